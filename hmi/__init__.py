@@ -1,0 +1,1 @@
+"""The operator panel, served to a browser."""

@@ -1,0 +1,1 @@
+"""Quality-inspection station for soft fruit."""

@@ -1,0 +1,1 @@
+"""Images from files in; results, masks, curves, plots and a report out."""

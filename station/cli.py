@@ -1,0 +1,82 @@
+"""The command `station`: a table of commands, each loaded only when it is asked for."""
+
+import importlib
+import sys
+from importlib.metadata import version
+from typing import NamedTuple, NoReturn
+
+import click
+
+from station.errors import StationError
+
+
+class Entry(NamedTuple):
+    """Where a command lives, as `module:attribute`, and its one line in `station --help`."""
+
+    target: str
+    summary: str
+
+
+COMMANDS = {
+    "analyze": Entry("station.commands.analyze:analyze", "Measure the deformed area in tactile images."),
+    "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command's module only to run it or to show its help."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Give the names in the table's order.
+
+        Args:
+            ctx: unused, click's.
+        """
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and give the command, or None where the table has no such name.
+
+        Args:
+            ctx: unused, click's.
+            cmd_name: the name typed by the user.
+        """
+        if cmd_name not in COMMANDS:
+            return None
+        module, attribute = COMMANDS[cmd_name].target.split(":")
+        return getattr(importlib.import_module(module), attribute)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands without importing any of them.
+
+        Args:
+            ctx: unused, click's.
+            formatter: what the list is written to.
+        """
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, entry.summary) for name, entry in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(version("fruit-station"), prog_name="station")
+def cli() -> None:
+    """Inspect soft fruit with a gripper and an opto-tactile sensor."""
+
+
+def main() -> NoReturn:
+    """Run the command line: exit code 0 on success, 2 on bad usage or bad input, 1 on a failure."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except click.Abort:
+        click.echo("station: interrupted", err=True)
+        code = 130
+    except StationError as error:
+        click.echo(f"station: {error}", err=True)
+        code = error.exit_code
+    except BrokenPipeError:
+        sys.stderr.close()
+        code = 1
+    raise SystemExit(code if isinstance(code, int) else 0)

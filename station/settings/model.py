@@ -1,0 +1,38 @@
+"""The base of every settings model: strict, frozen, and explained field by field."""
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Settings(BaseModel):
+    """A settings model that refuses unknown keys, wrong types, NaN and infinity, and never changes."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        validate_default=True,
+    )
+
+
+def setting(
+    default: Any = ...,
+    *,
+    title: str,
+    description: str,
+    unit: str | None = None,
+    **bounds: Any,
+) -> Any:
+    """Declare a field of a settings model.
+
+    Args:
+        default: the value where the file gives none; left out, the field is required.
+        title: the name shown to a person, without the unit.
+        description: what the value does and where its default comes from, in one or two sentences.
+        unit: the unit's symbol (`mm`, `s`, `px`, `N`), or None for a number without one, a text or a choice.
+        bounds: pydantic's own constraints (`ge`, `le`, `gt`, `lt`, `min_length`, `pattern`, …).
+    """
+    extra = {"unit": unit} if unit else None
+    return Field(default, title=title, description=description, json_schema_extra=extra, **bounds)

@@ -1,0 +1,1 @@
+"""The simulated world on the real wire protocols; nobody in the station imports it."""

@@ -1,0 +1,1 @@
+"""Images in, contact out: pure functions over arrays."""

@@ -1,0 +1,91 @@
+"""What every test lives under: nothing may outlive it, and a missing tool is an error where CI says so."""
+
+import asyncio
+import gc
+import os
+import shutil
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+import pytest
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+GRACE_S = 3.0
+
+
+class Living(NamedTuple):
+    """What is alive in this process and below it."""
+
+    threads: frozenset[threading.Thread]
+    processes: frozenset[int]
+    ports: frozenset[tuple[int, int]]
+    tasks: frozenset[asyncio.Task[object]]
+
+    @classmethod
+    def now(cls) -> "Living":
+        me = psutil.Process()
+        children = [child for child in me.children(recursive=True) if child.status() != psutil.STATUS_ZOMBIE]
+        listening = {
+            (connection.fd, connection.laddr.port)
+            for connection in me.net_connections(kind="inet")
+            if connection.status == psutil.CONN_LISTEN
+        }
+        tasks = {thing for thing in gc.get_objects() if isinstance(thing, asyncio.Task) and not thing.done()}
+        return cls(
+            frozenset(threading.enumerate()),
+            frozenset(child.pid for child in children),
+            frozenset(listening),
+            frozenset(tasks),
+        )
+
+    def beyond(self, before: "Living") -> list[str]:
+        """What is here now and was not before, in words."""
+        new_threads = [thread.name for thread in self.threads - before.threads if thread.is_alive()]
+        return [
+            *(f"thread {name}" for name in new_threads),
+            *(f"process {pid}" for pid in self.processes - before.processes),
+            *(f"listening port {port}" for _, port in self.ports - before.ports),
+            *(f"task {task.get_name()}" for task in self.tasks - before.tasks),
+        ]
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind() -> Iterator[None]:
+    """Fail a test that leaves a thread, process, listening port or asyncio task."""
+    before = Living.now()
+    yield
+    deadline = time.monotonic() + GRACE_S
+    while left := Living.now().beyond(before):
+        if time.monotonic() > deadline:
+            pytest.fail(f"left behind: {', '.join(left)}", pytrace=False)
+        threading.Event().wait(0.02)
+
+
+def missing(what: str) -> None:
+    """Skip a test for want of a tool; fail it where CI promises that tools are there."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
+    pytest.skip(f"{what} is missing on this machine")
+
+
+@pytest.fixture
+def chromium() -> str:
+    """The path of the browser."""
+    path = shutil.which("chromium")
+    if path is None:
+        missing("chromium")
+    assert path is not None
+    return path
+
+
+@pytest.fixture(scope="session")
+def real_images() -> Path:
+    """The folder of real DIGIT images, which lies beside the project and is no part of it."""
+    folder = SHARED / "data"
+    if not (folder / "digit_presses").is_dir():
+        pytest.skip("the folder of real DIGIT images is not beside this checkout")
+    return folder
