@@ -34,5 +34,6 @@ def setting(
         unit: the unit's symbol (`mm`, `s`, `px`, `N`), or None for a number without one, a text or a choice.
         bounds: pydantic's own constraints (`ge`, `le`, `gt`, `lt`, `min_length`, `pattern`, …).
     """
-    extra = {"unit": unit} if unit else None
-    return Field(default, title=title, description=description, json_schema_extra=extra, **bounds)
+    if unit:
+        bounds["json_schema_extra"] = {"unit": unit}
+    return Field(default, title=title, description=description, **bounds)

@@ -1,0 +1,110 @@
+"""How a recipe has the contact found in an image: the method and every parameter of it."""
+
+from typing import Literal
+
+from station.settings.model import Settings, setting
+
+
+class PaperParameters(Settings):
+    """The pipeline as printed in Computers and Electronics in Agriculture 235 (2025) 110397."""
+
+    amplification: float = setting(
+        10.0,
+        title="Amplification",
+        description="Factor on the colour difference to the reference; the paper prints 10.",
+        ge=1.0,
+        le=50.0,
+    )
+    denoise_h: float = setting(
+        20.0,
+        title="Denoising strength, brightness",
+        description="Filter strength h of the non-local means for brightness; the paper prints 20.",
+        unit="grey level",
+        ge=0.0,
+        le=100.0,
+    )
+    denoise_h_color: float = setting(
+        21.0,
+        title="Denoising strength, colour",
+        description="Filter strength hColor of the non-local means for colour; the paper prints 21.",
+        unit="grey level",
+        ge=0.0,
+        le=100.0,
+    )
+    template_window_px: int = setting(
+        21,
+        title="Template window",
+        description="Side of the compared patches. The paper prints 20; OpenCV needs an odd side, so 21.",
+        unit="px",
+        ge=1,
+        le=61,
+    )
+    search_window_px: int = setting(
+        7,
+        title="Search window",
+        description="Side of the window that is searched for like patches; the paper prints 7.",
+        unit="px",
+        ge=1,
+        le=61,
+    )
+    clusters: int = setting(
+        2,
+        title="Clusters",
+        description="Number of K-means clusters; the brightest is taken as contact. The paper prints 2.",
+        ge=2,
+        le=8,
+    )
+    kmeans_starts: int = setting(
+        10,
+        title="K-means starts",
+        description="Random starts of which the most compact wins; not printed in the paper, common practice.",
+        ge=1,
+        le=50,
+    )
+    kernel_px: int = setting(
+        3,
+        title="Morphology kernel",
+        description="Side of the square kernel of the closing and the opening; the paper prints 3x3.",
+        unit="px",
+        ge=1,
+        le=51,
+    )
+    smallest_component_px: int = setting(
+        5000,
+        title="Smallest component",
+        description="Components below this are dropped; printed for 640x480 and scaled with the image's area.",
+        unit="px",
+        ge=0,
+        le=307_200,
+    )
+    seed: int = setting(
+        0,
+        title="Seed",
+        description="Seed of the K-means starts, so that the same image always gives the same mask.",
+        ge=0,
+        le=2**31 - 1,
+    )
+
+
+class RobustParameters(Settings):
+    """The station's own method."""
+
+
+class Segmentation(Settings):
+    """The method that a recipe uses, with the parameters of both methods for comparison."""
+
+    method: Literal["robust", "paper"] = setting(
+        "robust",
+        title="Method",
+        description="`robust` is the station's own method, `paper` the published pipeline as printed.",
+    )
+    paper: PaperParameters = setting(
+        PaperParameters(),
+        title="Paper's parameters",
+        description="Used when the paper's method is chosen.",
+    )
+    robust: RobustParameters = setting(
+        RobustParameters(),
+        title="Robust parameters",
+        description="Used when the robust method is chosen.",
+    )

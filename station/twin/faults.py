@@ -1,0 +1,76 @@
+"""The faults that can be switched on in a twin's device while it runs."""
+
+from enum import StrEnum
+
+
+class CommonFault(StrEnum):
+    """Faults that every device knows."""
+
+    OFF = "off"
+    """Gone: connections refused or cut."""
+    STUCK = "stuck"
+    """Alive on the wire, but its state never changes again."""
+    GARBAGE = "garbage"
+    """Answers that are no protocol at all."""
+    WRONG = "wrong"
+    """Well-formed answers with wrong values."""
+    SLOW = "slow"
+    """Does everything at a fraction of its speed."""
+    DELAYED = "delayed"
+    """Answers late."""
+    INTERMITTENT = "intermittent"
+    """Comes and goes."""
+
+
+class FaultBoard:
+    """One device's switches. The device asks; tests, the console and the command line set."""
+
+    def __init__(self, device: str, own: tuple[str, ...] = ()) -> None:
+        self.device = device
+        self.known: tuple[str, ...] = (*CommonFault, *own)
+        self._active: dict[str, float] = {}
+
+    def set(self, fault: str, amount: float = 1.0) -> None:
+        """Switch a fault on.
+
+        Args:
+            fault: one of `known`.
+            amount: its strength in the unit that the device documents (seconds for `delayed`, …).
+
+        Raises:
+            ValueError: the device has no such fault.
+        """
+        if fault not in self.known:
+            raise ValueError(f"{self.device} has no fault {fault!r}; it knows: {', '.join(self.known)}")
+        self._active[fault] = amount
+
+    def clear(self, fault: str | None = None) -> None:
+        """Switch one fault off, or all of them.
+
+        Args:
+            fault: the fault's name; None for all.
+        """
+        if fault is None:
+            self._active.clear()
+        else:
+            self._active.pop(fault, None)
+
+    def active(self, fault: str) -> bool:
+        """Whether a fault is switched on.
+
+        Args:
+            fault: the fault's name.
+        """
+        return fault in self._active
+
+    def amount(self, fault: str) -> float:
+        """A fault's strength, 0.0 where it is off.
+
+        Args:
+            fault: the fault's name.
+        """
+        return self._active.get(fault, 0.0)
+
+    def snapshot(self) -> dict[str, float]:
+        """All faults that are on, with their strengths."""
+        return dict(self._active)

@@ -1,0 +1,83 @@
+"""What a measurement method says about one image."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+"""A colour image, shape (height, width, 3), dtype uint8, channels B, G, R as OpenCV reads them."""
+
+Mask = npt.NDArray[np.uint8]
+"""A mask, shape (height, width), dtype uint8, 0 or 255."""
+
+StageSink = Callable[[str, npt.NDArray[np.uint8]], None]
+"""Takes a stage's name and its picture: (height, width, 3) BGR or (height, width) grey, dtype uint8."""
+
+
+class Flag(StrEnum):
+    """What a reader of an area has to know about it."""
+
+    NO_CONTACT = "no_contact"
+    """Nothing touches the gel: the area is 0."""
+    CUT_BY_BORDER = "cut_by_border"
+    """The contact reaches the image's border: the area is a lower bound."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The contact found in one image; `area_px` is 0 and `centroid_px` None where there is none."""
+
+    mask: Mask
+    area_px: int
+    centroid_px: tuple[float, float] | None
+    """x to the right and y down from the centre of the upper left pixel."""
+    flags: frozenset[Flag]
+
+    @property
+    def found(self) -> bool:
+        """Whether anything touches the gel."""
+        return self.area_px > 0
+
+
+class Method(Protocol):
+    """A measurement method, made once for a reference and used for many images of its size."""
+
+    stages: tuple[str, ...]
+    """The names of the stages' pictures in the order in which they come."""
+
+    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+        """Find the contact in an image.
+
+        Args:
+            image: shape and channels as the reference's.
+            on_stage: gets each stage's picture; nothing is drawn for it where it is None.
+
+        Raises:
+            ValueError: the image's shape or dtype is not the reference's.
+        """
+        ...
+
+
+def contact_from_mask(mask: Mask, flags: frozenset[Flag] = frozenset()) -> Contact:
+    """Measure a mask: its area and centroid, with the flags that follow from it added.
+
+    Args:
+        mask: shape (height, width), dtype uint8, 0 or 255.
+        flags: what the method itself has to say.
+    """
+    inside = mask > 0
+    area_px = int(np.count_nonzero(inside))
+    if area_px == 0:
+        return Contact(mask, 0, None, flags | {Flag.NO_CONTACT})
+    rows, columns = inside.sum(axis=1), inside.sum(axis=0)
+    centroid_px = (
+        float(np.arange(columns.size) @ columns) / area_px,
+        float(np.arange(rows.size) @ rows) / area_px,
+    )
+    if rows[0] or rows[-1] or columns[0] or columns[-1]:
+        flags |= {Flag.CUT_BY_BORDER}
+    return Contact(mask, area_px, centroid_px, flags)
