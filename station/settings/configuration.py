@@ -1,0 +1,213 @@
+"""The station's configuration: defaults, then `station.yaml`, then the environment."""
+
+import ipaddress
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, model_validator
+
+from station.settings.environment import CONFIG_VARIABLE, PLACE, overrides, variable
+from station.settings.model import Settings, setting
+from station.settings.problems import Contradiction, Problem, SettingsError, dotted
+from station.settings.problems import Path as Where
+from station.settings.schema import branches, leaves, schema_of
+from station.settings.validation import validated
+from station.settings.yaml_loader import Document, read_document
+
+FILE_NAME = "station.yaml"
+
+_HOST_NAME = re.compile(r"(?=.{1,253}$)(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
+
+
+def _host(text: str) -> str:
+    """Refuse what is neither an IP address nor a host's name; digits and dots alone are an address or nothing."""
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        if not _HOST_NAME.fullmatch(text) or re.fullmatch(r"[0-9.]+", text):
+            raise ValueError("expected an IP address or a host's name") from None
+    return text
+
+
+def _folder(path: Path) -> Path:
+    """Refuse the empty text, and what no file system or only a shell understands."""
+    if path == Path() or "\0" in str(path) or "~" in path.parts:
+        raise ValueError("expected the path of a folder, written out without ~")
+    return path
+
+
+Host = Annotated[str, AfterValidator(_host)]
+Folder = Annotated[Path, AfterValidator(_folder)]
+
+
+class ModbusSettings(Settings):
+    """Where the line's PLC reaches the station."""
+
+    host: Host = setting(
+        "127.0.0.1",
+        title="Address",
+        description="Network address on which Modbus TCP is served; loopback until a site decides otherwise.",
+        max_length=253,
+    )
+    port: int = setting(
+        5020,
+        title="Port",
+        description="TCP port of Modbus; a site sets 502, which needs the right to bind low ports.",
+        ge=1,
+        le=65_535,
+    )
+    unit: int = setting(
+        1,
+        title="Unit",
+        description="Modbus unit identifier that the station answers to; 0 and 248 to 255 are reserved.",
+        ge=1,
+        le=247,
+    )
+
+
+class HmiSettings(Settings):
+    """Where operators' browsers reach the station."""
+
+    host: Host = setting(
+        "127.0.0.1",
+        title="Address",
+        description="Network address on which the operators' pages are served.",
+        max_length=253,
+    )
+    port: int = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.", ge=1, le=65_535)
+
+
+class MetricsSettings(Settings):
+    """Where Prometheus and supervisors reach the station."""
+
+    host: Host = setting(
+        "127.0.0.1",
+        title="Address",
+        description="Network address on which /metrics, /livez, /readyz and /version are served.",
+        max_length=253,
+    )
+    port: int = setting(
+        9108,
+        title="Port",
+        description="TCP port of metrics and health over HTTP.",
+        ge=1,
+        le=65_535,
+    )
+
+
+class Configuration(Settings):
+    """What a site sets once: folders, addresses and devices. A recipe holds what changes with the fruit."""
+
+    home: Folder = setting(
+        Path("state"),
+        title="Home folder",
+        description=(
+            "Folder of the station's state. A relative path in the file counts from the file's folder, elsewhere "
+            "from the working folder."
+        ),
+    )
+    recipes_folder: Folder | None = setting(
+        None,
+        title="Recipe folder",
+        description="Folder of the site's recipes, counted as the home folder is; null takes the recipes shipped.",
+    )
+    modbus: ModbusSettings = setting(
+        ModbusSettings(), title="Modbus TCP", description="Where the line's PLC reaches the station."
+    )
+    hmi: HmiSettings = setting(HmiSettings(), title="HMI", description="Where operators' browsers reach the station.")
+    metrics: MetricsSettings = setting(
+        MetricsSettings(), title="Metrics", description="Where Prometheus and supervisors reach the station."
+    )
+
+    @model_validator(mode="after")
+    def _addresses_differ(self) -> Self:
+        """Two servers cannot share one address."""
+        servers = {name: (getattr(self, name).host, getattr(self, name).port) for name in ("modbus", "hmi", "metrics")}
+        clashes: list[tuple[Where, str]] = [
+            ((name, "port"), f"expected a port of its own, got {address[1]}, which {other}.port is too")
+            for name, address in servers.items()
+            for other in servers
+            if other != name and servers[other] == address
+        ]
+        if clashes:
+            raise Contradiction(clashes)
+        return self
+
+
+def load_configuration(file: Path | None = None, environ: Mapping[str, str] | None = None) -> Configuration:
+    """Read the configuration: defaults, overridden by the file, overridden by the environment.
+
+    The file is the one given; else the one that `STATION_CONFIG` names; else `station.yaml` in the home folder
+    (`STATION_HOME`, or the default) where there is one. Every path in the result is absolute.
+
+    Args:
+        file: the file that the user named.
+        environ: the environment; the process's own by default.
+
+    Raises:
+        SettingsError: all problems of the environment and of the file.
+    """
+    environ = os.environ if environ is None else environ
+    root = schema_of(Configuration)
+    given, problems = overrides(root, environ)
+    chosen = _file(file, environ)
+    document = read_document(chosen) if chosen else Document("default", None, {})
+    merged = document.value if document.value is not None else {}
+    for path, value in given.items():
+        merged = _with(merged, path, value)
+
+    def locate(path: Where) -> tuple[str, str]:
+        if path in given:
+            return PLACE, variable(path)
+        return document.locate(path) if chosen else ("built-in default", dotted(path))
+
+    merged = _anchored(merged, document, given, chosen.parent if chosen else Path())
+    document = replace(document, problems=(*problems, *document.problems))
+    return validated(Configuration, document, merged, locate)
+
+
+def _file(file: Path | None, environ: Mapping[str, str]) -> Path | None:
+    """The configuration file to read, or None for none."""
+    if file is not None:
+        return file
+    if CONFIG_VARIABLE in environ:
+        if not environ[CONFIG_VARIABLE]:
+            raise SettingsError([Problem(PLACE, CONFIG_VARIABLE, "expected the path of a file, got nothing")])
+        return Path(environ[CONFIG_VARIABLE])
+    in_home = Path(environ.get(variable(("home",)), Configuration().home)) / FILE_NAME
+    return in_home if os.path.lexists(in_home) else None
+
+
+def _with(values: Any, path: Where, value: Any) -> Any:
+    """Plain values with one more set; a section that is no mapping stays, to be refused as it stands."""
+    if not path:
+        return value
+    if values is None:
+        values = {}
+    if not isinstance(values, dict):
+        return values
+    return {**values, path[0]: _with(values.get(path[0]), path[1:], value)}
+
+
+def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folder: Path) -> Any:
+    """Plain values with every path absolute: the file's from its folder, all others from the working folder."""
+    root = schema_of(Configuration)
+    for leaf in leaves(root):
+        if all(branch.get("format") != "path" for branch in branches(leaf.node, root)):
+            continue
+        in_file = leaf.path in document.lines and leaf.path not in given
+        text = _at(values, leaf.path) if in_file or leaf.path in given else leaf.node.get("default")
+        if text and isinstance(text, str):
+            values = _with(values, leaf.path, str(Path(folder if in_file else "", text).absolute()))
+    return values
+
+
+def _at(values: Any, path: Where) -> Any:
+    """The value of a field, or None where there is none."""
+    for part in path:
+        values = values.get(part) if isinstance(values, dict) else None
+    return values

@@ -1,0 +1,83 @@
+"""The environment variables `STATION_…`, one for every field of the configuration that holds a value."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from station.settings.problems import Path, Problem, SettingsError, shortened
+from station.settings.schema import Leaf, Node, branches, expectation, leaves, shown
+from station.settings.yaml_loader import parse_document
+
+PREFIX = "STATION_"
+CONFIG_VARIABLE = "STATION_CONFIG"
+"""Names the configuration file; no field of it."""
+PLACE = "environment"
+
+
+def variable(path: Path) -> str:
+    """The variable of a field: its path's names in capitals, joined by `_`.
+
+    Args:
+        path: `("modbus", "port")` gives `STATION_MODBUS_PORT`.
+    """
+    return PREFIX + "_".join(str(part) for part in path).upper()
+
+
+def variables(root: Node) -> dict[str, Leaf]:
+    """Every variable with the field that it sets.
+
+    Args:
+        root: the configuration's schema.
+
+    Raises:
+        ValueError: two fields would have one variable; one of them needs another name.
+    """
+    known: dict[str, Leaf] = {}
+    for leaf in leaves(root):
+        name = variable(leaf.path)
+        if name in known or name == CONFIG_VARIABLE:
+            raise ValueError(f"{name} would set more than one thing: rename the field {leaf.path}")
+        known[name] = leaf
+    return known
+
+
+def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], list[Problem]]:
+    """The values that the environment gives, by their fields; and its unknown variables and texts that are no value.
+
+    Args:
+        root: the configuration's schema.
+        environ: all environment variables; those without the prefix are none of ours.
+    """
+    known = variables(root)
+    problems: list[Problem] = []
+    values: dict[Path, Any] = {}
+    for name in sorted(environ):
+        if not name.startswith(PREFIX) or name == CONFIG_VARIABLE:
+            continue
+        if name not in known:
+            problems.append(Problem(PLACE, shortened(name), _unknown(name, known)))
+            continue
+        leaf = known[name]
+        try:
+            values[leaf.path] = _value(environ[name], leaf.node, root)
+        except SettingsError:
+            wanted = expectation(leaf.node, root)
+            problems.append(Problem(PLACE, name, f"expected {wanted}, got {shown(environ[name])}"))
+    return values, problems
+
+
+def _value(text: str, node: Node, root: Node) -> Any:
+    """A variable's text as the field's value: as it stands for a text, else as a YAML file would hold it."""
+    if any(branch.get("type") == "string" for branch in branches(node, root)):
+        return text
+    document = parse_document(text.encode("utf-8", "surrogateescape"), PLACE)
+    if document.problems:
+        raise SettingsError(document.problems)
+    return document.value
+
+
+def _unknown(name: str, known: Iterable[str]) -> str:
+    """An unknown variable, with the known ones that it looks like."""
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else "see docs/configuration.md for those there are"
+    return f"unknown variable: {hint}"

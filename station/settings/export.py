@@ -1,0 +1,132 @@
+"""Write what is made from the settings models: `python -m station.settings.export`, in a checkout.
+
+The JSON Schemas, the example configuration and the tables of fields in the documents; a test compares them.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from station.settings.configuration import Configuration
+from station.settings.environment import variable
+from station.settings.recipe_model import Recipe
+from station.settings.schema import Leaf, Node, expectation, leaves, resolved, schema_of
+
+ROOT = Path(__file__).resolve().parents[2]
+BEGIN, END = "<!-- fields: made by python -m station.settings.export -->\n", "<!-- end of fields -->\n"
+
+
+def exported(root: Path = ROOT) -> dict[Path, str]:
+    """What each file has to hold.
+
+    Args:
+        root: the checkout; the documents there are read for the text around their tables.
+    """
+    recipe_guide, configuration_guide = root / "docs" / "recipes.md", root / "docs" / "configuration.md"
+    return {
+        root / "recipes" / "recipe.schema.json": json_schema(Recipe, "A recipe of the fruit-inspection station"),
+        root / "deploy" / "station.schema.json": json_schema(Configuration, "station.yaml"),
+        root / "deploy" / "station.yaml": example(),
+        recipe_guide: _with_table(recipe_guide.read_text(encoding="utf-8"), recipe_table()),
+        configuration_guide: _with_table(configuration_guide.read_text(encoding="utf-8"), configuration_table()),
+    }
+
+
+def json_schema(model: type[BaseModel], title: str) -> str:
+    """A model's JSON Schema as a file.
+
+    Args:
+        model: the settings model.
+        title: what the file describes.
+    """
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(model), "title": title}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def recipe_table() -> str:
+    """The recipe's fields as a Markdown table."""
+    root = schema_of(Recipe)
+    rows = [_row([f"`{_dotted(leaf)}`", *_columns(leaf, root)]) for leaf in leaves(root, into_lists=True)]
+    return "".join([_head("field", "title", "takes", "default", "meaning"), *rows])
+
+
+def configuration_table() -> str:
+    """The configuration's fields as a Markdown table, with their environment variables."""
+    root = schema_of(Configuration)
+    rows = [_row([f"`{_dotted(leaf)}`", f"`{variable(leaf.path)}`", *_columns(leaf, root)]) for leaf in leaves(root)]
+    return "".join([_head("field", "variable", "title", "takes", "default", "meaning"), *rows])
+
+
+def example() -> str:
+    """A `station.yaml` with every default, commented out: `## ` explains, `# ` is a setting."""
+    return "".join(
+        [
+            "# yaml-language-server: $schema=station.schema.json\n\n",
+            "## The station's configuration with all its defaults: take the `# ` away from what is to change,\n",
+            "## and from the line of its section. Guide: docs/configuration.md\n",
+            *_section(schema_of(Configuration), schema_of(Configuration), 0),
+        ]
+    )
+
+
+def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
+    """The lines of one section's fields."""
+    indent = "  " * depth
+    for name, child in resolved(node, root)["properties"].items():
+        field = resolved(child, root)
+        yield "\n" if depth == 0 else ""
+        yield f"## {indent}{field['description']}\n"
+        if "properties" in field:
+            yield f"# {indent}{name}:\n"
+            yield from _section(field, root, depth + 1)
+        else:
+            yield f"## {indent}Takes {expectation(field, root)}.\n"
+            yield f"# {indent}{name}: {json.dumps(field.get('default'), ensure_ascii=False)}\n"
+
+
+def _columns(leaf: Leaf, root: Node) -> list[str]:
+    """A field's title, what it takes, its default and its meaning."""
+    default = f"`{json.dumps(leaf.node['default'], ensure_ascii=False)}`" if "default" in leaf.node else "required"
+    takes = "a list of the following" if _of_mappings(leaf, root) else expectation(leaf.node, root)
+    return [leaf.node.get("title", ""), takes, default, leaf.node.get("description", "")]
+
+
+def _of_mappings(leaf: Leaf, root: Node) -> bool:
+    """Whether a field is a list of mappings."""
+    return "properties" in resolved(leaf.node.get("items") or {}, root)
+
+
+def _dotted(leaf: Leaf) -> str:
+    """A field's path with dots."""
+    return ".".join(str(part) for part in leaf.path)
+
+
+def _head(*names: str) -> str:
+    """A table's first two rows."""
+    return _row(list(names)) + _row(["---"] * len(names))
+
+
+def _row(cells: list[str]) -> str:
+    """One row of a table."""
+    escaped = [cell.replace("|", "\\|") for cell in cells]
+    return f"| {' | '.join(escaped)} |\n"
+
+
+def _with_table(text: str, table: str) -> str:
+    """A document with the table between its two marks renewed."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}{table}{END}{after}"
+
+
+def main() -> None:
+    """Write every file that is made from the models."""
+    for path, text in exported().items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

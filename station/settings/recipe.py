@@ -1,0 +1,128 @@
+"""Find and read recipe files, alone or a folder of them."""
+
+import difflib
+import importlib.resources
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from station.errors import BadInputError
+from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.recipe_model import Recipe
+from station.settings.validation import load_file
+from station.settings.yaml_loader import read_document
+
+__all__ = ["Checked", "Recipe", "check_recipes", "find_recipe", "load_recipe", "load_recipes", "recipe_files"]
+
+SUFFIXES = (".yaml", ".yml")
+
+
+class Checked(NamedTuple):
+    """What a number of files hold."""
+
+    recipes: dict[Path, Recipe]
+    """The good ones, by their files; of recipes that clash with each other, none."""
+    problems: tuple[Problem, ...]
+
+
+def load_recipe(path: Path) -> Recipe:
+    """Read one recipe.
+
+    Args:
+        path: its file.
+
+    Raises:
+        SettingsError: all problems of the file.
+    """
+    return load_file(Recipe, path)
+
+
+def load_recipes(folder: Path | None = None) -> dict[str, Recipe]:
+    """Read all recipes of a folder, by name.
+
+    Args:
+        folder: the folder; the recipes shipped with the station by default.
+
+    Raises:
+        SettingsError: all problems of all files; the folder cannot be read or holds no recipe; two files hold the
+            same name or PLC number.
+    """
+    checked = check_recipes(recipe_files(folder))
+    if checked.problems:
+        raise SettingsError(checked.problems)
+    return {recipe.name: recipe for recipe in checked.recipes.values()}
+
+
+def find_recipe(name_or_path: str | Path, folder: Path | None = None) -> Recipe:
+    """Read a recipe by its name, or by its file's path: whatever ends in `.yaml` or holds a separator is a path.
+
+    A broken file beside the one looked for does no harm.
+
+    Args:
+        name_or_path: what the user asked for.
+        folder: where names are looked for; the recipes shipped with the station by default.
+
+    Raises:
+        BadInputError: there is no such recipe; the message lists those there are. Or its file is bad.
+    """
+    if isinstance(name_or_path, Path) or "/" in name_or_path or name_or_path.endswith(SUFFIXES):
+        return load_recipe(Path(name_or_path))
+    files = recipe_files(folder)
+    checked = check_recipes(files)
+    known = {recipe.name: recipe for recipe in checked.recipes.values()}
+    if name_or_path in known:
+        return known[name_or_path]
+    near = difflib.get_close_matches(name_or_path, known, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    problems = "".join(f"\n{problem}" for problem in checked.problems)
+    raise BadInputError(
+        f"recipe {shortened(name_or_path)}: {hint}expected the path of a .yaml file or one of "
+        f"{', '.join(sorted(known)) or 'no recipe at all'} (in {files[0].parent}){problems}"
+    )
+
+
+def recipe_files(folder: Path | None = None) -> list[Path]:
+    """The recipe files of a folder, sorted by name.
+
+    Args:
+        folder: the folder; the recipes shipped with the station by default.
+
+    Raises:
+        SettingsError: the folder cannot be read or holds no recipe.
+    """
+    folder = Path(str(importlib.resources.files("recipes"))) if folder is None else folder
+    try:
+        files = sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES and path.name[0] != ".")
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        problem = Problem(shortened(str(folder), 1000), "folder", f"expected a folder of recipes: {reason.lower()}")
+        raise SettingsError([problem]) from error
+    if not files:
+        raise SettingsError([Problem(shortened(str(folder), 1000), "folder", "expected recipes (*.yaml), got none")])
+    return files
+
+
+def check_recipes(files: Iterable[Path]) -> Checked:
+    """Read many recipes, whatever is wrong with some of them.
+
+    Args:
+        files: the recipes' files.
+    """
+    recipes: dict[Path, Recipe] = {}
+    problems: list[Problem] = []
+    for path in files:
+        try:
+            recipes[path] = load_recipe(path)
+        except SettingsError as error:
+            problems += error.problems
+    clashing: set[Path] = set()
+    for field in ("name", "plc_number"):
+        first: dict[str | int, Path] = {}
+        for path, recipe in recipes.items():
+            value = getattr(recipe, field)
+            other = first.setdefault(value, path)
+            if other != path:
+                clashing |= {other, path}
+                place = read_document(path).locate((field,))
+                problems.append(Problem(*place, f"expected one recipe with {value}, but {other} has it too"))
+    return Checked({path: recipe for path, recipe in recipes.items() if path not in clashing}, tuple(problems))

@@ -1,0 +1,264 @@
+"""One fruit's recipe: how it is pressed, how the contact is found, and what is too much."""
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from station.settings.model import Settings, setting
+from station.settings.problems import Contradiction, Path
+from station.settings.segmentation import Segmentation
+
+LARGEST_AREA_MM2 = 260.0
+"""No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
+
+
+class WidthRange(Settings):
+    """The widths of fruit that the recipe is meant for."""
+
+    smallest_mm: float = setting(
+        title="Smallest", description="A narrower fruit is not this recipe's.", unit="mm", ge=1.0, le=85.0
+    )
+    largest_mm: float = setting(
+        title="Largest", description="A wider fruit is not this recipe's.", unit="mm", ge=1.0, le=85.0
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.smallest_mm >= self.largest_mm:
+            raise Contradiction(
+                [(("smallest_mm",), f"expected less than largest_mm, {self.largest_mm:g} mm, got {self.smallest_mm:g}")]
+            )
+        return self
+
+
+class WidthSteps(Settings):
+    """How the gripper closes while images are taken."""
+
+    start: Literal["onset", "width"] = setting(
+        title="Start",
+        description="`onset` counts the steps from the measured first contact, `width` from a given gripper width.",
+    )
+    start_width_mm: float | None = setting(
+        None,
+        title="Start width",
+        description="Gripper width of the first image where `start` is `width`; else null.",
+        unit="mm",
+        ge=0.0,
+        le=85.0,
+    )
+    step_mm: float = setting(
+        title="Step",
+        description="Closing from one image to the next; a count of the gripper is about 0.4 mm.",
+        unit="mm",
+        ge=0.4,
+        le=5.0,
+    )
+    number: int = setting(
+        title="Number of steps",
+        description="Steps after the start; an image is taken at the start and after each step.",
+        ge=1,
+        le=100,
+    )
+    result_closings_mm: tuple[Annotated[float, Field(gt=0.0, le=50.0)], ...] = setting(
+        title="Results' closings",
+        description="Closings from the onset at which the area is a result, in ascending order.",
+        unit="mm",
+        min_length=1,
+        max_length=20,
+    )
+    closing_limit_mm: float = setting(
+        title="Closing limit",
+        description="No command closes the gripper further than this from the start of the steps.",
+        unit="mm",
+        ge=0.4,
+        le=50.0,
+    )
+
+    @property
+    def travel_mm(self) -> float:
+        """Closing from the start to the last image, mm."""
+        return round(self.step_mm * self.number, 6)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        if self.start == "width" and self.start_width_mm is None:
+            wrong.append((("start_width_mm",), "expected a width, as start is 'width'"))
+        if self.start == "onset" and self.start_width_mm is not None:
+            wrong.append((("start_width_mm",), f"expected null, as start is 'onset', got {self.start_width_mm:g}"))
+        if self.start_width_mm is not None and self.travel_mm > self.start_width_mm:
+            wrong.append((("number",), f"expected steps within the start width, got {self.travel_mm:g} mm of closing"))
+        if self.travel_mm > self.closing_limit_mm:
+            limit = f"closing_limit_mm, {self.closing_limit_mm:g} mm"
+            wrong.append((("number",), f"expected steps within {limit}, got {self.travel_mm:g} mm of closing"))
+        for index, closing_mm in enumerate(self.result_closings_mm):
+            place = ("result_closings_mm", index)
+            if closing_mm > self.travel_mm:
+                wrong.append((place, f"expected within the steps, {self.travel_mm:g} mm, got {closing_mm:g}"))
+            elif index and closing_mm <= self.result_closings_mm[index - 1]:
+                wrong.append((place, f"expected more than the closing before, got {closing_mm:g}"))
+        if wrong:
+            raise Contradiction(wrong)
+        return self
+
+
+class Grip(Settings):
+    """How the gripper moves during the steps."""
+
+    speed_mm_s: float = setting(
+        title="Speed",
+        description="Closing speed; the 2F-85 takes 20 to 150 mm/s.",
+        unit="mm/s",
+        ge=20.0,
+        le=150.0,
+    )
+    force_n: float = setting(
+        title="Force limit",
+        description="The gripper's own force limit, 20 to 235 N on the 2F-85. It does not protect soft fruit.",
+        unit="N",
+        ge=20.0,
+        le=235.0,
+    )
+
+
+class Imaging(Settings):
+    """When images are taken, and how many."""
+
+    settle_s: float = setting(
+        title="Settle time",
+        description="Wait after each step before the first frame: soft fruit creeps.",
+        unit="s",
+        ge=0.0,
+        le=10.0,
+    )
+    frames_per_step: int = setting(
+        title="Frames a step",
+        description="Frames averaged after each step.",
+        ge=1,
+        le=30,
+    )
+    reference_frames: int = setting(
+        title="Reference frames",
+        description="Frames with nothing touching the gel whose median is the reference.",
+        ge=1,
+        le=60,
+    )
+
+
+class AreaThreshold(Settings):
+    """The contact area above which a fruit is damaged, at one closing."""
+
+    closing_mm: float = setting(
+        title="Closing", description="One of the results' closings.", unit="mm", gt=0.0, le=50.0
+    )
+    area_mm2: float = setting(
+        title="Area", description="A larger area fails the fruit.", unit="mm²", gt=0.0, le=LARGEST_AREA_MM2
+    )
+
+
+class DamageThresholds(Settings):
+    """What fails a fruit."""
+
+    area: tuple[AreaThreshold, ...] = setting(
+        title="Area thresholds",
+        description="Largest areas of a good fruit, in ascending order of closing.",
+        min_length=1,
+        max_length=20,
+    )
+    growth_mm2_per_mm: float = setting(
+        title="Growth threshold",
+        description="A larger growth of the area per millimetre of closing fails the fruit.",
+        unit="mm²/mm",
+        gt=0.0,
+        le=500.0,
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        for index, (before, after) in enumerate(pairwise(self.area), start=1):
+            if after.closing_mm <= before.closing_mm:
+                text = f"expected more than the threshold before, got {after.closing_mm:g}"
+                wrong.append((("area", index, "closing_mm"), text))
+            if after.area_mm2 < before.area_mm2:
+                text = f"expected no less than the threshold before, got {after.area_mm2:g}"
+                wrong.append((("area", index, "area_mm2"), text))
+        if wrong:
+            raise Contradiction(wrong)
+        return self
+
+
+class EarlyStop(Settings):
+    """What ends the steps before the last one, to spare fruit and gel."""
+
+    area_mm2: float = setting(
+        title="Area limit",
+        description="At a larger area no further step is made.",
+        unit="mm²",
+        gt=0.0,
+        le=LARGEST_AREA_MM2,
+    )
+    growth_mm2_per_mm: float = setting(
+        title="Growth limit",
+        description="At a larger growth of the area per millimetre of closing no further step is made.",
+        unit="mm²/mm",
+        gt=0.0,
+        le=1000.0,
+    )
+
+
+class Recipe(Settings):
+    """One fruit's width steps, segmentation and damage thresholds."""
+
+    schema_version: Literal[1] = setting(
+        title="Schema version", description="The version of this form; the number rises when a field's meaning changes."
+    )
+    name: str = setting(
+        title="Name",
+        description="The recipe's name in commands and records: small letters, digits and underscores.",
+        pattern=r"^[a-z][a-z0-9_]{0,31}$",
+    )
+    title: str = setting(
+        title="Title",
+        description="The name that operators see, one line of at most 40 characters.",
+        pattern=r"^\S.{0,39}$",
+    )
+    plc_number: int = setting(
+        title="PLC number",
+        description="The number by which the line's PLC names the recipe; 0 is none.",
+        ge=1,
+        le=65_535,
+    )
+    expected_width: WidthRange = setting(
+        title="Expected width", description="The widths of fruit that the recipe is meant for."
+    )
+    steps: WidthSteps = setting(title="Width steps", description="How the gripper closes while images are taken.")
+    gripper: Grip = setting(title="Gripper", description="How the gripper moves during the steps.")
+    imaging: Imaging = setting(title="Imaging", description="When images are taken, and how many.")
+    segmentation: Segmentation = setting(
+        Segmentation(), title="Segmentation", description="How the contact is found in an image."
+    )
+    damage: DamageThresholds = setting(title="Damage thresholds", description="What fails a fruit.")
+    early_stop: EarlyStop = setting(
+        title="Early stop", description="What ends the steps before the last one, to spare fruit and gel."
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        closings = ", ".join(f"{closing_mm:g}" for closing_mm in self.steps.result_closings_mm)
+        for index, threshold in enumerate(self.damage.area):
+            if threshold.closing_mm not in self.steps.result_closings_mm:
+                text = f"expected one of the results' closings ({closings}), got {threshold.closing_mm:g}"
+                wrong.append((("damage", "area", index, "closing_mm"), text))
+        largest_mm2 = max(threshold.area_mm2 for threshold in self.damage.area)
+        if self.early_stop.area_mm2 < largest_mm2:
+            text = f"expected no less than the largest damage threshold, {largest_mm2:g} mm², got"
+            wrong.append((("early_stop", "area_mm2"), f"{text} {self.early_stop.area_mm2:g}"))
+        if self.early_stop.growth_mm2_per_mm < self.damage.growth_mm2_per_mm:
+            text = f"expected no less than the damage threshold, {self.damage.growth_mm2_per_mm:g} mm²/mm, got"
+            wrong.append((("early_stop", "growth_mm2_per_mm"), f"{text} {self.early_stop.growth_mm2_per_mm:g}"))
+        if wrong:
+            raise Contradiction(wrong)
+        return self

@@ -1,0 +1,123 @@
+"""From plain values to a settings model, or to every problem in a person's words."""
+
+import difflib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from station.settings.model import Settings
+from station.settings.problems import Contradiction, Problem, SettingsError, shortened
+from station.settings.problems import Path as Where
+from station.settings.schema import Node, expectation, find, names, schema_of, shown
+from station.settings.yaml_loader import Document, read_document
+
+Model = TypeVar("Model", bound=Settings)
+
+Locate = Callable[[Where], tuple[str, str]]
+"""Says where a value was written and what it is called there: `file:line` and `modbus.port`."""
+
+
+def load_file(model: type[Model], path: Path) -> Model:
+    """Read a YAML file into a model.
+
+    Args:
+        model: what the file has to hold.
+        path: the file.
+
+    Raises:
+        SettingsError: all problems of the file, in the order of its lines.
+    """
+    document = read_document(path)
+    return validated(model, document, document.value, document.locate)
+
+
+def validated(model: type[Model], document: Document, value: Any, locate: Locate) -> Model:
+    """Check plain values against a model.
+
+    Args:
+        model: what the values have to be.
+        document: the file they come from; its own problems come first.
+        value: the values: mappings, lists, texts, numbers, truth values and None.
+        locate: says where a value was written.
+
+    Raises:
+        SettingsError: all problems.
+    """
+    problems = list(document.problems)
+    if () in document.doubtful:
+        raise SettingsError(problems)
+    try:
+        # As JSON, because strict pydantic then takes a list for a tuple and a text for an enumeration.
+        checked = model.model_validate_json(json.dumps(value))
+    except ValidationError as error:
+        for details in error.errors():
+            problems += _problems(details, value, schema_of(model), locate, document.doubtful)
+        raise SettingsError(sorted(problems, key=_line)) from error
+    if problems:
+        raise SettingsError(problems)
+    return checked
+
+
+def _line(problem: Problem) -> int:
+    """A problem's line, for sorting; 0 where its place has none."""
+    line = problem.place.rpartition(":")[2]
+    return int(line) if line.isdecimal() else 0
+
+
+def _problems(
+    details: ErrorDetails, value: Any, root: Node, locate: Locate, doubtful: frozenset[Where]
+) -> list[Problem]:
+    """What one complaint of pydantic's means to a person; nothing where the loader has complained already."""
+    path = _cleaned(details["loc"], value)
+    if any(path[: len(each)] == each for each in doubtful):
+        return []
+    cause = details.get("ctx", {}).get("error")
+    if isinstance(cause, Contradiction):
+        return [Problem(*locate(path + inner), text) for inner, text in cause.parts]
+    return [Problem(*locate(path), _words(details, path, root, cause))]
+
+
+def _cleaned(location: tuple[str | int, ...], value: Any) -> Where:
+    """A path without the names of alternatives that pydantic mixes in; its last part may be missing in the value."""
+    path: list[str | int] = []
+    for index, part in enumerate(location):
+        inside = _inside(value, part)
+        if inside is not None:
+            path.append(part)
+            value = inside[0]
+        elif index == len(location) - 1 and isinstance(value, dict | list):
+            path.append(part)
+    return tuple(path)
+
+
+def _inside(value: Any, part: str | int) -> tuple[Any] | None:
+    """One entry or item, or None where there is none."""
+    if isinstance(value, dict) and part in value:
+        return (value[part],)
+    if isinstance(value, list) and isinstance(part, int) and part < len(value):
+        return (value[part],)
+    return None
+
+
+def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str:
+    """What was expected, and what came instead."""
+    if details["type"] == "extra_forbidden":
+        return _unknown(str(path[-1]), names(root, path[:-1]))
+    node = find(root, path)
+    wanted = expectation(node, root) if node else details["msg"]
+    if details["type"] == "missing":
+        return f"expected {wanted}, got nothing"
+    if cause is not None:
+        return f"{cause}, got {shown(details['input'])}"
+    return f"expected {wanted}, got {shown(details['input'])}"
+
+
+def _unknown(name: str, known: list[str]) -> str:
+    """An unknown key, with the known one that it looks like or all of them."""
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"expected {', '.join(known)}"
+    return f"unknown key {shortened(name)}: {hint}"
