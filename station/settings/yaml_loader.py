@@ -123,22 +123,31 @@ class _Composer:
         self._problems: list[Problem] = []
         self._doubtful: set[Where] = set()
         self._values = 0
-        self._at: Where = ()
+        self._scanned_lines = 0
 
     def document(self) -> Document:
         """Read the only document; nothing at all is None."""
         value = None
         try:
-            value = self._only_document(yaml.parse(self._text, Loader=yaml.SafeLoader))
+            value = self._only_document(self._events())
         except _Abandoned:
             self._doubtful.add(())
         except yaml.YAMLError as error:
             self._syntax(error)
         except (ValueError, OverflowError):  # PyYAML takes \UFFFFFFFF to chr() as it stands
-            self._note(self._at, self._lines.get(self._at, 1), "expected characters that exist in Unicode")
-            self._doubtful.add(())
+            self._note((), self._scanned_lines + 1, "expected characters that exist in Unicode")
         found = tuple(self._problems)
         return Document(self._source, value, self._lines, found, frozenset(self._doubtful))
+
+    def _events(self) -> Iterator[events.Event]:
+        """The parser's events; how far it has read stays known when it fails."""
+        loader = yaml.SafeLoader(self._text)
+        try:
+            while loader.check_event():
+                yield loader.get_event()
+        finally:
+            self._scanned_lines = loader.line
+            loader.dispose()
 
     def _only_document(self, stream: Iterator[events.Event]) -> Any:
         """The value of the stream's one document."""
@@ -156,7 +165,6 @@ class _Composer:
 
     def _value(self, event: events.Event, stream: Iterator[events.Event], path: Where) -> Any:
         """The value that begins with an event."""
-        self._at = path
         self._lines.setdefault(path, _line(event))
         self._values += 1
         if self._values > MOST_VALUES:
@@ -214,7 +222,7 @@ class _Composer:
         if event.style is None and event.value == "<<":
             self._note(path, _line(event), "expected a key, got the merge key <<: write the entries out")
             return None
-        here = (*path, shortened(event.value))
+        here = (*path, shortened(event.value) or "?")
         if event.anchor is not None or event.tag is not None:
             self._note(here, _line(event), "expected a key without anchor or tag")
             return None
