@@ -201,7 +201,7 @@ def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folde
             continue
         in_file = leaf.path in document.lines and leaf.path not in given
         text = _at(values, leaf.path) if in_file or leaf.path in given else leaf.node.get("default")
-        if text and isinstance(text, str):
+        if text and isinstance(text, str) and not text.startswith("~"):
             values = _with(values, leaf.path, str(Path(folder if in_file else "", text).absolute()))
     return values
 

@@ -78,6 +78,6 @@ def _value(text: str, node: Node, root: Node) -> Any:
 
 def _unknown(name: str, known: Iterable[str]) -> str:
     """An unknown variable, with the known ones that it looks like."""
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else "see docs/configuration.md for those there are"
+    near = difflib.get_close_matches(name.removeprefix(PREFIX), [each.removeprefix(PREFIX) for each in known], n=1)
+    hint = f"did you mean {PREFIX}{near[0]}?" if near else "see docs/configuration.md for those there are"
     return f"unknown variable: {hint}"

@@ -74,6 +74,8 @@ def _children(node: Node, part: str | int) -> list[Node]:
     if isinstance(part, int):
         items = node.get("prefixItems", ())
         child = items[part] if part < len(items) else node.get("items")
+        if isinstance(child, dict) and "unit" in node:
+            child = {**child, "unit": node["unit"]}
     else:
         child = node.get("properties", {}).get(part, node.get("additionalProperties"))
     return [child] if isinstance(child, dict) else []

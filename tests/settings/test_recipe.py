@@ -1,0 +1,325 @@
+"""Recipes: what is wrong is said with file, line, field and what was expected; the shipped ones are good."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.errors import BadInputError
+from station.settings.problems import Problem, SettingsError
+from station.settings.recipe import Recipe, find_recipe, load_recipe, load_recipes
+from station.settings.validation import validated
+from station.settings.yaml_loader import parse_document
+
+ALIKE = "expected a value that YAML 1.1 and 1.2 read alike, got"
+CLOSING = "a number above 0 and at most 50 mm"
+
+# What is changed in the small recipe, by regular expression, and what has to be said then.
+BAD = {
+    "text for a number": (
+        r"step_mm: 1",
+        "step_mm: x",
+        ["10: steps.step_mm: expected a number from 0.4 to 5 mm, got 'x'"],
+    ),
+    "quoted number": (
+        r"step_mm: 1",
+        "step_mm: '1'",
+        ["10: steps.step_mm: expected a number from 0.4 to 5 mm, got '1'"],
+    ),
+    "truth for a number": (
+        r"settle_s: 0.2",
+        "settle_s: true",
+        ["18: imaging.settle_s: expected a number from 0 to 10 s, got true"],
+    ),
+    "nothing": (r"force_n: 20", "force_n:", ["16: gripper.force_n: expected a number from 20 to 235 N, got nothing"]),
+    "too small": (r"force_n: 20", "force_n: 0", ["16: gripper.force_n: expected a number from 20 to 235 N, got 0"]),
+    "broken number of steps": (
+        r"number: 8",
+        "number: 8.0",
+        ["11: steps.number: expected an integer from 1 to 100, got 8.0"],
+    ),
+    "choice": (r"start: onset", "start: there", ["9: steps.start: expected one of onset, width, got 'there'"]),
+    "no list": (
+        r"\[4, 8\]",
+        "4",
+        [f"12: steps.result_closings_mm: expected a list of 1 to 20 items, each {CLOSING}, got 4"],
+    ),
+    "wrong item": (
+        r"\[4, 8\]",
+        "[4, -8]",
+        ["12: steps.result_closings_mm[1]: expected a number above 0 and at most 50 mm, got -8"],
+    ),
+    "no mapping": (
+        r"gripper:\n.*\n.*\n",
+        "gripper: fast\n",
+        ["14: gripper: expected a mapping with speed_mm_s, force_n, got 'fast'"],
+    ),
+    "unknown key": (
+        r"speed_mm_s",
+        "sped_mm_s",
+        [
+            "14: gripper.speed_mm_s: expected a number from 20 to 150 mm/s, got nothing",
+            "15: gripper.sped_mm_s: unknown key sped_mm_s: did you mean speed_mm_s?",
+        ],
+    ),
+    "unlike any key": (
+        r"force_n: 20",
+        "force_n: 20\n  zzz: 1",
+        ["17: gripper.zzz: unknown key zzz: expected speed_mm_s, force_n"],
+    ),
+    "unknown in a list": (
+        r"- closing_mm: 8",
+        "- closing: 8",
+        [
+            "25: damage.area[1].closing_mm: expected a number above 0 and at most 50 mm, got nothing",
+            "25: damage.area[1].closing: unknown key closing: did you mean closing_mm?",
+        ],
+    ),
+    "other version": (r"schema_version: 1", "schema_version: 2", ["1: schema_version: expected 1, got 2"]),
+    "name": (
+        r"name: cherry",
+        "name: Cherry!",
+        ["2: name: expected a text that matches ^[a-z][a-z0-9_]{0,31}$, got 'Cherry!'"],
+    ),
+    "name NO": (
+        r"name: cherry",
+        "name: NO",
+        [f'2: name: {ALIKE} NO: write true or false, or "NO" in quotes for a text'],
+    ),
+    "PLC number octal": (
+        r"plc_number: 7",
+        "plc_number: 012",
+        [f'4: plc_number: {ALIKE} 012: write it without the leading zero, or "012" in quotes for a text'],
+    ),
+    "several at once": (
+        r"plc_number: 7\nexpected_width:\n  smallest_mm: 20",
+        "plc_number: 0\nexpected_width:\n  smallest_mm: .inf",
+        [
+            "4: plc_number: expected an integer from 1 to 65535, got 0",
+            "6: expected_width.smallest_mm: expected a finite number, got .inf",
+        ],
+    ),
+    "widths swapped": (
+        r"smallest_mm: 20",
+        "smallest_mm: 31",
+        ["6: expected_width.smallest_mm: expected less than largest_mm, 30 mm, got 31"],
+    ),
+    "steps beyond the limit": (
+        r"number: 8",
+        "number: 9",
+        ["11: steps.number: expected steps within closing_limit_mm, 8.5 mm, got 9 mm of closing"],
+    ),
+    "result out of reach": (
+        r"\[4, 8\]",
+        "[4, 8.2]",
+        ["12: steps.result_closings_mm[1]: expected within the steps, 8 mm, got 8.2"],
+    ),
+    "results unordered": (
+        r"\[4, 8\]",
+        "[8, 4]",
+        ["12: steps.result_closings_mm[1]: expected more than the closing before, got 4"],
+    ),
+    "width missing": (
+        r"start: onset",
+        "start: width",
+        ["8: steps.start_width_mm: expected a width, as start is 'width'"],
+    ),
+    "width without use": (
+        r"start: onset",
+        "start: onset\n  start_width_mm: 40",
+        ["10: steps.start_width_mm: expected null, as start is 'onset', got 40"],
+    ),
+    "closing beyond shut": (
+        r"start: onset",
+        "start: width\n  start_width_mm: 7.9",
+        ["12: steps.number: expected steps within the start width, got 8 mm of closing"],
+    ),
+    "threshold elsewhere": (
+        r"- closing_mm: 8",
+        "- closing_mm: 7",
+        ["25: damage.area[1].closing_mm: expected one of the results' closings (4, 8), got 7"],
+    ),
+    "thresholds fall": (
+        r"area_mm2: 150",
+        "area_mm2: 90",
+        ["26: damage.area[1].area_mm2: expected no less than the threshold before, got 90"],
+    ),
+    "thresholds doubled": (
+        r"- closing_mm: 8",
+        "- closing_mm: 4",
+        ["25: damage.area[1].closing_mm: expected more than the threshold before, got 4"],
+    ),
+    "early stop before damage": (
+        r"area_mm2: 160\n  growth_mm2_per_mm: 40",
+        "area_mm2: 140\n  growth_mm2_per_mm: 20",
+        [
+            "29: early_stop.area_mm2: expected no less than the largest damage threshold, 150 mm², got 140",
+            "30: early_stop.growth_mm2_per_mm: expected no less than the damage threshold, 30 mm²/mm, got 20",
+        ],
+    ),
+    "section missing": (
+        r"imaging:\n(  .*\n)+",
+        "",
+        ["1: imaging: expected a mapping with settle_s, frames_per_step, reference_frames, got nothing"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), BAD.values(), ids=BAD)
+def test_a_bad_recipe_is_refused_with_line_field_and_expectation(small, write, old, new, expected):
+    text, count = re.subn(old, new, small, count=1)
+    assert count == 1
+    path = write(text)
+    with pytest.raises(SettingsError) as caught:
+        load_recipe(path)
+    assert str(caught.value).splitlines() == [f"{path}:{each}" for each in expected]
+
+
+@pytest.mark.parametrize("content", ["", "[]", "7", "text"])
+def test_what_is_no_mapping_is_no_recipe(write, content):
+    with pytest.raises(SettingsError, match=r"r\.yaml:1: file: expected a mapping with schema_version, name, "):
+        load_recipe(write(content))
+
+
+def test_a_good_recipe_is_read_and_cannot_be_changed(small, write):
+    recipe = load_recipe(write(small))
+    assert (recipe.name, recipe.steps.travel_mm, recipe.segmentation.method) == ("cherry", 8.0, "robust")
+    assert [threshold.area_mm2 for threshold in recipe.damage.area] == [100.0, 150.0]
+    with pytest.raises(ValueError, match="frozen"):
+        recipe.name = "other"
+
+
+def test_steps_that_are_no_binary_fractions_end_where_a_person_says(small, write):
+    text = small.replace("step_mm: 1", "step_mm: 0.4").replace("number: 8", "number: 30")
+    text = text.replace("closing_limit_mm: 8.5", "closing_limit_mm: 12").replace("[4, 8]", "[4, 8, 12]")
+    assert load_recipe(write(text)).steps.travel_mm == 12
+
+
+class TestShipped:
+    def test_the_four_are_there_with_their_own_numbers(self):
+        recipes = load_recipes()
+        assert sorted(recipes) == ["blueberry", "raspberry", "rubber_ball", "strawberry"]
+        assert recipes["strawberry"].steps.result_closings_mm == (4, 8, 12)
+        assert recipes["blueberry"].steps.result_closings_mm == (8, 12, 16)
+        assert recipes["raspberry"].steps.result_closings_mm == (8, 12, 16)
+        ball = recipes["rubber_ball"].steps
+        assert (ball.start_width_mm, ball.step_mm, ball.number) == (46, 1, 13)
+
+    def test_every_number_has_a_comment_near_it(self, root: Path):
+        for path in (root / "recipes").glob("*.yaml"):
+            lines = path.read_text().splitlines()
+            assert lines[0] == "# yaml-language-server: $schema=recipe.schema.json"
+            block_has_comment = False
+            for line in lines:
+                if not line.strip() or re.fullmatch(r"[a-z_]+:", line):
+                    block_has_comment = block_has_comment and bool(line.strip())
+                block_has_comment |= "#" in line
+                if re.search(r": \[?[\d.]", line) and "schema_version" not in line:
+                    assert block_has_comment, f"{path.name}: {line}"
+
+    def test_the_papers_parameters_are_written_out_and_as_printed(self, root: Path):
+        for recipe in load_recipes().values():
+            assert recipe.segmentation.paper.model_fields_set == set(type(recipe.segmentation.paper).model_fields)
+            assert recipe.segmentation.paper == type(recipe.segmentation.paper)()
+
+
+class TestFolders:
+    def test_two_with_one_name_or_number_are_refused_and_both_named(self, small, write, tmp_path):
+        first, second = write(small, "a.yaml"), write(small, "b.yml")
+        with pytest.raises(SettingsError) as caught:
+            load_recipes(tmp_path)
+        assert str(caught.value).splitlines() == [
+            f"{second}:2: name: expected one recipe with cherry, but {first} has it too",
+            f"{second}:4: plc_number: expected one recipe with 7, but {first} has it too",
+        ]
+
+    def test_all_files_problems_come_at_once(self, small, write, tmp_path):
+        first = write(small.replace("force_n: 20", "force_n: 0"), "a.yaml")
+        second = write("- 1", "b.yaml")
+        with pytest.raises(SettingsError) as caught:
+            load_recipes(tmp_path)
+        assert [problem.place for problem in caught.value.problems] == [f"{first}:16", f"{second}:1"]
+
+    def test_other_files_are_left_alone(self, small, write, tmp_path):
+        write(small)
+        write("{}", "recipe.schema.json")
+        write("no: [", ".hidden.yaml")
+        assert list(load_recipes(tmp_path)) == ["cherry"]
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            (".", "folder: expected recipes"),
+            ("none", "folder: expected a folder of recipes: no such file or directory"),
+            ("a\0b", "folder: expected a folder of recipes"),
+        ],
+    )
+    def test_a_folder_without_recipes(self, tmp_path, name, message):
+        with pytest.raises(SettingsError, match=message):
+            load_recipes(tmp_path / name)
+
+
+class TestFinding:
+    def test_by_name_and_by_path(self, small, write, tmp_path, monkeypatch):
+        path = write(small)
+        assert find_recipe("strawberry").plc_number == 1
+        assert find_recipe("cherry", tmp_path) == find_recipe(path) == find_recipe(str(path)) == load_recipe(path)
+        monkeypatch.chdir(tmp_path)
+        assert find_recipe("r.yaml").name == "cherry"
+
+    def test_an_unknown_name_lists_those_there_are(self):
+        with pytest.raises(BadInputError) as caught:
+            find_recipe("strawbery")
+        assert str(caught.value).startswith(
+            "recipe strawbery: did you mean strawberry? expected the path of a .yaml file or one of "
+            "blueberry, raspberry, rubber_ball, strawberry (in "
+        )
+
+    def test_a_broken_neighbour_does_no_harm_and_is_named_where_it_may_be_the_one(self, small, write, tmp_path):
+        write(small)
+        broken = write("name: plum", "plum.yaml")
+        assert find_recipe("cherry", tmp_path).name == "cherry"
+        with pytest.raises(BadInputError, match=re.escape(f"{broken}:1: schema_version: expected 1, got nothing")):
+            find_recipe("plum", tmp_path)
+
+
+VALUES = st.one_of(
+    st.none(), st.booleans(), st.integers(-(10**20), 10**20), st.floats(), st.text(max_size=8),
+    st.sampled_from(["[]", "{}", "[1, 2]", "{a: 1}", "NO", "012", "*a", "&a 1", "!!set {}", "'", "1.5", "width"]),
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_mutated_recipe_is_a_recipe_or_a_list_of_problems(small, data):
+    lines = small.splitlines()
+    for _ in range(data.draw(st.integers(1, 3))):
+        index = data.draw(st.integers(0, len(lines) - 1))
+        key = lines[index].partition(":")[0]
+        lines[index] = data.draw(
+            st.sampled_from([f"{key}: {data.draw(VALUES)}", "", lines[0], key, f"  {lines[index]}", lines[index][2:]])
+        )
+    document = parse_document("\n".join(lines).encode("utf-8", "surrogatepass"), "f")
+    found: tuple[Problem, ...] | Recipe
+    try:
+        found = validated(Recipe, document, document.value, document.locate)
+    except SettingsError as error:
+        found = error.problems
+    if isinstance(found, Recipe):
+        assert Recipe.model_validate_json(found.model_dump_json()) == found
+    else:
+        assert found
+        assert all(re.match(r"f:\d+: \S+.*: ", str(problem)) for problem in found)
+
+
+def test_a_recipe_survives_being_kept_beside_a_result(small, write):
+    recipe = load_recipe(write(small))
+    assert Recipe.model_validate_json(recipe.model_dump_json()) == recipe
+
+
+def test_a_copied_folder_is_as_good_as_the_shipped_one(root, tmp_path):
+    shutil.copytree(root / "recipes", tmp_path / "site")
+    assert load_recipes(tmp_path / "site") == load_recipes()

@@ -1,0 +1,91 @@
+"""`station recipes check` as a user meets it."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+
+@pytest.fixture
+def station(tmp_path):
+    """Run the command line in an empty folder."""
+
+    def run(*arguments: object, **environ: str) -> subprocess.CompletedProcess[str]:
+        clean = {key: value for key, value in os.environ.items() if not key.startswith("STATION_")}
+        return subprocess.run(
+            [sys.executable, "-m", "station", *map(str, arguments)],
+            capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path, env={**clean, **environ},
+        )  # fmt: skip
+
+    return run
+
+
+def test_the_shipped_recipes_are_good_from_anywhere(station):
+    done = station("recipes", "check")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert len(lines) == 4
+    assert lines[3].startswith("OK ")
+    assert lines[3].endswith(
+        "strawberry.yaml: strawberry, PLC number 1, 22 to 53 mm wide, 12 steps of 1 mm, results at 4, 8, 12 mm, robust"
+    )
+
+
+def test_all_problems_of_all_files_and_the_good_ones_beside_them(station, small, write):
+    good = write(small, "good.yaml")
+    bad = write(small.replace("force_n: 20", "force_n: 0").replace("step_mm: 1", "step_mm: x"), "bad.yaml")
+    done = station("recipes", "check", good, bad, "none.yaml")
+    assert done.returncode == 2
+    assert done.stdout.startswith(f"OK {good}: cherry, PLC number 7")
+    assert done.stderr.splitlines() == [
+        f"{bad}:10: steps.step_mm: expected a number from 0.4 to 5 mm, got 'x'",
+        f"{bad}:16: gripper.force_n: expected a number from 20 to 235 N, got 0",
+        "none.yaml:1: file: expected a readable file: no such file or directory: is the name right?",
+    ]
+
+
+def test_the_configured_folder_is_checked(station, small, write, tmp_path):
+    (tmp_path / "ours").mkdir()
+    write(small, "ours/cherry.yaml")
+    write("recipes_folder: ours\n", "station.yaml")
+    for done in (
+        station("recipes", "check", "--config", "station.yaml"),
+        station("recipes", "check", STATION_CONFIG="station.yaml"),
+        station("recipes", "check", STATION_HOME="."),
+        station("recipes", "check", STATION_RECIPES_FOLDER="ours"),
+        station("recipes", "check", "ours"),
+    ):
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.count("OK ") == 1
+        assert "cherry.yaml: cherry, PLC number 7" in done.stdout
+
+
+def test_a_bad_environment_is_a_message_and_exit_code_2(station):
+    done = station("recipes", "check", STATION_MODBUS_PROT="502")
+    assert done.returncode == 2
+    assert (
+        done.stderr
+        == "station: environment: STATION_MODBUS_PROT: unknown variable: did you mean STATION_MODBUS_PORT?\n"
+    )
+
+
+def test_what_is_hostile_is_a_message_and_exit_code_2(station, write, tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    bomb = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40))])
+    for path in (tmp_path / "pipe.yaml", write(bomb), write(b"\xff\xfe"), write("[" * 60_000), write(""), "a\nb.yaml"):
+        done = station("recipes", "check", path)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+        assert re.match(r".+:\d+: .+: ", done.stderr)
+
+
+def test_the_guides_example_is_what_happens(station, root, write):
+    shipped = (root / "recipes" / "strawberry.yaml").read_text()
+    text = shipped.replace("step_mm: 1 ", "step_mm: fine ").replace("force_n: 20 ", "forse_n: 20 ")
+    write(text, "my_cherry.yaml")
+    command, *expected = re.findall(
+        r"```\n\$ (station .*)\n((?:.*\n)+?)```", (root / "docs" / "recipes.md").read_text()
+    )[0]
+    assert station(*command.split()[1:]).stderr == "".join(expected)
