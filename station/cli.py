@@ -18,7 +18,7 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
-    "analyze": Entry("station.commands.analyze:analyze", "Measure the deformed area in tactile images."),
+    "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
 }
 

@@ -22,7 +22,7 @@ _KMEANS_EPSILON = 1.0
 class PaperMethod:
     """The paper's pipeline against one reference image."""
 
-    stages = ("difference", "denoised", "segmented")
+    stages: tuple[str, ...] = ("difference", "denoised", "segmented")
 
     def __init__(self, reference: Image, parameters: PaperParameters) -> None:
         self._reference = reference

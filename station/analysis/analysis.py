@@ -1,0 +1,201 @@
+"""One run of `station analyze`: images in, the folder of results out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from station.analysis.decoding import Decoded
+from station.analysis.measurement import Measured, Refused, measure_all
+from station.analysis.output import OutputFolder, flag_names
+from station.analysis.pictures import outlined, sheet, stacked, thumbnail
+from station.analysis.plots import curve_svg
+from station.analysis.report import Report, ReportRow, data_uri, render
+from station.analysis.sources import Source
+from station.errors import BadInputError
+from station.inspection.curve import Reading, area_curve
+from station.settings.segmentation import Segmentation
+from station.vision.contact import Image
+from station.vision.methods import make_method
+from station.vision.quality import DenoisingQuality, denoising_quality
+from station.vision.scale import typical_mm_per_px
+
+_THUMBNAIL_PX = 220
+_STAGE_PX = 150
+_COLUMNS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is to be measured, how, and where the results go."""
+
+    sources: Sequence[Source]
+    references: Sequence[Decoded]
+    reference_name: str
+    segmentation: Segmentation
+    recipe: str | None
+    widths_mm: dict[str, float] | None
+    """The measured width by the image's name, or None where no table was given."""
+    out: Path
+    stages: bool
+    jobs: int
+
+
+@dataclass(slots=True)
+class _Gathered:
+    """What the report needs of each image, small enough to keep for all of them."""
+
+    rows: list[ReportRow] = field(default_factory=list)
+    thumbnails: list[tuple[str, list[Image]]] = field(default_factory=list)
+    stages: list[tuple[str, list[Image]]] = field(default_factory=list)
+    stage_names: tuple[str, ...] = ()
+    qualities: list[tuple[str, DenoisingQuality]] = field(default_factory=list)
+    readings: list[tuple[str, Reading]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a run."""
+
+    measured: int
+    refused: Sequence[Refused]
+
+
+def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
+    """Measure all images and write tables, masks, pictures and the report.
+
+    Args:
+        request: what, how and where.
+        on_done: called after each image.
+
+    Raises:
+        BadInputError: the widths do not fit the images, or the folder cannot be written; what is measured by then
+            is kept.
+    """
+    _check_widths(request)
+    references = [decoded.image for decoded in request.references]
+    shape = references[0].shape
+    mm_per_px = typical_mm_per_px(shape[0], shape[1])
+    gathered = _Gathered()
+    refused: list[Refused] = []
+    with OutputFolder(request.out) as output:
+        for item in measure_all(
+            request.sources,
+            shape,
+            lambda: make_method(references, request.segmentation),
+            jobs=request.jobs,
+            stages=request.stages,
+        ):
+            if isinstance(item, Refused):
+                refused.append(item)
+            else:
+                area_mm2 = item.contact.area_px * mm_per_px**2
+                output.add(item, area_mm2)
+                output.add_stages(item)
+                _gather(gathered, item, area_mm2, request.widths_mm)
+            on_done()
+        if gathered.rows:
+            _write_summaries(output, request, gathered, refused, mm_per_px)
+    return Outcome(len(gathered.rows), refused)
+
+
+def _check_widths(request: Request) -> None:
+    if request.widths_mm is None:
+        return
+    missing = [source.name for source in request.sources if source.name not in request.widths_mm]
+    if missing:
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+        raise BadInputError(f"--widths: no width for {', '.join(missing[:3])}{more}; add a row for each image")
+
+
+def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dict[str, float] | None) -> None:
+    name = item.source.name
+    picture = thumbnail(outlined(item.image, item.contact.mask), _THUMBNAIL_PX)
+    width_mm = widths_mm[name] if widths_mm is not None else None
+    gathered.rows.append(
+        ReportRow(
+            image=name,
+            picture=data_uri(picture),
+            mask=f"masks/{item.source.stem}.png",
+            contact=item.contact.found,
+            area_px=item.contact.area_px,
+            area_mm2=area_mm2,
+            width_mm=width_mm,
+            closing_mm=None,
+            flags=flag_names(item),
+            notes=item.conversions,
+        )
+    )
+    gathered.thumbnails.append((f"{name}\n{area_mm2:.2f} mm2", [picture]))
+    if width_mm is not None:
+        gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2)))
+    if item.stages:
+        gathered.stage_names = tuple(item.stages)
+        gathered.stages.append((name, [thumbnail(stage, _STAGE_PX) for stage in item.stages.values()]))
+        gathered.qualities.append((name, denoising_quality(item.stages["difference"], item.stages["denoised"])))
+
+
+def _write_summaries(
+    output: OutputFolder, request: Request, gathered: _Gathered, refused: Sequence[Refused], mm_per_px: float
+) -> None:
+    output.write_errors(refused)
+    output.write_picture("contact_sheet.png", _paged(gathered.thumbnails))
+    stages_picture = None
+    if gathered.stages:
+        sheet_of_stages = _paged(gathered.stages, gathered.stage_names)
+        output.write_picture("stages.png", sheet_of_stages)
+        output.write_denoising(gathered.qualities)
+        stages_picture = data_uri(sheet_of_stages)
+    svg, rows = _write_curve(output, request, gathered)
+    report = Report(
+        title=f"Contact areas of {len(gathered.rows)} images",
+        facts=_facts(request, mm_per_px),
+        rows=rows,
+        errors=[(item.source.name, item.reason) for item in refused],
+        curve_svg=svg,
+        stages=stages_picture,
+        quality=_mean_quality(gathered.qualities),
+    )
+    output.write_bytes("report.html", render(report).encode())
+
+
+def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) -> tuple[str | None, list[ReportRow]]:
+    """Write the curve where there are widths, and put the closings into the report's rows."""
+    curve = area_curve(reading for _, reading in gathered.readings)
+    if not curve.points:
+        return None, gathered.rows
+    names = {id(reading): name for name, reading in gathered.readings}
+    images = [names[id(point.reading)] for point in curve.points]
+    output.write_curve(images, curve)
+    svg = curve_svg(curve, f"{request.recipe or 'press'}, method {request.segmentation.method}")
+    output.write_bytes("curve.svg", svg.encode())
+    closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
+    return svg, [replace(row, closing_mm=closing_mm[row.image]) for row in gathered.rows]
+
+
+def _facts(request: Request, mm_per_px: float) -> list[tuple[str, str]]:
+    count = len(request.references)
+    parameters = request.segmentation.paper if request.segmentation.method == "paper" else request.segmentation.robust
+    return [
+        ("Method", request.segmentation.method),
+        ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
+        ("Recipe", request.recipe or "none: the method's defaults"),
+        ("Reference", request.reference_name + (f", median of {count} images" if count > 1 else "")),
+        ("Scale", f"{mm_per_px:.4f} mm per pixel, typical for the sensor and not calibrated"),
+        ("Program", f"fruit-station {version('fruit-station')}"),
+    ]
+
+
+def _mean_quality(qualities: Sequence[tuple[str, DenoisingQuality]]) -> str | None:
+    if not qualities:
+        return None
+    psnr_db = float(np.mean([quality.psnr_db for _, quality in qualities]))
+    mse = float(np.mean([quality.mse for _, quality in qualities]))
+    ssim = float(np.mean([quality.ssim for _, quality in qualities]))
+    return f"PSNR {psnr_db:.2f} dB, MSE {mse:.1f}, SSIM {ssim:.3f}"
+
+
+def _paged(columns: Sequence[tuple[str, Sequence[Image]]], row_names: Sequence[str] = ()) -> Image:
+    return stacked([sheet(columns[start : start + _COLUMNS], row_names) for start in range(0, len(columns), _COLUMNS)])

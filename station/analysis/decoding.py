@@ -1,0 +1,98 @@
+"""One image file in, one colour image out: checked before a pixel is believed."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import cv2
+import numpy as np
+import PIL.Image
+
+from station.errors import BadInputError
+from station.vision.contact import Image
+
+FORMATS = ("JPEG", "PNG", "BMP", "TIFF", "WEBP", "PPM")
+SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm"})
+LARGEST_FILE_BYTES = 200_000_000
+LARGEST_IMAGE_PX = 50_000_000
+SMALLEST_SIDE_PX = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """A colour image and what had to be converted to get it."""
+
+    image: Image
+    conversions: tuple[str, ...]
+
+
+def decode_file(path: Path) -> Decoded:
+    """Read an image file as stored, without turning it by its EXIF data.
+
+    Args:
+        path: a JPEG, PNG, BMP, TIFF, WebP or PPM file.
+
+    Raises:
+        BadInputError: the file cannot be read, is no such image, is cut short, or is absurdly large or small.
+    """
+    try:
+        size_bytes = path.stat().st_size
+        if not path.is_file():
+            raise BadInputError(f"{path}: expected an image file, found something else")
+        if size_bytes > LARGEST_FILE_BYTES:
+            raise BadInputError(f"{path}: expected an image of at most {LARGEST_FILE_BYTES} bytes, found {size_bytes}")
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read: {error.strerror}") from error
+    _check(path, data)
+    raw = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if raw is None:
+        raise BadInputError(f"{path}: cannot be decoded; export it again as PNG or JPEG")
+    return to_colour(path, np.asarray(raw))
+
+
+def _check(path: Path, data: bytes) -> None:
+    """Refuse what is no image, absurd in size or cut short.
+
+    OpenCV alone fills the missing part of a truncated JPEG with grey and says nothing.
+    """
+    if not data:
+        raise BadInputError(f"{path}: the file is empty; copy it again")
+    try:
+        with PIL.Image.open(BytesIO(data), formats=FORMATS) as picture:
+            width, height = picture.size
+            if width * height > LARGEST_IMAGE_PX:
+                raise BadInputError(f"{path}: {width}x{height} is more than {LARGEST_IMAGE_PX} pixels")
+            if min(width, height) < SMALLEST_SIDE_PX:
+                raise BadInputError(f"{path}: {width}x{height} is smaller than {SMALLEST_SIDE_PX} pixels a side")
+            picture.load()
+    except PIL.UnidentifiedImageError as error:
+        raise BadInputError(f"{path}: not an image; expected one of {', '.join(FORMATS)}") from error
+    except (OSError, SyntaxError, ValueError, PIL.Image.DecompressionBombError) as error:
+        raise BadInputError(f"{path}: damaged or cut short ({error}); copy it again from the source") from error
+
+
+def to_colour(path: Path, raw: np.ndarray) -> Decoded:
+    """Make BGR with 8 bits of whatever was stored, and say what was done.
+
+    Args:
+        path: for the message.
+        raw: shape (height, width) or (height, width, 1 to 4), dtype uint8 or uint16.
+
+    Raises:
+        BadInputError: another dtype or number of channels.
+    """
+    conversions: list[str] = []
+    if raw.dtype == np.uint16:
+        raw = (raw // 257).astype(np.uint8)
+        conversions.append("16 bits scaled to 8")
+    if raw.dtype != np.uint8:
+        raise BadInputError(f"{path}: expected 8 or 16 bits a channel, found {raw.dtype}; export it as PNG")
+    channels = 1 if raw.ndim == 2 else raw.shape[2]
+    if channels in {2, 4}:
+        raw = raw[:, :, : channels - 1]
+        conversions.append("transparency dropped")
+    if channels in {1, 2}:
+        raw = np.repeat(raw.reshape(*raw.shape[:2], 1), 3, axis=2)
+        conversions.append("grey spread to three channels")
+    return Decoded(np.ascontiguousarray(raw, np.uint8), tuple(conversions))

@@ -1,0 +1,220 @@
+"""The files of one analysis: written as results come, so that what is measured is never lost."""
+
+import csv
+import errno
+import os
+from collections.abc import Iterable, Sequence
+from io import FileIO, StringIO
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.analysis.measurement import Measured, Refused
+from station.errors import BadInputError
+from station.inspection.curve import AreaCurve
+from station.vision.contact import Flag
+from station.vision.quality import DenoisingQuality
+
+RESULT_COLUMNS = ("image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags")
+CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2")
+_OWN_NAMES = (
+    "results.csv",
+    "errors.csv",
+    "curve.csv",
+    "curve.svg",
+    "denoising.csv",
+    "masks",
+    "stages",
+    "stages.png",
+    "contact_sheet.png",
+    "report.html",
+)
+CONVERTED = "converted"
+"""The flag of an image that was not stored as 8-bit colour."""
+
+
+class OutputFolder:
+    """The folder `DIR` of `station analyze`. It holds one analysis and refuses to mix two."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._made = False
+        self._results: FileIO | None = None
+
+    def __enter__(self) -> Self:
+        """Make the folder and try to write in it.
+
+        Raises:
+            BadInputError: it holds an earlier result, is a file, or cannot be written.
+        """
+        earlier = [name for name in _OWN_NAMES if (self.folder / name).exists()]
+        if earlier:
+            raise BadInputError(
+                f"{self.folder}: holds an earlier result ({', '.join(earlier)}); name another folder or remove it"
+            )
+        try:
+            self._made = not self.folder.exists()
+            (self.folder / "masks").mkdir(parents=True)
+        except OSError as error:
+            raise self._refusal(self.folder, error) from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the table; leave no empty folder where nothing could be measured."""
+        if self._results is not None:
+            self._results.close()
+            return
+        (self.folder / "masks").rmdir()
+        if self._made and not any(self.folder.iterdir()):
+            self.folder.rmdir()
+
+    def add(self, measured: Measured, area_mm2: float) -> None:
+        """Write an image's mask, then its row.
+
+        Args:
+            measured: the image and its contact.
+            area_mm2: the contact area on the gel.
+
+        Raises:
+            BadInputError: the disk is full or the folder has become unwritable.
+        """
+        contact = measured.contact
+        self.write_picture(f"masks/{measured.source.stem}.png", contact.mask)
+        x_px, y_px = contact.centroid_px or (None, None)
+        row = (
+            measured.source.name,
+            int(contact.found),
+            contact.area_px,
+            f"{area_mm2:.3f}",
+            "" if x_px is None else f"{x_px:.2f}",
+            "" if y_px is None else f"{y_px:.2f}",
+            ";".join(flag_names(measured)),
+        )
+        path = self.folder / "results.csv"
+        try:
+            if self._results is None:
+                self._results = path.open("xb", buffering=0)
+                _append_whole(self._results, _csv_bytes([RESULT_COLUMNS, row]))
+            else:
+                _append_whole(self._results, _csv_bytes([row]))
+        except OSError as error:
+            raise self._refusal(path, error) from error
+
+    def add_stages(self, measured: Measured) -> None:
+        """Write each stage's picture of one image.
+
+        Args:
+            measured: an image measured with its stages.
+
+        Raises:
+            BadInputError: the disk is full or the folder has become unwritable.
+        """
+        for number, (name, picture) in enumerate(measured.stages.items(), start=1):
+            self.write_picture(f"stages/{measured.source.stem}_{number}_{name}.png", picture)
+
+    def write_errors(self, refused: Iterable[Refused]) -> None:
+        """Write which images could not be measured, and why.
+
+        Args:
+            refused: in the order given by the user.
+        """
+        rows = [(item.source.name, item.reason) for item in refused]
+        if rows:
+            self._write_table("errors.csv", ("image", "error"), rows)
+
+    def write_curve(self, images: Sequence[str], curve: AreaCurve) -> None:
+        """Write the area curve.
+
+        Args:
+            images: the images' names in the curve's order.
+            curve: as many points as images.
+        """
+        rows = [
+            (
+                image,
+                f"{point.reading.width_mm:g}",
+                f"{point.closing_mm:.3f}",
+                point.reading.area_px,
+                f"{point.reading.area_mm2:.3f}",
+            )
+            for image, point in zip(images, curve.points, strict=True)
+        ]
+        self._write_table("curve.csv", CURVE_COLUMNS, rows)
+
+    def write_denoising(self, qualities: Sequence[tuple[str, DenoisingQuality]]) -> None:
+        """Write the figures of the denoising, as the paper's Table 2 has them.
+
+        Args:
+            qualities: the image's name with its figures.
+        """
+        rows = [(name, f"{q.psnr_db:.3f}", f"{q.mse:.3f}", f"{q.ssim:.4f}") for name, q in qualities]
+        self._write_table("denoising.csv", ("image", "psnr_db", "mse", "ssim"), rows)
+
+    def write_picture(self, name: str, picture: npt.NDArray[np.uint8]) -> None:
+        """Write a picture as PNG.
+
+        Args:
+            name: path below the folder.
+            picture: shape (height, width) or (height, width, 3), dtype uint8.
+        """
+        self.write_bytes(name, cv2.imencode(".png", picture)[1].tobytes())
+
+    def write_bytes(self, name: str, data: bytes) -> None:
+        """Write a file.
+
+        Args:
+            name: path below the folder.
+            data: the whole content.
+
+        Raises:
+            BadInputError: the disk is full or the folder has become unwritable.
+        """
+        path = self.folder / name
+        try:
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(data)
+        except OSError as error:
+            path.unlink(missing_ok=True)
+            raise self._refusal(path, error) from error
+
+    def _write_table(self, name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+        self.write_bytes(name, _csv_bytes([header, *rows]))
+
+    def _refusal(self, path: Path, error: OSError) -> BadInputError:
+        kept = f"; the results so far are kept in {self.folder}" if self._results is not None else ""
+        return BadInputError(f"{path}: cannot be written: {error.strerror}; name another --out or free space{kept}")
+
+
+def _csv_bytes(rows: Iterable[Sequence[object]]) -> bytes:
+    text = StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode()
+
+
+def _append_whole(file: FileIO, data: bytes) -> None:
+    """Append all or nothing, so that a full disk never leaves half a row."""
+    end = file.tell()
+    try:
+        written = file.write(data)
+    except OSError:
+        file.truncate(end)
+        raise
+    if written != len(data):
+        file.truncate(end)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def flag_names(measured: Measured) -> list[str]:
+    """What a reader of the area has to know, in a fixed order.
+
+    Args:
+        measured: the image and its contact.
+    """
+    names = [flag.value for flag in Flag if flag in measured.contact.flags]
+    return [*names, CONVERTED] if measured.conversions else names

@@ -1,0 +1,101 @@
+"""What people look at: the image with its contact drawn in, and sheets of many."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import Image, Mask
+
+_OUTLINE_BGR = (255, 255, 255)
+_INK_BGR = (30, 30, 30)
+_PAPER_GREY = 245
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_MARGIN_PX = 8
+_LINE_PX = 16
+
+
+def outlined(image: Image, mask: Mask) -> Image:
+    """The image with the mask's outline drawn in, on a dark line so that it shows on any ground.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+        mask: shape (height, width), dtype uint8.
+    """
+    drawn = image.copy()
+    contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    thin = max(1, round(min(mask.shape) / 240))
+    cv2.drawContours(drawn, contours, -1, (0, 0, 0), 3 * thin)
+    cv2.drawContours(drawn, contours, -1, _OUTLINE_BGR, thin)
+    return drawn
+
+
+def thumbnail(picture: npt.NDArray[np.uint8], height_px: int) -> Image:
+    """Shrink to a height and make colour of grey.
+
+    Args:
+        picture: shape (height, width) or (height, width, 3), dtype uint8.
+        height_px: the wanted height.
+    """
+    width_px = max(1, round(picture.shape[1] * height_px / picture.shape[0]))
+    small = cv2.resize(picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.cvtColor(small, cv2.COLOR_GRAY2BGR) if small.ndim == 2 else small, np.uint8)
+
+
+def sheet(columns: Sequence[tuple[str, Sequence[Image]]], row_names: Sequence[str] = ()) -> Image:
+    """Columns of pictures beside each other, each with its caption below and the rows named at the left.
+
+    Args:
+        columns: caption (its lines parted by a line feed) and the pictures from top to bottom, all of one size.
+        row_names: one for each row, or none.
+    """
+    height_px, width_px = columns[0][1][0].shape[:2]
+    left_px = 96 if row_names else _MARGIN_PX
+    lines = max(caption.count("\n") + 1 for caption, _ in columns)
+    rows = len(columns[0][1])
+    canvas = np.full(
+        (
+            _MARGIN_PX + rows * (height_px + _MARGIN_PX) + lines * _LINE_PX,
+            left_px + len(columns) * (width_px + _MARGIN_PX),
+            3,
+        ),
+        _PAPER_GREY,
+        np.uint8,
+    )
+    for number, (caption, pictures) in enumerate(columns):
+        x = left_px + number * (width_px + _MARGIN_PX)
+        for row, picture in enumerate(pictures):
+            y = _MARGIN_PX + row * (height_px + _MARGIN_PX)
+            canvas[y : y + height_px, x : x + width_px] = picture
+        for line, text in enumerate(caption.split("\n")):
+            y = rows * (height_px + _MARGIN_PX) + (line + 1) * _LINE_PX
+            cv2.putText(canvas, _fitting(text, width_px), (x, y), _FONT, 0.38, _INK_BGR, 1, cv2.LINE_AA)
+    for row, name in enumerate(row_names):
+        y = _MARGIN_PX + row * (height_px + _MARGIN_PX) + height_px // 2
+        cv2.putText(canvas, name, (_MARGIN_PX, y), _FONT, 0.42, _INK_BGR, 1, cv2.LINE_AA)
+    return canvas
+
+
+def stacked(sheets: Sequence[Image]) -> Image:
+    """Sheets below each other, the narrower ones filled up at the right.
+
+    Args:
+        sheets: one or more pictures.
+    """
+    widest_px = max(picture.shape[1] for picture in sheets)
+    return np.vstack(
+        [
+            np.pad(picture, ((0, 0), (0, widest_px - picture.shape[1]), (0, 0)), constant_values=_PAPER_GREY)
+            for picture in sheets
+        ]
+    )
+
+
+def _fitting(text: str, width_px: int) -> str:
+    """Shorten a caption in its middle until it fits below its picture."""
+    shown = text
+    while len(shown) > 3 and cv2.getTextSize(shown, _FONT, 0.38, 1)[0][0] > width_px:
+        keep = (len(shown) - 3) // 2
+        shown = f"{shown[:keep]}..{shown[-keep:]}" if keep else shown[:3]
+    return shown

@@ -1,0 +1,44 @@
+"""The area curve as a plot."""
+
+from io import StringIO
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from station.inspection.curve import AreaCurve
+
+
+def curve_svg(curve: AreaCurve, title: str) -> str:
+    """Draw area over closing in the manner of the paper's Fig. 14.
+
+    Args:
+        curve: a curve with at least one point.
+        title: what was pressed and how it was measured.
+
+    Returns:
+        An SVG document that is the same for the same input.
+    """
+    closing_mm = [point.closing_mm for point in curve.points]
+    area_mm2 = [point.reading.area_mm2 for point in curve.points]
+    with mpl.rc_context({"svg.hashsalt": "area-curve", "svg.fonttype": "none", "font.size": 10}):
+        figure = Figure(figsize=(7.2, 4.0), layout="constrained")
+        axes = figure.add_subplot()
+        axes.plot(closing_mm, area_mm2, color="#1f4e79", marker="o", markersize=4, linewidth=1.5)
+        axes.axvline(0, color="#888888", linewidth=0.8, linestyle="--")
+        axes.annotate(
+            f"onset at {curve.onset_mm:g} mm",
+            (0, 1),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, -12),
+            textcoords="offset points",
+            color="#555555",
+        )
+        axes.set_xlabel("closing [mm]")
+        axes.set_ylabel("contact area [mm²]")
+        axes.set_ylim(bottom=0)
+        axes.set_title(title)
+        axes.grid(color="#dddddd", linewidth=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        text = StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()

@@ -1,0 +1,74 @@
+"""The report that people read: one HTML file with its pictures inside."""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import jinja2
+from markupsafe import Markup
+
+from station.vision.contact import Image
+
+_JPEG_QUALITY = 88
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRow:
+    """One measured image in the report."""
+
+    image: str
+    picture: str
+    """A data URI."""
+    mask: str
+    """The mask's path beside the report."""
+    contact: bool
+    area_px: int
+    area_mm2: float
+    width_mm: float | None
+    closing_mm: float | None
+    flags: Sequence[str]
+    notes: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All that the report shows."""
+
+    title: str
+    facts: Sequence[tuple[str, str]]
+    """Names and values of how it was measured."""
+    rows: Sequence[ReportRow]
+    errors: Sequence[tuple[str, str]]
+    curve_svg: str | None
+    stages: str | None
+    """The stages' sheet as a path beside the report."""
+    quality: str | None
+    """The mean of the denoising's figures in words."""
+
+
+def render(report: Report) -> str:
+    """Make an HTML document that needs no network and no other file to be read.
+
+    Args:
+        report: what to show.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("station.analysis", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    curve = Markup(report.curve_svg[report.curve_svg.index("<svg") :]) if report.curve_svg else None  # noqa: S704 (made by this program, text escaped by matplotlib)
+    return environment.get_template("report.html.j2").render(report=report, curve=curve)
+
+
+def data_uri(picture: Image) -> str:
+    """A picture as a JPEG inside the document.
+
+    Args:
+        picture: shape (height, width, 3), dtype uint8.
+    """
+    data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
+    return "data:image/jpeg;base64," + base64.b64encode(data).decode()

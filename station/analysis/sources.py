@@ -1,0 +1,175 @@
+"""What the user names on the command line, as an ordered list of images that are decoded when needed."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from natsort import natsorted, ns
+
+from station.analysis.decoding import SUFFIXES, Decoded, decode_file
+from station.errors import BadInputError
+
+VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg"})
+_MOST_REFERENCE_FRAMES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One image that can be asked for."""
+
+    name: str
+    """The file's name, or the video's name with the frame's number."""
+    stem: str
+    """The name that its mask and stages get."""
+    load: Callable[[], Decoded]
+    """Decodes it; raises BadInputError."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """The sources found, and how many other files were passed over in folders."""
+
+    sources: tuple[Source, ...]
+    passed_over: tuple[Path, ...]
+
+
+def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listing:
+    """Find the images under the places: files in the order given, a folder's files in natural order.
+
+    A folder's files that are no images by their suffix, and the reference itself, are passed over.
+
+    Args:
+        places: image files, folders or videos.
+        reference: a file that is not to be measured, where it lies in one of the folders.
+
+    Returns:
+        A place that has no images, or cannot be listed, is a source that fails when it is loaded.
+
+    Raises:
+        BadInputError: there is no place with an image, or two images would get the same mask.
+    """
+    found: list[Source] = []
+    passed_over: list[Path] = []
+    refused: list[BadInputError] = []
+    for place in places:
+        try:
+            listing = _list_place(place, reference)
+        except BadInputError as error:
+            refused.append(error)
+            found.append(_refused_source(place, error))
+        else:
+            found += listing.sources
+            passed_over += listing.passed_over
+    if len(refused) == len(found):
+        raise BadInputError("; ".join(str(error) for error in refused) or "no images were named")
+    _refuse_equal_stems(found)
+    return Listing(tuple(found), tuple(passed_over))
+
+
+def load_references(place: Path) -> list[Decoded]:
+    """Load the untouched gel: one image, or the images of a folder or video of it.
+
+    Args:
+        place: an image file, a folder or a video; of many frames the first 32 are used.
+
+    Raises:
+        BadInputError: one of them cannot be read, or they differ in size.
+    """
+    loaded = [source.load() for source in list_sources([place]).sources[:_MOST_REFERENCE_FRAMES]]
+    if len({decoded.image.shape for decoded in loaded}) > 1:
+        raise BadInputError(f"{place}: the reference images differ in size; take them from one sensor and mode")
+    return loaded
+
+
+def _list_place(place: Path, reference: Path | None) -> Listing:
+    if place.is_dir():
+        files = natsorted((path for path in _children(place) if path.is_file()), alg=ns.PATH)
+        chosen = [path for path in files if path.suffix.lower() in SUFFIXES and not _same(path, reference)]
+        if not chosen:
+            raise BadInputError(f"{place}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}")
+        passed_over = tuple(path for path in files if path not in chosen)
+        return Listing(tuple(_file_source(path) for path in chosen), passed_over)
+    if place.suffix.lower() in VIDEO_SUFFIXES:
+        return Listing(tuple(_video_sources(place)), ())
+    if not place.exists():
+        raise BadInputError(f"{place}: there is no such file")
+    return Listing((_file_source(place),), ())
+
+
+def _children(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise BadInputError(f"{folder}: the folder cannot be read: {error.strerror}") from error
+
+
+def _same(path: Path, other: Path | None) -> bool:
+    return other is not None and other.exists() and path.samefile(other)
+
+
+def _file_source(path: Path) -> Source:
+    return Source(path.name, path.stem, lambda: decode_file(path))
+
+
+def _refused_source(place: Path, error: BadInputError) -> Source:
+    def load() -> Decoded:
+        raise error
+
+    return Source(str(place), str(place), load)
+
+
+def _video_sources(path: Path) -> Iterator[Source]:
+    """List a video's frames; each is decoded in turn, since seeking in a compressed video is not exact."""
+    if not path.is_file():
+        raise BadInputError(f"{path}: there is no such file")
+    frames = _Video(path)
+    for index in range(frames.count):
+        name = f"{path.stem}_{index:05d}"
+        yield Source(name, name, lambda index=index: frames.frame(index))
+
+
+class _Video:
+    """A video read forwards, one frame at a time."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.count = self._count()
+        self._capture = cv2.VideoCapture(str(path))
+        self._next = 0
+
+    def _count(self) -> int:
+        """Count by decoding: the number in a video's header is an estimate, and zero in a broken one."""
+        capture = cv2.VideoCapture(str(self._path))
+        count = 0
+        while capture.grab():
+            count += 1
+        capture.release()
+        if count == 0:
+            raise BadInputError(f"{self._path}: no frame of this video can be decoded; export it as MP4 or AVI")
+        return count
+
+    def frame(self, index: int) -> Decoded:
+        """Decode the frame with this index, which must be the next or a later one."""
+        while self._next < index and self._capture.grab():
+            self._next += 1
+        good, image = self._capture.read()
+        if not good:
+            raise BadInputError(f"{self._path}: frame {index} cannot be decoded")
+        self._next += 1
+        if self._next == self.count:
+            self._capture.release()
+        return Decoded(np.asarray(image, np.uint8), ())
+
+
+def _refuse_equal_stems(sources: Iterable[Source]) -> None:
+    """Two images of one stem would write one mask."""
+    seen: dict[str, str] = {}
+    for source in sources:
+        if source.stem in seen:
+            raise BadInputError(
+                f"{source.name} and {seen[source.stem]} would both write masks/{source.stem}.png; "
+                "measure them in two runs, or rename one"
+            )
+        seen[source.stem] = source.name

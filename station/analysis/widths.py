@@ -1,0 +1,62 @@
+"""The table of gripper widths that goes with a folder of images."""
+
+import csv
+import math
+from pathlib import Path
+
+from station.errors import BadInputError
+
+_HEADER = ("image", "width_mm")
+_WIDEST_MM = 200.0
+_LARGEST_FILE_BYTES = 10_000_000
+
+
+def read_widths(path: Path) -> dict[str, float]:
+    """Read a CSV with the columns `image,width_mm`.
+
+    Args:
+        path: the file; further columns are ignored.
+
+    Returns:
+        The measured width in mm by the image's name.
+
+    Raises:
+        BadInputError: the file cannot be read, lacks a column, names an image twice, or has a width that is no
+            number from 0 to 200 mm.
+    """
+    try:
+        if path.stat().st_size > _LARGEST_FILE_BYTES:
+            raise BadInputError(f"{path}: expected a table of widths below {_LARGEST_FILE_BYTES} bytes")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise BadInputError(f"{path}: expected UTF-8; save the table as CSV UTF-8") from error
+    reader = csv.DictReader(text.splitlines())
+    if reader.fieldnames is None or not set(_HEADER) <= set(reader.fieldnames):
+        raise BadInputError(f"{path}:1: expected the header {','.join(_HEADER)}")
+    widths: dict[str, float] = {}
+    try:
+        for row in reader:
+            place = f"{path}:{reader.line_num}"
+            name = (row["image"] or "").strip()
+            if not name:
+                raise BadInputError(f"{place}: image: expected a file name")
+            if name in widths:
+                raise BadInputError(f"{place}: image: {name} is listed twice")
+            widths[name] = _width_mm(place, row["width_mm"])
+    except csv.Error as error:
+        raise BadInputError(f"{path}:{reader.line_num}: not a CSV table: {error}") from error
+    if not widths:
+        raise BadInputError(f"{path}: expected a row for each image, found none")
+    return widths
+
+
+def _width_mm(place: str, text: str | None) -> float:
+    try:
+        width_mm = float(text or "")
+    except ValueError:
+        width_mm = math.nan
+    if not 0 <= width_mm <= _WIDEST_MM:
+        raise BadInputError(f"{place}: width_mm: expected a number from 0 to {_WIDEST_MM:g} mm, found {text!r}")
+    return width_mm

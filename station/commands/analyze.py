@@ -1,0 +1,79 @@
+"""`station analyze`: measure the deformed area in tactile images."""
+
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+import click
+
+from station.analysis.analysis import Request, analyze
+from station.analysis.sources import list_sources, load_references
+from station.analysis.widths import read_widths
+from station.errors import BadInputError
+from station.settings.recipe import find_recipe
+from station.settings.segmentation import Segmentation
+
+PLACE = click.Path(path_type=Path)
+
+
+@click.command("analyze")
+@click.option("--reference", required=True, type=PLACE, help="Image of the untouched gel, or a folder or video of it.")
+@click.option("--recipe", "recipe_name", metavar="NAME", help="Recipe, by name or file, whose segmentation is used.")
+@click.option("--method", type=click.Choice(["paper", "robust"]), help="Method, in place of the recipe's.")
+@click.option("--widths", type=PLACE, help="CSV image,width_mm: adds closing and the area curve.")
+@click.option("--stages", is_flag=True, help="Write each stage's picture as well.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 64),
+    default=lambda: min(64, os.cpu_count() or 1),
+    show_default="one a core",
+    help="Images measured at the same time.",
+)
+@click.option("--out", required=True, type=PLACE, help="Folder for the results; it must not hold an earlier one.")
+@click.argument("images", nargs=-1, required=True, type=PLACE, metavar="IMAGE...")
+def analyze_command(
+    reference: Path,
+    recipe_name: str | None,
+    method: str | None,
+    widths: Path | None,
+    stages: bool,  # noqa: FBT001 (click passes arguments by name)
+    jobs: int,
+    out: Path,
+    images: tuple[Path, ...],
+) -> None:
+    """Measure the deformed area in tactile images: files, folders or videos.
+
+    Writes results.csv, masks/, contact_sheet.png and report.html into the folder given with --out. An image that
+    cannot be measured is listed in errors.csv; the others' results are kept, and the exit code is 2.
+    """
+    recipe = find_recipe(recipe_name) if recipe_name else None
+    segmentation = recipe.segmentation if recipe else Segmentation()
+    if method:
+        segmentation = segmentation.model_copy(update={"method": method})
+    references = load_references(reference)
+    listing = list_sources(images, reference)
+    if listing.passed_over:
+        names = ", ".join(path.name for path in listing.passed_over[:5])
+        click.echo(f"station: not measured: {names}{', …' if len(listing.passed_over) > 5 else ''}", err=True)
+    request = Request(
+        sources=listing.sources,
+        references=references,
+        reference_name=str(reference),
+        segmentation=segmentation,
+        recipe=recipe.name if recipe else None,
+        widths_mm=read_widths(widths) if widths else None,
+        out=out,
+        stages=stages,
+        jobs=jobs,
+    )
+    with click.progressbar(
+        length=len(listing.sources), label="measuring", file=sys.stderr, hidden=not sys.stderr.isatty()
+    ) as bar:
+        outcome = analyze(request, partial(bar.update, 1))
+    for item in outcome.refused:
+        click.echo(f"station: {item.reason}", err=True)
+    if outcome.measured:
+        click.echo(f"{outcome.measured} images measured; report: {out / 'report.html'}")
+    if outcome.refused:
+        raise BadInputError(f"{len(outcome.refused)} of {len(listing.sources)} images could not be measured")

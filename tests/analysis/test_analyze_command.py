@@ -1,0 +1,317 @@
+"""`station analyze` through the command line."""
+
+import csv
+import resource
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+HEADER = ["image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags"]
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_folder_gives_rows_masks_sheet_and_report(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = read_table(out / "results.csv")
+    assert list(rows[0]) == HEADER
+    assert [row["image"] for row in rows] == [f"frame_{number}.png" for number in range(7, 13)]
+    for row in rows[1:]:
+        mask = cv2.imread(str(out / "masks" / row["image"]), cv2.IMREAD_UNCHANGED)
+        assert mask is not None
+        assert mask.shape == (320, 240)
+        assert set(np.unique(mask)) <= {0, 255}
+        assert np.count_nonzero(mask) == int(row["area_px"])
+        assert int(row["area_px"]) == pytest.approx(press.areas_px[row["image"]], rel=0.25)
+        assert float(row["area_mm2"]) == pytest.approx(int(row["area_px"]) * (0.0266 * 2) ** 2, rel=1e-3)
+        assert (float(row["centroid_x_px"]), float(row["centroid_y_px"])) == pytest.approx((120, 160), abs=4)
+        assert row["contact"] == "1"
+    assert (out / "contact_sheet.png").exists()
+    assert not (out / "stages").exists()
+
+
+def test_widths_add_closing_curve_and_plot(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    (press.folder / "frame_7.png").unlink()
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--widths", press.widths, "--out", out, press.folder
+    )
+    assert done.returncode == 0, done.stderr
+    curve = read_table(out / "curve.csv")
+    assert [float(row["closing_mm"]) for row in curve] == [0, 1, 2, 3, 4]
+    assert [float(row["width_mm"]) for row in curve] == [38, 37, 36, 35, 34]
+    areas = [float(row["area_mm2"]) for row in curve]
+    assert areas == sorted(areas)
+    assert "closing [mm]" in (out / "curve.svg").read_text()
+
+
+def test_stages_are_the_papers_three_rows_with_the_denoising_figures(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--stages", "--out", out, press.folder)
+    assert done.returncode == 0, done.stderr
+    for number, name in enumerate(("difference", "denoised", "segmented"), start=1):
+        assert (out / "stages" / f"frame_12_{number}_{name}.png").exists()
+    assert (out / "stages.png").exists()
+    figures = read_table(out / "denoising.csv")
+    assert len(figures) == 6
+    assert all(10 < float(row["psnr_db"]) < 60 and 0 < float(row["ssim"]) < 1 for row in figures)
+
+
+def test_the_results_do_not_depend_on_the_number_of_jobs(press, analyze, tmp_path):
+    tables = []
+    for jobs in (1, 3):
+        out = tmp_path / f"jobs{jobs}"
+        arguments = ("--reference", press.reference, "--method", "paper", "--jobs", jobs, "--out", out, press.folder)
+        assert analyze(*arguments).returncode == 0
+        tables.append((out / "results.csv").read_bytes())
+    assert tables[0] == tables[1]
+
+
+def test_a_video_is_measured_frame_by_frame(press, analyze, tmp_path):
+    video = tmp_path / "close.avi"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10, (240, 320))
+    for number in range(7, 13):
+        writer.write(np.asarray(cv2.imread(str(press.folder / f"frame_{number}.png"))))
+    writer.release()
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, video)
+    assert done.returncode == 0, done.stderr
+    rows = read_table(out / "results.csv")
+    assert [row["image"] for row in rows] == [f"close_{index:05d}" for index in range(6)]
+    assert int(rows[5]["area_px"]) == pytest.approx(press.areas_px["frame_12.png"], rel=0.25)
+
+
+def test_grey_16_bit_and_transparent_images_are_converted_and_say_so(press, analyze, tmp_path):
+    image = np.asarray(cv2.imread(str(press.folder / "frame_12.png")))
+    odd = tmp_path / "odd"
+    odd.mkdir()
+    cv2.imwrite(str(odd / "alpha.png"), cv2.cvtColor(image, cv2.COLOR_BGR2BGRA))
+    cv2.imwrite(str(odd / "deep.png"), image.astype(np.uint16) * 257)
+    cv2.imwrite(str(odd / "grey.png"), image[:, :, 1])
+    cv2.imwrite(str(odd / "plain.png"), image)
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, odd)
+    assert done.returncode == 0, done.stderr
+    alpha, deep, grey, plain = read_table(out / "results.csv")
+    assert alpha["area_px"] == deep["area_px"] == plain["area_px"]
+    assert ["converted" in row["flags"] for row in (alpha, deep, grey, plain)] == [True, True, True, False]
+    report = (out / "report.html").read_text()
+    for words in ("transparency dropped", "16 bits scaled to 8", "grey spread to three channels"):
+        assert words in report
+
+
+def spoil_truncated(folder: Path) -> Path:
+    path = folder / "bad.jpg"
+    cv2.imwrite(str(path), np.asarray(cv2.imread(str(folder / "frame_9.png"))))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    return path
+
+
+def spoil_text(folder: Path) -> Path:
+    path = folder / "bad.png"
+    path.write_text("this is no image")
+    return path
+
+
+def spoil_empty(folder: Path) -> Path:
+    path = folder / "bad.png"
+    path.touch()
+    return path
+
+
+def spoil_size(folder: Path) -> Path:
+    path = folder / "bad.png"
+    cv2.imwrite(str(path), np.zeros((100, 100, 3), np.uint8))
+    return path
+
+
+def spoil_missing(folder: Path) -> Path:
+    return folder / "bad.png"
+
+
+def spoil_video(folder: Path) -> Path:
+    path = folder / "bad.mp4"
+    path.write_bytes(b"\x00\x00\x00\x18ftypmp42" + bytes(500))
+    return path
+
+
+def spoil_folder(folder: Path) -> Path:
+    path = folder / "bad"
+    path.mkdir()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (spoil_truncated, "damaged or cut short"),
+        (spoil_text, "not an image"),
+        (spoil_empty, "the file is empty"),
+        (spoil_size, "the reference has 240x320"),
+        (spoil_missing, "there is no such file"),
+        (spoil_video, "no frame of this video can be decoded"),
+        (spoil_folder, "the folder has no images"),
+    ],
+)
+def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze, tmp_path, spoil, words):
+    bad = spoil(press.folder)
+    first, last = press.folder / "frame_9.png", press.folder / "frame_12.png"
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "bad" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [row["image"] for row in read_table(out / "results.csv")] == ["frame_9.png", "frame_12.png"]
+    (error,) = read_table(out / "errors.csv")
+    assert words in error["error"]
+    assert words in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize("spoil", [spoil_text, spoil_missing, spoil_folder])
+def test_where_nothing_can_be_measured_no_folder_is_left(press, analyze, tmp_path, spoil):
+    out = tmp_path / "new" / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, spoil(press.folder))
+    assert done.returncode == 2
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("spoil", [spoil_truncated, spoil_text, spoil_missing, spoil_folder])
+def test_a_bad_reference_is_refused_before_anything_is_written(press, analyze, tmp_path, spoil):
+    bad = spoil(press.folder)
+    out = tmp_path / "out"
+    done = analyze("--reference", bad, "--method", "paper", "--out", out, press.folder / "frame_9.png")
+    assert done.returncode == 2
+    assert str(bad) in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
+def test_an_earlier_result_is_never_mixed_with_a_new_one(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    arguments = ("--reference", press.reference, "--method", "paper", "--out", out, press.folder / "frame_9.png")
+    assert analyze(*arguments).returncode == 0
+    before = (out / "results.csv").read_bytes()
+    done = analyze(*arguments)
+    assert done.returncode == 2
+    assert "holds an earlier result" in done.stderr
+    assert (out / "results.csv").read_bytes() == before
+
+
+def test_an_output_that_cannot_be_made_is_refused(press, analyze, tmp_path):
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for out in (file, file / "below"):
+        done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder)
+        assert done.returncode == 2
+        assert "cannot be written" in done.stderr
+        assert file.read_text() == "mine"
+
+
+def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze, tmp_path):
+    """The limit on a file's size stands for the full disk: the last, noisy stage does not fit any more."""
+    out = tmp_path / "out"
+    noise = np.random.default_rng(0).integers(0, 255, (320, 240, 3), dtype=np.uint8)
+    cv2.imwrite(str(press.folder / "frame_13.png"), noise)
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--stages", "--jobs", 1, "--out", out, press.folder,
+        preexec_fn=limit,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "cannot be written" in done.stderr
+    assert "results so far are kept" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(read_table(out / "results.csv")) >= 6
+
+
+def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
+    """The limit falls into the table itself: no half row may stay."""
+    for number in range(200):
+        shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 30}{number}.png")
+    out = tmp_path / "out"
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
+
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder, preexec_fn=limit)
+    assert done.returncode == 2
+    assert "results.csv: cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (out / "results.csv").stat().st_size > 6_000
+    assert all(row["flags"] is not None for row in read_table(out / "results.csv"))
+    assert (out / "results.csv").read_bytes().endswith(b"\r\n")
+
+
+def test_two_images_that_would_share_a_mask_are_refused(press, analyze, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(press.folder / "frame_9.png", other)
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--out", tmp_path / "out",
+        press.folder / "frame_9.png", other / "frame_9.png",
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "would both write masks/frame_9.png" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("image;width_mm\nframe_9.png;3\n", ":1: expected the header image,width_mm"),
+        ("image,width_mm\nframe_9.png,wide\n", ":2: width_mm: expected a number from 0 to 200 mm, found 'wide'"),
+        ("image,width_mm\nframe_9.png,nan\n", ":2: width_mm: expected a number"),
+        ("image,width_mm\nframe_9.png,3\nframe_9.png,4\n", ":3: image: frame_9.png is listed twice"),
+        ("image,width_mm\nframe_10.png,3\n", "no width for frame_9.png"),
+        ("image,width_mm\n", "expected a row for each image"),
+        ("image,width_mm\n\xff", "expected UTF-8"),
+    ],
+)
+def test_a_bad_table_of_widths_is_named_by_its_line(press, analyze, tmp_path, table, words):
+    widths = tmp_path / "bad.csv"
+    widths.write_bytes(table.encode("latin-1"))
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--widths", widths, "--out", tmp_path / "out",
+        press.folder / "frame_9.png",
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_untouched_frames_serves_as_reference(press, analyze, tmp_path):
+    frames = tmp_path / "untouched"
+    frames.mkdir()
+    for number in range(3):
+        shutil.copy(press.reference, frames / f"untouched_{number}.png")
+    done = analyze("--reference", frames, "--method", "paper", "--out", tmp_path / "out", press.folder / "frame_9.png")
+    assert done.returncode == 0, done.stderr
+    assert "median of 3 images" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_folder_passes_over_the_reference_and_other_files(press, analyze, tmp_path):
+    (press.folder / "notes.txt").write_text("mine")
+    reference = press.folder / "reference.png"
+    shutil.copy(press.reference, reference)
+    done = analyze("--reference", reference, "--method", "paper", "--out", tmp_path / "out", press.folder)
+    assert done.returncode == 0
+    assert "not measured: notes.txt, reference.png" in done.stderr
+    assert len(read_table(tmp_path / "out" / "results.csv")) == 6
+
+
+@pytest.mark.parametrize("arguments", [(), ("--reference", "x"), ("--out", "x", "--reference", "y"), ("--jobs", "0")])
+def test_bad_usage_is_exit_code_2_with_a_hint(analyze, arguments):
+    done = analyze(*arguments)
+    assert done.returncode == 2
+    assert "Usage:" in done.stderr

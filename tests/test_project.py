@@ -1,0 +1,83 @@
+"""Promises about the repository itself: locks, packaging, links, the run script."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).resolve().parents[1]
+LOCKS = ("requirements-build.lock", "requirements.lock", "requirements-dev.lock")
+PIN = re.compile(r"^(?P<name>[a-z0-9._-]+)==(?P<version>[^ ;]+)", re.MULTILINE)
+LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
+
+
+def pins(lock: str) -> dict[str, str]:
+    return {match["name"]: match["version"] for match in PIN.finditer((ROOT / lock).read_text())}
+
+
+def tracked(*patterns: str) -> list[Path]:
+    done = subprocess.run(["git", "ls-files", "-z", *patterns], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [ROOT / name for name in done.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_the_developers_lock_holds_what_ships_in_the_same_versions():
+    developer = pins("requirements-dev.lock")
+    for lock in LOCKS[:2]:
+        assert pins(lock)
+        assert {name: developer.get(name) for name in pins(lock)} == pins(lock)
+
+
+def test_the_locks_satisfy_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    groups = project["dependency-groups"]
+    wanted = {
+        "requirements-build.lock": groups["build"],
+        "requirements.lock": project["project"]["dependencies"],
+        "requirements-dev.lock": groups["dev"],
+    }
+    for lock, requirements in wanted.items():
+        locked = pins(lock)
+        for text in requirements:
+            requirement = Requirement(text)
+            name = requirement.name.lower().replace("_", "-")
+            assert requirement.specifier.contains(locked[name]), f"{text} in {lock}"
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_lock_has_hashes_and_no_address(lock):
+    text = (ROOT / lock).read_text()
+    assert "://" not in text
+    assert all(" \\\n    --hash=sha256:" in block for block in re.split(r"\n(?=[a-z])", text.strip()))
+
+
+def test_relative_links_in_the_documents_lead_somewhere():
+    broken = [
+        f"{page.relative_to(ROOT)}: {link}"
+        for page in tracked("*.md")
+        for link in LINK.findall(page.read_text())
+        if not (page.parent / link).exists()
+    ]
+    assert not broken
+
+
+def test_the_wheel_holds_what_the_program_reads(tmp_path):
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=60)
+    (wheel,) = tmp_path.glob("fruit_station-*.whl")
+    shipped = set(zipfile.ZipFile(wheel).namelist())
+    data = tracked("station", "recipes", "plc_interface", "hmi")
+    assert {str(path.relative_to(ROOT)) for path in data} <= shipped
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), ([], 0), (["brew"], 2)])
+def test_the_run_script_needs_only_the_standard_library(arguments, code):
+    command = [sys.executable, "-I", "-S", str(ROOT / "run"), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    assert done.returncode == code
+    assert "./run COMMAND" in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
