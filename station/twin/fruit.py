@@ -1,6 +1,6 @@
 """The fruit that the twin has squeezed: size, shape, texture, stiffness, creep and yield, drawn from a seed."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -134,15 +134,6 @@ class Fruit:
             y_mm: likewise.
         """
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
-
-    def damaged(self, softening: float, set_mm: float) -> "Fruit":
-        """The same fruit after it was squeezed too far.
-
-        Args:
-            softening: factor on its modulus, 0 to 1.
-            set_mm: what it stays narrower by.
-        """
-        return replace(self, modulus_mpa=self.modulus_mpa * softening, width_mm=self.width_mm - set_mm)
 
 
 def draw_fruit(kind: Kind | str, seed: int, *, bruised: bool = False) -> Fruit:

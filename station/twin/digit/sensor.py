@@ -33,6 +33,8 @@ class Condition:
     """0 clear to 1: the image blurs towards a grey veil."""
     dirt: int = 0
     """Crumbs stuck on the gel: they dent it all the time."""
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Brightness of the LEDs, blue, green and red, over that of the fit."""
 
 
 class DigitSensor:
@@ -96,6 +98,7 @@ class DigitSensor:
             image += self._optics.change(dent) * self._gain
         if condition.torn:
             _tear(image, self._background, generator)
+        image *= np.asarray(condition.light, np.float32)
         if condition.dead_led:
             image[..., _CHANNEL[condition.dead_led]] *= _DEAD_LED_REST
         if condition.fog:
