@@ -1,0 +1,112 @@
+"""What the gel's surface looks like under a fruit: the dent, and the truth that a measurement is judged by."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.twin.fruit import Fruit
+from station.twin.gel import (
+    GRID_MM,
+    GRID_SHAPE,
+    GRID_STEP,
+    MM_PER_PX,
+    SENSOR_SHAPE,
+    FloatArray,
+    Gel,
+    dent_mm,
+    visible_edge_mm,
+)
+from station.twin.squeeze import Squeezed
+
+Mask = npt.NDArray[np.uint8]
+
+_SKIN_MM, _BRIDGE_MM, _LEVELLED_MM = 0.1, 0.25, 2.0
+"""Smoothing of the texture: in the imprint, in the outline, and what counts as its mean level."""
+_BRIDGED = 0.3
+"""The part of the texture's depth that shows in the contact's outline; the skin and the gel yield for the rest."""
+_FULL_IMPRINT_PRESSURE = 0.4
+"""Mean pressure over the gel's modulus at which the texture is pressed in fully."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where and how the fruit meets the gel."""
+
+    x_px: float = 240.0
+    y_px: float = 320.0
+    turn_deg: float = 0.0
+    tilt_deg: float = 0.0
+    """Lean of the fruit's surface against the gel, about the image's rows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The gel at one closing."""
+
+    dent: FloatArray
+    """mm, shape (320, 240)."""
+    true_mask: Mask
+    """The contact inside its edge, shape (640, 480), 0 or 255."""
+
+    @property
+    def true_area_px(self) -> int:
+        """The contact's area."""
+        return int(np.count_nonzero(self.true_mask))
+
+    @property
+    def true_area_mm2(self) -> float:
+        """The contact's area."""
+        return self.true_area_px * MM_PER_PX**2
+
+
+class FruitOnGel:
+    """One fruit in one pose over the gel, made once and pressed to any depth."""
+
+    def __init__(self, fruit: Fruit, pose: Pose, gel: Gel) -> None:
+        self._fruit, self._gel = fruit, gel
+        rows, columns = np.indices(GRID_SHAPE, dtype=np.float32)
+        centre = (GRID_STEP - 1) / 2
+        x_mm = (columns * GRID_STEP + centre - pose.x_px) * MM_PER_PX
+        y_mm = (rows * GRID_STEP + centre - pose.y_px) * MM_PER_PX
+        turn = np.deg2rad(pose.turn_deg)
+        across = (x_mm * np.cos(turn) + y_mm * np.sin(turn)).astype(np.float32)
+        along = (y_mm * np.cos(turn) - x_mm * np.sin(turn)).astype(np.float32)
+        lean = np.tan(np.deg2rad(pose.tilt_deg))
+        shape = fruit.gap_mm(across, along) + lean * x_mm + 0.5 * lean**2 * fruit.surface.radius_mm
+        texture = fruit.texture_mm(across, along)
+        coarse = cv2.GaussianBlur(texture, (0, 0), _BRIDGE_MM / GRID_MM)
+        wide = cv2.GaussianBlur(texture, (0, 0), _LEVELLED_MM / GRID_MM)
+        self._relief = np.asarray(cv2.GaussianBlur(texture, (0, 0), _SKIN_MM / GRID_MM) - wide, np.float32)
+        self._gap = np.maximum(0.0, shape + _BRIDGED * (coarse - wide)).astype(np.float32)
+        height, width = SENSOR_SHAPE
+        self._fine_gap = np.asarray(cv2.resize(self._gap, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+    def pressed(self, squeezed: Squeezed) -> Footprint:
+        """The gel under the fruit at one closing.
+
+        Args:
+            squeezed: what the closing does, from `Squeeze.at`.
+        """
+        approach = squeezed.approach_mm
+        if approach <= 0:
+            return Footprint(np.zeros(GRID_SHAPE, np.float32), np.zeros(SENSOR_SHAPE, np.uint8))
+        surface = self._fruit.surface
+        radius_mm = surface.radius_mm
+        contact_radius_mm = float(np.sqrt(approach * radius_mm))
+        dent = dent_mm(self._gap, approach, surface, self._gel)
+        pressure_mpa = squeezed.force_n / (np.pi * contact_radius_mm**2)
+        imprint = min(1.0, pressure_mpa / (_FULL_IMPRINT_PRESSURE * self._gel.modulus_mpa))
+        within = np.maximum(0.0, 1.0 - self._gap * np.float32(2.0 / approach))
+        dent = dent * np.float32(squeezed.gel_share) - np.float32(imprint) * self._relief * within
+        edge_mm = visible_edge_mm(contact_radius_mm, squeezed.gel_share * contact_radius_mm / radius_mm)
+        limit_mm = 0.5 * approach * (edge_mm / contact_radius_mm) ** 2
+        return Footprint(np.maximum(dent, 0.0).astype(np.float32), _filled(self._fine_gap < limit_mm))
+
+
+def _filled(inside: npt.NDArray[np.bool_]) -> Mask:
+    """The mask with its holes filled."""
+    mask = np.where(inside, 255, 0).astype(np.uint8)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(mask, outlines, -1, 255, cv2.FILLED), np.uint8)

@@ -1,0 +1,1 @@
+"""The DIGIT's optics, noise and frames on the wire."""

@@ -1,0 +1,107 @@
+"""What makes two frames of the same scene differ: pixel noise, streaks, row and frame offsets, slow drift of light.
+
+Levels are measured on real frames (`station.twin.digit.fit`). The real pixel noise is blotchy (colour is sampled
+at half the resolution and compressed): neighbours correlate as after a Gaussian blur of the widths below, and
+the channels as given. Pixel noise is cut from a bank of fields made once, at random places, since drawing nearly
+a million normal deviates per frame would cost more than all the rest.
+"""
+
+import cv2
+import numpy as np
+
+from station.twin.digit.backgrounds import cosine_field
+from station.twin.digit.numbers import Array, NoiseLevels
+from station.twin.gel import SENSOR_SHAPE
+
+_BANKS = 6
+_BANK_MARGIN = 48
+_BLUR_ACROSS_PX, _BLUR_DOWN_PX = 1.25, 1.75
+_CHANNELS = np.array([[1.0, -0.29, 0.11], [-0.29, 1.0, -0.27], [0.11, -0.27, 1.0]])
+_LINE_BLUR_PX = 1.6
+_DRIFT_SHAPE = (80, 60)
+_DRIFT_COSINES = 5
+_BURSTS = 0.75
+"""Spread of the logarithm of the drift's steps; gives the real offsets' ratio of 95th percentile to median."""
+DRIFT_TIME_S = 30.0
+"""The drift forgets itself in this time."""
+DRIFT_STEP_S = 0.2
+"""The drift's field is drawn anew when this much time has passed."""
+
+
+class FrameNoise:
+    """Everything that is new in each frame."""
+
+    def __init__(self, levels: NoiseLevels, seed: int) -> None:
+        self._levels = levels
+        self._generator = np.random.default_rng([seed, 3])
+        rows, columns = (side + _BANK_MARGIN for side in SENSOR_SHAPE)
+        mix = np.linalg.cholesky(_CHANNELS).T.astype(np.float32)
+        self._banks: list[Array] = []
+        for _ in range(_BANKS):
+            white = self._generator.standard_normal((rows, columns, 3), np.float32) @ mix
+            field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
+            self._banks.append((field / field.std(axis=(0, 1)) * levels.pixel).astype(np.float32))
+
+    def pixels(self) -> Array:
+        """Pixel noise, shape (640, 480, 3), dtype float32; a view that must not be changed."""
+        bank = self._banks[self._generator.integers(_BANKS)]
+        top, left = self._generator.integers(_BANK_MARGIN + 1, size=2)
+        return bank[top : top + SENSOR_SHAPE[0], left : left + SENSOR_SHAPE[1]]
+
+    def columns(self) -> Array:
+        """Column streaks, shape (1, 480, 3)."""
+        return self._line(SENSOR_SHAPE[1], self._levels.column)[None]
+
+    def rows(self) -> Array:
+        """Row offsets, shape (640, 1, 3)."""
+        return self._line(SENSOR_SHAPE[0], self._levels.row)[:, None]
+
+    def _line(self, length: int, level: Array) -> Array:
+        white = self._generator.standard_normal((1, length, 3), np.float32)
+        line = cv2.GaussianBlur(white, (0, 0), _LINE_BLUR_PX, sigmaY=1e-3, borderType=cv2.BORDER_REFLECT)[0]
+        return (line * (level * np.float32(np.sqrt(2.0 * np.sqrt(np.pi) * _LINE_BLUR_PX)))).astype(np.float32)
+
+
+class Drift:
+    """Slow change of exposure and of the light's pattern: a decaying random walk with now and then a large step."""
+
+    def __init__(self, levels: NoiseLevels, seed: int) -> None:
+        self._generator = np.random.default_rng([seed, 4])
+        falling = 1.0 / np.arange(1, _DRIFT_COSINES) ** 2
+        falling /= np.sqrt(np.square(falling).sum())
+        # The first row of coefficients is what the columns' means see, the first column what the rows' see.
+        along, down = levels.drift_along[:, None] * falling, levels.drift_down[:, None] * falling
+        self._scale = np.zeros((3, _DRIFT_COSINES, _DRIFT_COSINES), np.float32)
+        self._scale[:, 0, 0] = levels.offset
+        self._scale[:, 0, 1:], self._scale[:, 1:, 0] = along, down
+        self._scale[:, 1:, 1:] = np.sqrt(down[:, :, None] * along[:, None, :]) / 2.0
+        self._state = self._innovation()
+        self._at_s: float | None = None
+        self.field = self._draw()
+
+    def advance(self, now_s: float) -> bool:
+        """Go on to a time; whether the field has been drawn anew.
+
+        Args:
+            now_s: the twin's time.
+        """
+        if self._at_s is None:
+            self._at_s = now_s
+        passed_s = now_s - self._at_s
+        if passed_s < DRIFT_STEP_S:
+            return False
+        kept = np.exp(-passed_s / DRIFT_TIME_S)
+        self._state = kept * self._state + np.sqrt(1.0 - kept**2) * self._innovation()
+        self._at_s = now_s
+        self.field = self._draw()
+        return True
+
+    def _innovation(self) -> Array:
+        """Normal deviates whose common size varies: now and then all of the light changes at once."""
+        size = np.exp(_BURSTS * self._generator.standard_normal() - _BURSTS**2)
+        return (self._generator.standard_normal(self._scale.shape) * size * self._scale).astype(np.float32)
+
+    def _draw(self) -> Array:
+        height, width = SENSOR_SHAPE
+        coarse = cosine_field(self._state.astype(np.float32), _DRIFT_SHAPE)
+        return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)

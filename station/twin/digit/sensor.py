@@ -1,0 +1,133 @@
+"""The DIGIT's image of a dented gel, with the sensor's own ills."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.twin.digit.backgrounds import background
+from station.twin.digit.noise import Drift, FrameNoise
+from station.twin.digit.numbers import Array, Fitted
+from station.twin.digit.optics import Optics
+from station.twin.gel import SENSOR_SHAPE, FloatArray
+
+Image = npt.NDArray[np.uint8]
+
+Colour = Literal["blue", "green", "red"]
+_CHANNEL: dict[Colour, int] = {"blue": 0, "green": 1, "red": 2}
+_DEAD_LED_REST = 0.12
+_FOG_BLUR_PX = 12.0
+_GAIN_LIMITS = (0.5, 1.6)
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What is wrong with the sensor; nothing by default."""
+
+    dead_led: Colour | None = None
+    torn: bool = False
+    """A tear across the gel: a bright line with a dark lip, and the dents around it half lost."""
+    fog: float = 0.0
+    """0 clear to 1: the image blurs towards a grey veil."""
+    dirt: int = 0
+    """Crumbs stuck on the gel: they dent it all the time."""
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Brightness of the LEDs, blue, green and red, over that of the fit."""
+
+
+class DigitSensor:
+    """Draws frames. The clean image is kept until dent, condition or drift change; noise is new in each frame.
+
+    Args:
+        seed: of the noise and the drift; the same calls give the same frames.
+        unit: seed of the unit's light; None for the unit that the optics were fitted on.
+        noise: factor on the noise of each frame; 0 for none.
+        drift: factor on the slow drift; 0 for none.
+    """
+
+    def __init__(self, seed: int, unit: int | None = None, noise: float = 1.0, drift: float = 1.0) -> None:
+        fitted = Fitted.load()
+        self._optics = Optics(fitted.table, fitted.smoothing_mm)
+        self._background = background(fitted, unit)
+        levels = self._background.mean(axis=(0, 1)) / background(fitted, None).mean(axis=(0, 1))
+        self._gain = np.clip(levels, *_GAIN_LIMITS).astype(np.float32)
+        self._noise, self._noise_factor = FrameNoise(fitted.noise, seed), noise
+        self._drift, self._drift_factor = Drift(fitted.noise, seed), drift
+        self._seed = seed
+        self._dent: FloatArray | None = None
+        self._condition = Condition()
+        self._clean = self._draw(None, self._condition)
+        self._base = self._clean + self._drift.field * np.float32(self._drift_factor)
+
+    def frame(self, dent: FloatArray | None, now_s: float, condition: Condition | None = None) -> Image:
+        """Draw one frame.
+
+        Args:
+            dent: the gel's dent in mm, shape (320, 240); None where nothing touches. Hand over the same
+                array as long as nothing moves: the clean image is then drawn once.
+            now_s: the twin's time; it moves the drift.
+            condition: what is wrong with the sensor; nothing where left out.
+
+        Returns:
+            Shape (640, 480, 3), dtype uint8, channels B, G, R.
+        """
+        condition = condition or Condition()
+        redraw = dent is not self._dent or condition != self._condition
+        if redraw:
+            self._dent, self._condition = dent, condition
+            self._clean = self._draw(dent, condition)
+        if self._drift.advance(now_s) or redraw:
+            self._base = self._clean + self._drift.field * np.float32(self._drift_factor)
+        if not self._noise_factor:
+            return np.asarray(cv2.convertScaleAbs(np.maximum(self._base, 0.0)), np.uint8)
+        factor = np.float32(self._noise_factor)
+        lined = self._base + self._noise.columns() * factor
+        lined += self._noise.rows() * factor
+        pixels = self._noise.pixels()
+        return np.asarray(cv2.addWeighted(pixels, float(factor), lined, 1.0, 0.0, dtype=cv2.CV_8U), np.uint8)
+
+    def _draw(self, dent: FloatArray | None, condition: Condition) -> Array:
+        generator = np.random.default_rng([self._seed, 5])
+        if condition.dirt:
+            crumbs = _crumbs(condition.dirt, generator)
+            dent = crumbs if dent is None else np.maximum(dent, crumbs)
+        image = self._background.copy()
+        if dent is not None:
+            image += self._optics.change(dent) * self._gain
+        if condition.torn:
+            _tear(image, self._background, generator)
+        image *= np.asarray(condition.light, np.float32)
+        if condition.dead_led:
+            image[..., _CHANNEL[condition.dead_led]] *= _DEAD_LED_REST
+        if condition.fog:
+            blurred = cv2.GaussianBlur(image, (0, 0), _FOG_BLUR_PX * condition.fog)
+            image = blurred * (1.0 - 0.7 * condition.fog) + blurred.mean() * 0.7 * condition.fog
+        return np.clip(image, 0.0, 255.0).astype(np.float32)
+
+
+def _crumbs(count: int, generator: np.random.Generator) -> FloatArray:
+    """Dents of crumbs of 0.5 to 1.5 mm, shape (320, 240), mm."""
+    rows, columns = (side // 2 for side in SENSOR_SHAPE)
+    dent = np.zeros((rows, columns), np.float32)
+    for _ in range(count):
+        centre = (int(generator.integers(columns)), int(generator.integers(rows)))
+        cv2.circle(dent, centre, int(generator.integers(5, 14)), float(generator.uniform(0.1, 0.35)), cv2.FILLED)
+    return np.asarray(cv2.GaussianBlur(dent, (0, 0), 3.0), np.float32)
+
+
+def _tear(image: Array, background_image: Array, generator: np.random.Generator) -> None:
+    """Draw a jagged tear from one side to the other into an image."""
+    rows, columns = SENSOR_SHAPE
+    x = np.linspace(0, columns - 1, 9)
+    y = rows * generator.uniform(0.3, 0.7) + np.cumsum(generator.normal(0, 25, x.size))
+    path = np.stack([x, y], axis=1).astype(np.int32)
+    near, line = np.zeros(SENSOR_SHAPE, np.float32), np.zeros(SENSOR_SHAPE, np.float32)
+    cv2.polylines(near, [path], isClosed=False, color=1.0, thickness=60)
+    cv2.polylines(line, [path], isClosed=False, color=1.0, thickness=5)
+    lost = cv2.GaussianBlur(near, (0, 0), 15.0)[..., None] * 0.5
+    image += (background_image - image) * lost
+    sharp = cv2.GaussianBlur(line, (0, 0), 1.5)
+    lip = np.roll(sharp, 5, axis=0)
+    image += (sharp * 110.0 - lip * 60.0)[..., None]

@@ -1,0 +1,147 @@
+"""What lies between the fingers: one fruit in one pose, how far it is closed, and what that has done to it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from station.twin.clock import Clock
+from station.twin.contact import Footprint, FruitOnGel, Pose
+from station.twin.fruit import Fruit
+from station.twin.gel import Gel
+from station.twin.squeeze import Squeeze, Squeezed
+
+DIGIT_MM = 32.0
+"""What the sensor takes of the gripper's opening."""
+_CREEP_STEP_S = 0.5
+_SOFTENING_MAX = 0.5
+_SET_SHARE = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """One moment of a squeeze, small enough to be handed to another thread that draws it."""
+
+    contact: FruitOnGel
+    squeezed: Squeezed
+
+
+class World:
+    """One fruit at most, between the DIGIT's gel and the sponge on the other finger.
+
+    Squeezed beyond its yield force and let go, a fruit stays narrower and softer: by a quarter of the closing
+    beyond the yield, and by up to half of its modulus.
+
+    Args:
+        clock: the twin's time, for creep.
+        gel: the gel on the sensor.
+        sponge_mm: what the sponge takes of the room between the fingers where it is not pressed; 0 means that
+            the gripper's width is calibrated with the sponge on.
+    """
+
+    def __init__(self, clock: Clock, gel: Gel | None = None, sponge_mm: float = 0.0) -> None:
+        self._clock = clock
+        self._gel = gel or Gel()
+        self._sponge_mm = sponge_mm
+        self._opening_mm = 85.0
+        self._fruit: Fruit | None = None
+        self._contact: FruitOnGel | None = None
+        self._squeeze: Squeeze | None = None
+        self._crept_s = 0.0
+        self._since_s: float | None = None
+        self._worst: Squeezed | None = None
+        self.arm_at_nest: Callable[[], bool] = lambda: True
+        """Whether the fingers are where the fruit lies; always, on a bench without an arm."""
+        self.opening_mm: Callable[[], float] = lambda: self._opening_mm
+        """The gripper's opening now; where no gripper is wired, the one that `force_N` was last asked for."""
+
+    @property
+    def fruit(self) -> Fruit | None:
+        """The fruit in the nest, as it is by now."""
+        return self._fruit
+
+    def place(self, fruit: Fruit, pose: Pose | None = None) -> None:
+        """Lay a fruit into the nest, in the place of what was there.
+
+        Args:
+            fruit: the fruit.
+            pose: where it meets the gel; the middle where left out.
+        """
+        self._pose = pose or Pose()
+        self._since_s = self._worst = None
+        self._lay(fruit)
+
+    def remove(self) -> None:
+        """Empty the nest: taken, dropped or blown away."""
+        self._fruit = self._contact = self._squeeze = self._since_s = self._worst = None
+
+    def width_mm(self, opening_mm: float) -> float:
+        """The room between gel and sponge at an opening of the gripper.
+
+        Args:
+            opening_mm: distance between the gripper's own pads, 0 to 85.
+        """
+        return opening_mm - DIGIT_MM - self._sponge_mm
+
+    def force_N(self, opening_mm: float) -> float:  # noqa: N802 (the gripper's protocol)
+        """The force that pushes the fingers apart at an opening, N.
+
+        Args:
+            opening_mm: distance between the gripper's own pads, 0 to 85.
+        """
+        self._opening_mm = opening_mm
+        return self._squeezed_at(opening_mm).force_n
+
+    def squeezed(self) -> Squeezed:
+        """What the gripper's opening does to the fruit now."""
+        return self._squeezed_at(self.opening_mm())
+
+    def touch(self) -> Touch | None:
+        """What the sensor feels now, to be drawn; None where nothing touches."""
+        squeezed = self.squeezed()
+        return Touch(self._contact, squeezed) if self._contact and squeezed.closing_mm > 0 else None
+
+    def footprint(self) -> Footprint | None:
+        """The gel's dent and the true mask now; None where nothing touches."""
+        touch = self.touch()
+        return touch.contact.pressed(touch.squeezed) if touch else None
+
+    def _squeezed_at(self, opening_mm: float) -> Squeezed:
+        if self._fruit is None or self._squeeze is None or not self.arm_at_nest():
+            return Squeezed(-self.width_mm(opening_mm), 0.0, 0.0, 0.0)
+        closing_mm = self._fruit.width_mm - self.width_mm(opening_mm)
+        self._age(self._fruit, touching=closing_mm > 0)
+        squeezed = self._squeeze.at(closing_mm)
+        if squeezed.force_n > self._fruit.variety.yield_n and (
+            self._worst is None or squeezed.closing_mm > self._worst.closing_mm
+        ):
+            self._worst = squeezed
+        return squeezed
+
+    def _age(self, fruit: Fruit, *, touching: bool) -> None:
+        """Let a held fruit creep, and a released one show what was done to it."""
+        if not touching:
+            self._since_s = None
+            if self._worst:
+                self._lay(self._damaged(fruit, self._worst))
+                self._worst = None
+            elif self._crept_s:
+                self._recurve(fruit, 0.0)
+            return
+        now_s = self._clock.now_s()
+        self._since_s = now_s if self._since_s is None else self._since_s
+        if now_s - self._since_s - self._crept_s >= _CREEP_STEP_S:
+            self._recurve(fruit, now_s - self._since_s)
+
+    def _damaged(self, fruit: Fruit, worst: Squeezed) -> Fruit:
+        yield_n = fruit.variety.yield_n
+        beyond = min(1.0, worst.force_n / yield_n - 1.0)
+        set_mm = _SET_SHARE * beyond * worst.closing_mm
+        softer = fruit.modulus_mpa * (1.0 - _SOFTENING_MAX * beyond)
+        return replace(fruit, width_mm=max(0.5 * fruit.width_mm, fruit.width_mm - set_mm), modulus_mpa=softer)
+
+    def _lay(self, fruit: Fruit) -> None:
+        self._fruit = fruit
+        self._contact = FruitOnGel(fruit, self._pose, self._gel)
+        self._recurve(fruit, 0.0)
+
+    def _recurve(self, fruit: Fruit, held_s: float) -> None:
+        self._squeeze, self._crept_s = Squeeze(fruit, self._gel, held_s), held_s
