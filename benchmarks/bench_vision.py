@@ -1,0 +1,87 @@
+"""Milliseconds for each stage of the measurement methods on one thread, beside other libraries' same steps.
+
+Run with `./run bench vision`. Writes `docs/speed.md`.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import cv2
+import numpy as np
+from skimage.restoration import denoise_nl_means
+from sklearn.cluster import KMeans
+from threadpoolctl import threadpool_limits
+
+from station.settings.segmentation import PaperParameters, RobustParameters
+from station.vision.paper import PaperMethod, amplified_difference, brightest_cluster, clean, denoise
+from station.vision.robust import RobustMethod
+
+ROOT = Path(__file__).resolve().parents[1]
+RUNS = 15
+PEER_RUNS = 3
+
+
+def median_ms(step: Callable[[], object], runs: int) -> float:
+    """The median time of a step after one warm-up, in milliseconds."""
+    step()
+    times = []
+    for _ in range(runs):
+        began = time.perf_counter()
+        step()
+        times.append(1000 * (time.perf_counter() - began))
+    return statistics.median(times)
+
+
+def scikit_kmeans(denoised: np.ndarray, parameters: PaperParameters) -> object:
+    """scikit-learn's K-means with the same number of clusters, starts and iterations."""
+    pixels = denoised.reshape(-1, 3).astype(np.float32)
+    return KMeans(
+        parameters.clusters, n_init=parameters.kmeans_starts, max_iter=10, tol=1e-3, random_state=parameters.seed
+    ).fit(pixels)
+
+
+def scikit_nlm(difference: np.ndarray, parameters: PaperParameters) -> object:
+    """scikit-image's fast non-local means with the same patch and search sizes."""
+    return denoise_nl_means(
+        difference,
+        patch_size=parameters.template_window_px,
+        patch_distance=parameters.search_window_px // 2,
+        h=parameters.denoise_h,
+        fast_mode=True,
+        channel_axis=2,
+        preserve_range=True,
+    )
+
+
+def paper_rows(image: np.ndarray, reference: np.ndarray) -> list[tuple[str, float, str, float | None]]:
+    """Each stage of the paper's method: its name, ms, and the same step elsewhere with its ms."""
+    parameters = PaperParameters()
+    difference = amplified_difference(image, reference, parameters.amplification)
+    denoised = denoise(difference, parameters)
+    clustered = brightest_cluster(denoised, parameters)
+    method = PaperMethod(reference, parameters)
+    return [
+        (
+            "difference, amplified",
+            median_ms(lambda: amplified_difference(image, reference, parameters.amplification), RUNS),
+            "",
+            None,
+        ),
+        (
+            "denoised, non-local means",
+            median_ms(lambda: denoise(difference, parameters), RUNS),
+            f"scikit-image {version('scikit-image')}",
+            median_ms(lambda: scikit_nlm(difference, parameters), PEER_RUNS),
+        ),
+        (
+            "clustered, K-means",
+            median_ms(lambda: brightest_cluster(denoised, parameters), RUNS),
+            f"scikit-learn {version('scikit-learn')}",
+            median_ms(lambda: scikit_kmeans(denoised, parameters), PEER_RUNS),
+        ),
+        ("morphology and components", median_ms(lambda: clean(clustered, parameters), RUNS), "", None),
+        ("`paper`, whole", median_ms(lambda: method.measure(image), RUNS), "", None),
+    ]

@@ -1,0 +1,38 @@
+"""`station demo`: the way from tactile images to a report, on a press that the twin draws."""
+
+import subprocess
+import sys
+from datetime import UTC, datetime
+
+import click
+
+from station.commands.analyze import analyze_command
+from station.errors import StationError
+from station.settings.configuration import load_configuration
+
+_FRUIT = "strawberry"
+_DRAWING_TIMEOUT_S = 120
+
+
+@click.command("demo")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruit.")
+@click.pass_context
+def demo(context: click.Context, seed: int) -> None:
+    """Press a simulated strawberry, measure the images, and say where the report lies."""
+    folder = load_configuration().home / "demo" / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%S-%f")
+    drawn = folder / "press"
+    click.echo(f"drawing a press of a simulated {_FRUIT} into {drawn}")
+    command = (sys.executable, "-m", "station", "twin", "press", "--fruit", _FRUIT, "--seed", seed, "--out", drawn)
+    done = subprocess.run([str(part) for part in command], timeout=_DRAWING_TIMEOUT_S, check=False, stdout=sys.stderr)
+    if done.returncode:
+        raise StationError("the twin could not draw the press: see its message above")
+    context.invoke(
+        analyze_command,
+        reference=drawn / "reference",
+        recipe_name=_FRUIT,
+        widths=drawn / "widths.csv",
+        stages=True,
+        out=folder / "report",
+        images=(drawn / "frames",),
+    )
+    click.echo(f"the report opens in a browser: {(folder / 'report' / 'report.html').as_uri()}")
