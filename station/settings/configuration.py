@@ -41,6 +41,7 @@ def _folder(path: Path) -> Path:
 
 
 Host = Annotated[str, AfterValidator(_host)]
+"""An IP address or a host's name; a text, as strict JSON takes no address object for a default."""
 Folder = Annotated[Path, AfterValidator(_folder)]
 
 
