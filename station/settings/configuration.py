@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, model_validator
 
-from station.settings.environment import CONFIG_VARIABLE, PLACE, overrides, variable
+from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
@@ -162,8 +162,9 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
         merged = _with(merged, path, value)
 
     def locate(path: Where) -> tuple[str, str]:
-        if path in given:
-            return PLACE, variable(path)
+        name = named(path, given)
+        if name:
+            return PLACE, name
         return document.locate(path) if chosen else ("built-in default", dotted(path))
 
     merged = _anchored(merged, document, given, chosen.parent if chosen else Path())

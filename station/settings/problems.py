@@ -30,7 +30,7 @@ def shortened(text: str, longest: int = 60) -> str:
     """
     if len(text) > longest:
         text = text[: longest - 1] + "…"
-    return text if text.isprintable() else repr(text)
+    return text if text.isprintable() else text.encode("unicode_escape").decode()
 
 
 class Problem(NamedTuple):
