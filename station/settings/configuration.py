@@ -188,11 +188,9 @@ def _with(values: Any, path: Where, value: Any) -> Any:
     """Plain values with one more set; a section that is no mapping stays, to be refused as it stands."""
     if not path:
         return value
-    if values is None:
-        values = {}
     if not isinstance(values, dict):
         return values
-    return {**values, path[0]: _with(values.get(path[0]), path[1:], value)}
+    return {**values, path[0]: _with(values.get(path[0], {}), path[1:], value)}
 
 
 def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folder: Path) -> Any:

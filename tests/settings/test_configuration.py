@@ -133,6 +133,12 @@ class TestBadFile:
         file = write(content)
         assert problems(file) == [f"{file}:{expected}"]
 
+    def test_the_environment_does_not_hide_what_is_wrong_around_it(self, write):
+        for content, shown in (("modbus:\n", "nothing"), ("modbus: 7\n", "7")):
+            file = write(content)
+            expected = f"{file}:1: modbus: expected a mapping with host, port, unit, got {shown}"
+            assert problems(file, STATION_MODBUS_PORT="502") == [expected]
+
     def test_two_servers_on_one_port(self, write):
         file = write("hmi:\n  port: 5020\n")
         assert problems(file) == [
