@@ -1,10 +1,12 @@
 """`station recipes`: look after recipe files."""
 
+import os
 from pathlib import Path
 
 import click
 
 from station.settings.configuration import load_configuration
+from station.settings.problems import shortened
 from station.settings.recipe import Recipe, check_recipes, recipe_files
 
 
@@ -29,10 +31,11 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
     """
     if not files:
         files = tuple(recipe_files(load_configuration(config).recipes_folder))
-    found = [path for file in files for path in (recipe_files(file) if file.is_dir() else [file])]
+    # Path.is_dir raises for names that are too long; a name that is none is the reader's to refuse.
+    found = [path for file in files for path in (recipe_files(file) if os.path.isdir(file) else [file])]  # noqa: PTH112
     checked = check_recipes(dict.fromkeys(found))
     for path, recipe in checked.recipes.items():
-        click.echo(f"OK {path}: {_facts(recipe)}")
+        click.echo(f"OK {shortened(str(path), 1000)}: {_facts(recipe)}")
     for problem in checked.problems:
         click.echo(str(problem), err=True)
     if checked.problems:

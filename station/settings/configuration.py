@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, model_validator
 
-from station.settings.environment import CONFIG_VARIABLE, PLACE, overrides, variable
+from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
@@ -41,6 +41,7 @@ def _folder(path: Path) -> Path:
 
 
 Host = Annotated[str, AfterValidator(_host)]
+"""An IP address or a host's name; a text, as strict JSON takes no address object for a default."""
 Folder = Annotated[Path, AfterValidator(_folder)]
 
 
@@ -161,8 +162,9 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
         merged = _with(merged, path, value)
 
     def locate(path: Where) -> tuple[str, str]:
-        if path in given:
-            return PLACE, variable(path)
+        name = named(path, given)
+        if name:
+            return PLACE, name
         return document.locate(path) if chosen else ("built-in default", dotted(path))
 
     merged = _anchored(merged, document, given, chosen.parent if chosen else Path())
@@ -186,11 +188,9 @@ def _with(values: Any, path: Where, value: Any) -> Any:
     """Plain values with one more set; a section that is no mapping stays, to be refused as it stands."""
     if not path:
         return value
-    if values is None:
-        values = {}
     if not isinstance(values, dict):
         return values
-    return {**values, path[0]: _with(values.get(path[0]), path[1:], value)}
+    return {**values, path[0]: _with(values.get(path[0], {}), path[1:], value)}
 
 
 def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folder: Path) -> Any:

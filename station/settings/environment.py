@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from station.settings.problems import Path, Problem, SettingsError, shortened
+from station.settings.problems import Path, Problem, SettingsError, dotted, shortened
 from station.settings.schema import Leaf, Node, branches, expectation, leaves, shown
 from station.settings.yaml_loader import parse_document
 
@@ -21,6 +21,24 @@ def variable(path: Path) -> str:
         path: `("modbus", "port")` gives `STATION_MODBUS_PORT`.
     """
     return PREFIX + "_".join(str(part) for part in path).upper()
+
+
+def named(path: Path, given: Iterable[Path]) -> str | None:
+    """A field's variable, with what is inside its value, where the environment gives it; else None.
+
+    Args:
+        path: a field, or a place inside a field's list or mapping.
+        given: the fields that the environment gives.
+    """
+    for field in given:
+        if path[: len(field)] == field:
+            inside = path[len(field) :]
+            return (
+                variable(field)
+                + ("." if inside and isinstance(inside[0], str) else "")
+                + (dotted(inside) if inside else "")
+            )
+    return None
 
 
 def variables(root: Node) -> dict[str, Leaf]:
@@ -68,9 +86,13 @@ def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], 
 
 def _value(text: str, node: Node, root: Node) -> Any:
     """A variable's text as the field's value: as it stands for a text, else as a YAML file would hold it."""
+    try:
+        content = text.encode()
+    except UnicodeEncodeError as error:
+        raise SettingsError([]) from error
     if any(branch.get("type") == "string" for branch in branches(node, root)):
         return text
-    document = parse_document(text.encode("utf-8", "surrogateescape"), PLACE)
+    document = parse_document(content, PLACE)
     if document.problems:
         raise SettingsError(document.problems)
     return document.value

@@ -30,7 +30,7 @@ def shortened(text: str, longest: int = 60) -> str:
     """
     if len(text) > longest:
         text = text[: longest - 1] + "…"
-    return text if text.isprintable() else repr(text)
+    return text if text.isprintable() else text.encode("unicode_escape").decode()
 
 
 class Problem(NamedTuple):
@@ -49,7 +49,10 @@ class SettingsError(BadInputError):
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.problems)
 
 
 class Contradiction(ValueError):  # noqa: N818 (pydantic's validators raise it; it reaches users as problems)

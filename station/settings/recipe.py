@@ -123,6 +123,6 @@ def check_recipes(files: Iterable[Path]) -> Checked:
             other = first.setdefault(value, path)
             if other != path:
                 clashing |= {other, path}
-                place = read_document(path).locate((field,))
-                problems.append(Problem(*place, f"expected one recipe with {value}, but {other} has it too"))
+                text = f"expected one recipe with {value}, but {shortened(str(other), 1000)} has it too"
+                problems.append(Problem(*read_document(path).locate((field,)), text))
     return Checked({path: recipe for path, recipe in recipes.items() if path not in clashing}, tuple(problems))

@@ -191,12 +191,12 @@ def bounds(node: Node) -> str:
 
 
 def figure(value: float) -> str:
-    """A number without a needless `.0`.
+    """A number to six digits, without a needless `.0`.
 
     Args:
         value: the number.
     """
-    return str(int(value)) if value == int(value) else str(value)
+    return str(int(value)) if value == int(value) else f"{value:.6g}"
 
 
 def shown(value: Any) -> str:

@@ -56,7 +56,7 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
     except ValidationError as error:
         for details in error.errors():
             problems += _problems(details, value, schema_of(model), locate, document.doubtful)
-        raise SettingsError(sorted(problems, key=_line)) from error
+        raise SettingsError(sorted(dict.fromkeys(problems), key=_line)) from error
     if problems:
         raise SettingsError(problems)
     return checked
@@ -73,6 +73,8 @@ def _problems(
 ) -> list[Problem]:
     """What one complaint of pydantic's means to a person; nothing where the loader has complained already."""
     path = _cleaned(details["loc"], value)
+    if details["type"] == "missing" and isinstance(path[-1], int):  # one complaint for a list that is too short
+        path = path[:-1]
     if any(path[: len(each)] == each for each in doubtful):
         return []
     cause = details.get("ctx", {}).get("error")
@@ -109,7 +111,7 @@ def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str
         return _unknown(str(path[-1]), names(root, path[:-1]))
     node = find(root, path)
     wanted = expectation(node, root) if node else details["msg"]
-    if details["type"] == "missing":
+    if details["type"] == "missing" and not isinstance(details["input"], list):
         return f"expected {wanted}, got nothing"
     if cause is not None:
         return f"{cause}, got {shown(details['input'])}"

@@ -69,7 +69,7 @@ def parse_document(content: bytes, source: str) -> Document:
         source: the file's name for messages.
     """
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         bad = Problem(f"{source}:{line}", "file", f"expected UTF-8 text, got the byte 0x{content[error.start]:02x}")
@@ -123,7 +123,6 @@ class _Composer:
         self._problems: list[Problem] = []
         self._doubtful: set[Where] = set()
         self._values = 0
-        self._scanned_lines = 0
 
     def document(self) -> Document:
         """Read the only document; nothing at all is None."""
@@ -134,20 +133,21 @@ class _Composer:
             self._doubtful.add(())
         except yaml.YAMLError as error:
             self._syntax(error)
-        except (ValueError, OverflowError):  # PyYAML takes \UFFFFFFFF to chr() as it stands
-            self._note((), self._scanned_lines + 1, "expected characters that exist in Unicode")
         found = tuple(self._problems)
         return Document(self._source, value, self._lines, found, frozenset(self._doubtful))
 
     def _events(self) -> Iterator[events.Event]:
-        """The parser's events; how far it has read stays known when it fails."""
+        """The parser's events."""
         loader = yaml.SafeLoader(self._text)
-        try:
-            while loader.check_event():
-                yield loader.get_event()
-        finally:
-            self._scanned_lines = loader.line
-            loader.dispose()
+        while True:
+            try:
+                event = loader.get_event() if loader.check_event() else None
+            except (ValueError, OverflowError):  # PyYAML takes \UFFFFFFFF to chr() as it stands
+                self._note((), loader.line + 1, "expected characters that exist in Unicode")
+                raise _Abandoned from None
+            if event is None:
+                return
+            yield event
 
     def _only_document(self, stream: Iterator[events.Event]) -> Any:
         """The value of the stream's one document."""

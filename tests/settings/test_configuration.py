@@ -7,10 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from station.settings.configuration import Configuration, load_configuration
-from station.settings.environment import overrides, variable, variables
+from station.settings.environment import named, overrides, variable, variables
 from station.settings.model import Settings, setting
 from station.settings.problems import Problem, SettingsError
 from station.settings.schema import leaves, schema_of
+from station.settings.validation import validated
+from station.settings.yaml_loader import parse_document
 
 
 def problems(file: Path | None = None, **environ: str) -> list[str]:
@@ -86,9 +88,10 @@ class TestBadEnvironment:
             ("STATION_MODBUS_PORT", "[", f"{PORT} '['"),
             ("STATION_MODBUS_PORT", "&a 1", f"{PORT} '&a 1'"),
             ("STATION_MODBUS_PORT", "true", f"{PORT} true"),
-            ("STATION_MODBUS_PORT", "\udcff", f"{PORT} ''\\udcff''"),
+            ("STATION_MODBUS_PORT", "\udcff", f"{PORT} '\\udcff'"),
             ("STATION_MODBUS_UNIT", "248", "expected an integer from 1 to 247, got 248"),
             ("STATION_HMI_HOST", "127.0.0.300", "expected an IP address or a host's name, got '127.0.0.300'"),
+            ("STATION_HMI_HOST", "\ud800", "expected a text of at most 253 characters, got '\\ud800'"),
             ("STATION_HMI_HOST", "a b", "expected an IP address or a host's name, got 'a b'"),
             ("STATION_HOME", "", "expected the path of a folder, written out without ~, got ''"),
             ("STATION_MODBUS_PROT", "1", "unknown variable: did you mean STATION_MODBUS_PORT?"),
@@ -115,7 +118,7 @@ class TestBadFile:
         ("content", "expected"),
         [
             ("modbus:\n  prot: 1\n", "2: modbus.prot: unknown key prot: did you mean port?"),
-            ("plc: {}\n", "1: plc: unknown key plc: expected home, recipes_folder, modbus, hmi, metrics"),
+            ("plc: {}\n", f"1: plc: unknown key plc: expected {', '.join(Configuration.model_fields)}"),
             ("\nmodbus: 5020\n", "2: modbus: expected a mapping with host, port, unit, got 5020"),
             ("home:\n", "1: home: expected a path, got nothing"),
             (
@@ -129,6 +132,12 @@ class TestBadFile:
     def test_each_is_refused_with_its_line(self, write, content, expected):
         file = write(content)
         assert problems(file) == [f"{file}:{expected}"]
+
+    def test_the_environment_does_not_hide_what_is_wrong_around_it(self, write):
+        for content, shown in (("modbus:\n", "nothing"), ("modbus: 7\n", "7")):
+            file = write(content)
+            expected = f"{file}:1: modbus: expected a mapping with host, port, unit, got {shown}"
+            assert problems(file, STATION_MODBUS_PORT="502") == [expected]
 
     def test_two_servers_on_one_port(self, write):
         file = write("hmi:\n  port: 5020\n")
@@ -166,6 +175,17 @@ class TestEveryField:
             {("dry",): True, ("pose", "joints_rad"): [1, 2.5], ("serial",): "012"},
             [],
         )
+
+    def test_a_list_that_is_too_short_is_one_problem_with_the_variables_name(self):
+        given, _ = overrides(schema_of(Site), {"STATION_POSE_JOINTS_RAD": "[1]"})
+        document = parse_document(b"pose:\n  joints_rad:\n    - 1\n", "f")
+        with pytest.raises(SettingsError) as caught:
+            validated(Site, document, document.value, document.locate)
+        expected = "expected a list of 2 items, each a number in rad, got a list of 1"
+        assert str(caught.value) == f"f:2: pose.joints_rad: {expected}"
+        assert named(("pose", "joints_rad", 1), given) == "STATION_POSE_JOINTS_RAD[1]"
+        assert named(("pose", "joints_rad"), given) == "STATION_POSE_JOINTS_RAD"
+        assert named(("pose",), given) is None
 
     def test_two_fields_with_one_variable_are_a_mistake_of_the_programmer(self):
         class Clash(Settings):

@@ -193,9 +193,9 @@ def test_a_good_recipe_is_read_and_cannot_be_changed(small, write):
 
 
 def test_steps_that_are_no_binary_fractions_end_where_a_person_says(small, write):
-    text = small.replace("step_mm: 1", "step_mm: 0.4").replace("number: 8", "number: 30")
-    text = text.replace("closing_limit_mm: 8.5", "closing_limit_mm: 12").replace("[4, 8]", "[4, 8, 12]")
-    assert load_recipe(write(text)).steps.travel_mm == 12
+    text = small.replace("step_mm: 1", "step_mm: 1.1").replace("number: 8", "number: 3").replace("8.5", "3.3")
+    text = text.replace("[4, 8]", "[1.1, 3.3]").replace("closing_mm: 4", "closing_mm: 1.1")
+    assert load_recipe(write(text.replace("closing_mm: 8", "closing_mm: 3.3"))).steps.travel_mm == 3.3
 
 
 class TestShipped:
@@ -235,6 +235,14 @@ class TestFolders:
             f"{second}:2: name: expected one recipe with cherry, but {first} has it too",
             f"{second}:4: plc_number: expected one recipe with 7, but {first} has it too",
         ]
+
+    def test_neither_of_two_that_clash_can_be_found_but_a_third_can(self, small, write, tmp_path):
+        write(small, "a.yaml")
+        write(small.replace("plc_number: 7", "plc_number: 8"), "b.yaml")
+        write(small.replace("cherry", "plum").replace("plc_number: 7", "plc_number: 9"), "c.yaml")
+        assert find_recipe("plum", tmp_path).plc_number == 9
+        with pytest.raises(BadInputError, match=r"one of plum \(in .*\)\n.*b\.yaml:2: name: expected one recipe with"):
+            find_recipe("cherry", tmp_path)
 
     def test_all_files_problems_come_at_once(self, small, write, tmp_path):
         first = write(small.replace("force_n: 20", "force_n: 0"), "a.yaml")

@@ -74,7 +74,15 @@ def test_a_bad_environment_is_a_message_and_exit_code_2(station):
 def test_what_is_hostile_is_a_message_and_exit_code_2(station, write, tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     bomb = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40))])
-    for path in (tmp_path / "pipe.yaml", write(bomb), write(b"\xff\xfe"), write("[" * 60_000), write(""), "a\nb.yaml"):
+    for path in (
+        tmp_path / "pipe.yaml",
+        write(bomb),
+        write(b"\xff\xfe"),
+        write("[" * 60_000),
+        write(""),
+        "a\nb.yaml",
+        "x" * 5000,
+    ):
         done = station("recipes", "check", path)
         assert done.returncode == 2
         assert "Traceback" not in done.stderr
