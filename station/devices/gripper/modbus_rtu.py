@@ -5,9 +5,10 @@ Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on h
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from typing import NoReturn
 
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
-from pymodbus.exceptions import ModbusException
+from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.framer import FramerType
 from pymodbus.pdu import ModbusPDU
 
@@ -102,7 +103,7 @@ class ModbusRtuLink:
     async def _send(self, values: list[int]) -> None:
         await self._ask(lambda client: client.write_registers(_COMMAND, values, device_id=self._settings.unit))
 
-    async def _refuse(self, what: str) -> None:
+    async def _refuse(self, what: str) -> NoReturn:
         await self.close()
         raise GripperProtocolError(
             f"{self.place} answered {what}",
@@ -112,14 +113,15 @@ class ModbusRtuLink:
     async def _ask(self, request: Callable[[_Client], Awaitable[ModbusPDU]]) -> ModbusPDU:
         client = await self._connected()
         self._received = b""
-        asking = asyncio.ensure_future(request(client))
         breaking = asyncio.ensure_future(self._lost.wait())
+        asking = asyncio.ensure_future(_called(request, client))
         try:
             await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
             answer = asking.result() if asking.done() else None
+        except ConnectionException:
+            answer = None
         except ModbusException:
             await self._explain_silence()
-            raise
         except BaseException:
             await self.close()
             raise
@@ -137,7 +139,7 @@ class ModbusRtuLink:
             await self._refuse(f"exception {answer.exception_code}")
         return answer
 
-    async def _explain_silence(self) -> None:
+    async def _explain_silence(self) -> NoReturn:
         """Raise what pymodbus' one time-out stands for: silence, or bytes that are no answer."""
         self._wait_for_quiet = True
         if self._received:
@@ -200,3 +202,8 @@ class ModbusRtuLink:
             trace_connect=on_connect,
             trace_packet=on_packet,
         )
+
+
+async def _called(request: Callable[[_Client], Awaitable[ModbusPDU]], client: _Client) -> ModbusPDU:
+    """Makes what pymodbus raises before it awaits anything an outcome like the others."""
+    return await request(client)

@@ -5,6 +5,7 @@ The socket carries no motor current. Unverified on hardware.
 
 import asyncio
 from contextlib import suppress
+from typing import NoReturn
 
 from station.devices.gripper.errors import (
     GripperEmergencyStopError,
@@ -91,7 +92,7 @@ class UrcapLink:
             await self._refuse(f"GET {name}", answer)
         return int(words[1])
 
-    async def _refuse(self, request: str, answer: bytes) -> None:
+    async def _refuse(self, request: str, answer: bytes) -> NoReturn:
         await self.close()
         raise GripperProtocolError(
             f"{self.place} answered {answer!r} to {request!r}",
