@@ -25,6 +25,7 @@ from station.devices.gripper.robotiq import make_gripper
 from station.devices.gripper.urcap import UrcapLink
 from station.settings.gripper import GripperSettings, ModbusRtuSettings, UrcapSettings
 from station.twin.robotiq.registers import Command
+from station.twin.robotiq.rtu import framed
 
 OnWire = Callable[..., Any]
 
@@ -272,6 +273,29 @@ def test_no_answer_whatsoever_does_more_than_raise_a_gripper_error(reply: bytes,
 
     asyncio.run(scenario())
     assert not unseen
+
+
+def test_an_answer_to_another_question_is_refused():
+    status = framed(bytes.fromhex("09 04 06 31 00 00 00 03 00"))
+
+    async def scenario() -> None:
+        async def deaf(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while await reader.read(100):
+                writer.write(status)
+            writer.close()
+
+        server = await asyncio.start_server(deaf, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        wire = ModbusRtuSettings(line="tcp", host="127.0.0.1", port=port)
+        gripper = make_gripper(GripperSettings(driver="modbus_rtu", modbus_rtu=wire))
+        assert (await gripper.read()).active
+        with pytest.raises(GripperProtocolError, match="function 4 where 16 was asked for"):
+            await gripper.move_to_width(40.0, 50.0, 20.0)
+        await gripper.close()
+        server.close()
+        await asyncio.sleep(0.01)
+
+    asyncio.run(scenario())
 
 
 def test_a_number_beyond_a_byte_is_refused(on: OnWire):

@@ -21,6 +21,7 @@ from station.devices.gripper.errors import (
 from station.devices.gripper.link import Status
 from station.settings.gripper import ModbusRtuSettings
 
+_READ, _WRITE = 0x04, 0x10
 _COMMAND, _STATUS, _COUNT = 0x03E8, 0x07D0, 3
 _ACTIVATE, _GO_TO, _RELEASE_OPENS = 0x0100, 0x0800, 0x2000
 _AMPERE_PER_COUNT = 0.01
@@ -90,10 +91,11 @@ class ModbusRtuLink:
 
     async def _registers(self) -> list[int]:
         answer = await self._ask(
-            lambda client: client.read_input_registers(_STATUS, count=_COUNT, device_id=self._settings.unit)
+            _READ,
+            lambda client: client.read_input_registers(_STATUS, count=_COUNT, device_id=self._settings.unit),
         )
         if len(answer.registers) != _COUNT:
-            await self._refuse(f"{len(answer.registers)} registers where {_COUNT} were asked for")
+            self._refuse(f"{len(answer.registers)} registers where {_COUNT} were asked for")
         return list(answer.registers)
 
     async def _write(self, values: list[int]) -> None:
@@ -101,54 +103,61 @@ class ModbusRtuLink:
             await self._send(values)
 
     async def _send(self, values: list[int]) -> None:
-        await self._ask(lambda client: client.write_registers(_COMMAND, values, device_id=self._settings.unit))
+        await self._ask(_WRITE, lambda client: client.write_registers(_COMMAND, values, device_id=self._settings.unit))
 
-    async def _refuse(self, what: str) -> NoReturn:
-        await self.close()
+    async def _ask(self, function: int, request: Callable[[_Client], Awaitable[ModbusPDU]]) -> ModbusPDU:
+        client = await self._connected()
+        self._received = b""
+        asking = asyncio.ensure_future(_called(request, client))
+        breaking = asyncio.ensure_future(self._lost.wait())
+        try:
+            await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
+        except asyncio.CancelledError:
+            # pymodbus ends it in time; an answer left on the line would be taken for the next one.
+            await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
+            raise
+        finally:
+            if not asking.done() or asking.exception():
+                self._drop()
+            asking.cancel()
+            breaking.cancel()
+            await asyncio.gather(asking, breaking, return_exceptions=True)
+        return self._checked(asking, function)
+
+    def _checked(self, asked: asyncio.Future[ModbusPDU], function: int) -> ModbusPDU:
+        """The answer, or the error that stands for what came instead."""
+        if asked.cancelled() or isinstance(asked.exception(), ConnectionException):
+            raise GripperLinkLostError(
+                f"the connection to {self.place} broke",
+                "check the cable and the adapter; the fingers may still be moving",
+            )
+        if isinstance(asked.exception(), ModbusException) and self._received:
+            self._refuse(f"with what is no Modbus RTU answer: {self._received[:16].hex(' ')}")
+        if isinstance(asked.exception(), ModbusException):
+            raise GripperSilentError(
+                f"{self.place} did not answer within {self._answer_timeout_s:g} s",
+                "check the 24 V supply, the wiring and the unit",
+            )
+        answer = asked.result()
+        if answer.isError():
+            self._refuse(f"exception {answer.exception_code}")
+        if answer.function_code != function:
+            self._refuse(f"function {answer.function_code} where {function} was asked for")
+        return answer
+
+    def _refuse(self, what: str) -> NoReturn:
+        self._drop()
         raise GripperProtocolError(
             f"{self.place} answered {what}",
             "check baud rate, unit, wiring and terminator, and that no second master is on the line",
         )
 
-    async def _ask(self, request: Callable[[_Client], Awaitable[ModbusPDU]]) -> ModbusPDU:
-        client = await self._connected()
-        self._received = b""
-        breaking = asyncio.ensure_future(self._lost.wait())
-        asking = asyncio.ensure_future(_called(request, client))
-        try:
-            await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
-            answer = asking.result() if asking.done() else None
-        except ConnectionException:
-            answer = None
-        except ModbusException:
-            await self._explain_silence()
-        except BaseException:
-            await self.close()
-            raise
-        finally:
-            asking.cancel()
-            breaking.cancel()
-            await asyncio.gather(asking, breaking, return_exceptions=True)
-        if answer is None:
-            await self.close()
-            raise GripperLinkLostError(
-                f"the connection to {self.place} broke",
-                "check the cable and the adapter; the fingers may still be moving",
-            )
-        if answer.isError():
-            await self._refuse(f"exception {answer.exception_code}")
-        return answer
-
-    async def _explain_silence(self) -> NoReturn:
-        """Raise what pymodbus' one time-out stands for: silence, or bytes that are no answer."""
+    def _drop(self) -> None:
+        """Close after a failure: an answer may still be on its way."""
         self._wait_for_quiet = True
-        if self._received:
-            await self._refuse(f"with what is no Modbus RTU answer: {self._received[:16].hex(' ')}")
-        await self.close()
-        raise GripperSilentError(
-            f"{self.place} did not answer within {self._answer_timeout_s:g} s",
-            "check the 24 V supply, the wiring and the unit",
-        )
+        if self._client:
+            self._client.close()
+            self._client = None
 
     async def _connected(self) -> _Client:
         if self._client:

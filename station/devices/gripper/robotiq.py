@@ -31,7 +31,7 @@ _RESET_HOLD_S = 0.5
 """Between reset and activation, as in the drivers that are known to work; also how long an old fault may linger."""
 _MUTE_GRACE_S = 0.5
 """Fault 9 says that the line was silent for a second, which being asked again cures; only one that stays is real."""
-_AT_POSITION_COUNTS = 3
+_AT_POSITION_COUNTS = 2
 """How far from the request the gripper may stand and still be at position."""
 _NO_COMMUNICATION = 0x9
 
@@ -67,7 +67,8 @@ class RobotiqGripper:
     async def activate(self) -> GripperReading:
         """Make the gripper ready. Idempotent: one that is active and without fault does not move.
 
-        Otherwise **the fingers travel their whole way**: nothing may be between them.
+        Otherwise **the fingers travel their whole way**, also when the wait for them is cancelled, and `stop` does not
+        end it: nothing may be between them.
 
         Raises:
             GripperFaultError: a fault that a reset and an activation do not clear.
@@ -178,12 +179,15 @@ class RobotiqGripper:
         return status, at_s
 
     async def _arrival(self, count: int, deadline_s: float, stops: int) -> tuple[Status, float]:
+        """The status once two looks in a row found the fingers at rest, and in the same place."""
+        position = None
         while True:
             status, at_s = await self._ready()
             if self._stops != stops:
                 raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
-            if status.echo == count and self._at_rest(status, count):
+            if status.echo == count and self._at_rest(status, count) and status.position == position:
                 return status, at_s
+            position = status.position
             await self._wait_until(deadline_s, f"the move to count {count}", status)
 
     @staticmethod

@@ -8,6 +8,7 @@ import os
 import pty
 import tty
 from collections import deque
+from contextlib import suppress
 
 from station.twin.robotiq.faults import gone
 from station.twin.robotiq.listener import Listener, disturbed
@@ -104,5 +105,8 @@ class RtuSerialServer:
             self._arrived.clear()
             while self._requests:
                 reply = answer(self._requests.popleft(), self._gripper)
-                if reply is not None:
-                    os.write(near, await disturbed(reply, self._gripper.faults))
+                if reply is None:
+                    continue
+                reply = await disturbed(reply, self._gripper.faults)
+                with suppress(BlockingIOError):  # a serial line loses what nobody reads
+                    os.write(near, reply)
