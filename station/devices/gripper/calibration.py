@@ -1,0 +1,80 @@
+"""Millimetres and newtons to the gripper's counts and settings, and back.
+
+Scales: Robotiq 2F-85 & 2F-140 instruction manual, speed and force registers; linear between the ends, and a force of
+20 to 235 N: both unverified on hardware.
+"""
+
+from math import ceil, floor
+
+from station.devices.gripper.errors import GripperRequestError
+from station.settings.gripper import GripperCalibration
+
+SLOWEST_MM_S, FASTEST_MM_S = 20.0, 150.0
+WEAKEST_N, STRONGEST_N = 20.0, 235.0
+_FULL_SCALE = 255
+_ROUNDING = 1e-9
+"""Keeps what floating point makes of a tie, or of a whole setting, from deciding."""
+
+
+def width_of_count(count: int, calibration: GripperCalibration) -> float:
+    """The gap for fruit at a position, mm; negative where the fingers press on each other.
+
+    Args:
+        count: position as read, 0 to 255.
+        calibration: the finger set.
+    """
+    opening_mm = (calibration.closed_count - count) * calibration.mm_per_count
+    return opening_mm - calibration.finger_offset_mm
+
+
+def max_width_mm(calibration: GripperCalibration) -> float:
+    """The gap for fruit when fully open, mm."""
+    return width_of_count(calibration.open_count, calibration)
+
+
+def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
+    """The position whose width is nearest, at most half a count away; a tie goes to the wider gap.
+
+    Args:
+        width_mm: 0 to the widest gap of the finger set.
+        calibration: the finger set.
+
+    Raises:
+        GripperRequestError: the width is out of reach.
+    """
+    widest_mm = max_width_mm(calibration)
+    if not -_ROUNDING <= width_mm <= widest_mm + _ROUNDING:
+        raise GripperRequestError(
+            f"a width of {width_mm} mm was asked for, its fingers reach 0 to {widest_mm:.2f} mm",
+            "correct the recipe's widths or the gripper's calibration",
+        )
+    exact = calibration.closed_count - (width_mm + calibration.finger_offset_mm) / calibration.mm_per_count
+    return ceil(exact - 0.5 - _ROUNDING)
+
+
+def speed_setting(speed_mm_s: float) -> int:
+    """The nearest speed setting, 0 to 255.
+
+    Raises:
+        GripperRequestError: the gripper cannot move at this speed.
+    """
+    if not SLOWEST_MM_S <= speed_mm_s <= FASTEST_MM_S:
+        raise GripperRequestError(
+            f"a speed of {speed_mm_s} mm/s was asked for, it moves at {SLOWEST_MM_S:g} to {FASTEST_MM_S:g} mm/s",
+            "correct the recipe's speed",
+        )
+    return round((speed_mm_s - SLOWEST_MM_S) / (FASTEST_MM_S - SLOWEST_MM_S) * _FULL_SCALE)
+
+
+def force_setting(force_N: float) -> int:  # noqa: N803 (the unit's symbol is a capital)
+    """The force setting, 0 to 255, rounded down: never more force than asked for.
+
+    Raises:
+        GripperRequestError: the gripper cannot hold this force.
+    """
+    if not WEAKEST_N <= force_N <= STRONGEST_N:
+        raise GripperRequestError(
+            f"a force of {force_N} N was asked for, it grips with {WEAKEST_N:g} to {STRONGEST_N:g} N",
+            "correct the recipe's force; a soft fruit is protected by small width steps, not by the force",
+        )
+    return floor((force_N - WEAKEST_N) / (STRONGEST_N - WEAKEST_N) * _FULL_SCALE + _ROUNDING)

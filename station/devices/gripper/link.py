@@ -1,0 +1,77 @@
+"""What the driver needs from a wire: the gripper's status, and four commands."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+
+class State(IntEnum):
+    """gSTA."""
+
+    RESET = 0
+    ACTIVATING = 1
+    ACTIVE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The gripper's registers as they were read."""
+
+    state: int
+    """gSTA."""
+    go_to: bool
+    """gGTO: a motion is asked for; where not, gOBJ means nothing."""
+    object_: int
+    """gOBJ."""
+    fault: int
+    """gFLT."""
+    echo: int
+    """gPR."""
+    position: int
+    """gPO."""
+    current_a: float | None
+    """gCU, None where the wire does not carry it."""
+
+
+class Link(Protocol):
+    """One wire to one gripper.
+
+    Connects when first used and again after `close` or a failure; connecting never moves the fingers. Any failure
+    closes the connection, so that a late answer can never be taken for the next one.
+    Each call is one whole exchange, raises a `GripperError`, and ends within the answer time-out.
+    """
+
+    @property
+    def place(self) -> str:
+        """What is at the other end and where, in words."""
+        ...
+
+    async def status(self) -> Status:
+        """Read the registers."""
+        ...
+
+    async def reset(self) -> None:
+        """Deactivate: clears latched faults, the fingers do not move."""
+        ...
+
+    async def begin_activation(self) -> None:
+        """Raise the activation bit: the fingers travel. An automatic release shall open them, not close."""
+        ...
+
+    async def go_to(self, position: int, speed: int, force: int) -> None:
+        """Move; to be sent to an active gripper only.
+
+        Args:
+            position: 0 to 255.
+            speed: 0 to 255.
+            force: 0 to 255.
+        """
+        ...
+
+    async def halt(self) -> None:
+        """Stop moving, and stay active if active."""
+        ...
+
+    async def close(self) -> None:
+        """Close the connection."""
+        ...

@@ -1,0 +1,218 @@
+"""The wire on the gripper's own RS-485 line: Modbus RTU at a serial port, or RTU frames over TCP.
+
+Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on hardware.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import NoReturn
+
+from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
+from pymodbus.exceptions import ConnectionException, ModbusException
+from pymodbus.framer import FramerType
+from pymodbus.pdu import ModbusPDU
+
+from station.devices.gripper.errors import (
+    GripperLinkLostError,
+    GripperProtocolError,
+    GripperSilentError,
+    GripperUnreachableError,
+)
+from station.devices.gripper.link import Status
+from station.settings.gripper import ModbusRtuSettings
+
+_READ, _WRITE = 0x04, 0x10
+_COMMAND, _STATUS, _COUNT = 0x03E8, 0x07D0, 3
+_ACTIVATE, _GO_TO, _RELEASE_OPENS = 0x0100, 0x0800, 0x2000
+_AMPERE_PER_COUNT = 0.01
+
+_Client = AsyncModbusTcpClient | AsyncModbusSerialClient
+
+
+class ModbusRtuLink:
+    """One pymodbus client, made anew after each failure; retries and reconnecting are left to the verbs."""
+
+    def __init__(self, settings: ModbusRtuSettings, answer_timeout_s: float) -> None:
+        self._settings = settings
+        self._answer_timeout_s = answer_timeout_s
+        self._exchange = asyncio.Lock()
+        self._client: _Client | None = None
+        self._lost = asyncio.Event()
+        self._received = b""
+        self._wait_for_quiet = False
+
+    @property
+    def place(self) -> str:
+        """What is at the other end and where, in words."""
+        settings = self._settings
+        where = settings.serial_port if settings.line == "serial" else f"{settings.host}:{settings.port}"
+        return f"Modbus RTU unit {settings.unit} at {where}"
+
+    async def status(self) -> Status:
+        """Read the three status registers in one exchange."""
+        async with self._exchange:
+            return await self._status()
+
+    async def reset(self) -> None:
+        """Deactivate."""
+        await self._write([0, 0, 0])
+
+    async def begin_activation(self) -> None:
+        """Raise the activation bit."""
+        await self._write([_ACTIVATE | _RELEASE_OPENS])
+
+    async def go_to(self, position: int, speed: int, force: int) -> None:
+        """Move, all of it in one message."""
+        await self._write([_ACTIVATE | _GO_TO | _RELEASE_OPENS, position, speed << 8 | force])
+
+    async def halt(self) -> None:
+        """Stop moving; the activation bit is written as it stands, since raising it would start an activation."""
+        async with self._exchange:
+            registers = await self._registers()
+            await self._send([registers[0] & _ACTIVATE | _RELEASE_OPENS])
+
+    async def close(self) -> None:
+        """Close the connection."""
+        if self._client:
+            self._client.close()
+            self._client = None
+
+    async def _status(self) -> Status:
+        gripper, fault, position = await self._registers()
+        return Status(
+            state=gripper >> 12 & 0x3,
+            go_to=bool(gripper & _GO_TO),
+            object_=gripper >> 14,
+            fault=fault >> 8 & 0xF,
+            echo=fault & 0xFF,
+            position=position >> 8,
+            current_a=(position & 0xFF) * _AMPERE_PER_COUNT,
+        )
+
+    async def _registers(self) -> list[int]:
+        answer = await self._ask(
+            _READ,
+            lambda client: client.read_input_registers(_STATUS, count=_COUNT, device_id=self._settings.unit),
+        )
+        if len(answer.registers) != _COUNT:
+            self._refuse(f"{len(answer.registers)} registers where {_COUNT} were asked for")
+        return list(answer.registers)
+
+    async def _write(self, values: list[int]) -> None:
+        async with self._exchange:
+            await self._send(values)
+
+    async def _send(self, values: list[int]) -> None:
+        await self._ask(_WRITE, lambda client: client.write_registers(_COMMAND, values, device_id=self._settings.unit))
+
+    async def _ask(self, function: int, request: Callable[[_Client], Awaitable[ModbusPDU]]) -> ModbusPDU:
+        client = await self._connected()
+        self._received = b""
+        asking = asyncio.ensure_future(_called(request, client))
+        breaking = asyncio.ensure_future(self._lost.wait())
+        try:
+            await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
+        except asyncio.CancelledError:
+            # pymodbus ends it in time; an answer left on the line would be taken for the next one.
+            await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
+            raise
+        finally:
+            if not asking.done() or asking.exception():
+                self._drop()
+            asking.cancel()
+            breaking.cancel()
+            await asyncio.gather(asking, breaking, return_exceptions=True)
+        return self._checked(asking, function)
+
+    def _checked(self, asked: asyncio.Future[ModbusPDU], function: int) -> ModbusPDU:
+        """The answer, or the error that stands for what came instead."""
+        if asked.cancelled() or isinstance(asked.exception(), ConnectionException):
+            raise GripperLinkLostError(
+                f"the connection to {self.place} broke",
+                "check the cable and the adapter; the fingers may still be moving",
+            )
+        if isinstance(asked.exception(), ModbusException) and self._received:
+            self._refuse(f"with what is no Modbus RTU answer: {self._received[:16].hex(' ')}")
+        if isinstance(asked.exception(), ModbusException):
+            raise GripperSilentError(
+                f"{self.place} did not answer within {self._answer_timeout_s:g} s",
+                "check the 24 V supply, the wiring and the unit",
+            )
+        answer = asked.result()
+        if answer.isError():
+            self._refuse(f"exception {answer.exception_code}")
+        if answer.function_code != function:
+            self._refuse(f"function {answer.function_code} where {function} was asked for")
+        return answer
+
+    def _refuse(self, what: str) -> NoReturn:
+        self._drop()
+        raise GripperProtocolError(
+            f"{self.place} answered {what}",
+            "check baud rate, unit, wiring and terminator, and that no second master is on the line",
+        )
+
+    def _drop(self) -> None:
+        """Close after a failure: an answer may still be on its way."""
+        self._wait_for_quiet = True
+        if self._client:
+            self._client.close()
+            self._client = None
+
+    async def _connected(self) -> _Client:
+        if self._client:
+            return self._client
+        if self._wait_for_quiet and self._settings.line == "serial":
+            # RTU answers carry no number: what is still on its way must not be taken for the next answer.
+            await asyncio.sleep(self._answer_timeout_s)
+        self._wait_for_quiet = False
+        self._lost = asyncio.Event()
+        client = self._make()
+        if not await client.connect():
+            client.close()
+            raise GripperUnreachableError(
+                f"no connection to {self.place}",
+                "check the serial port or the gateway's address, and that no other program has it open",
+            )
+        self._client = client
+        return client
+
+    def _make(self) -> _Client:
+        settings = self._settings
+        lost = self._lost
+
+        def on_connect(connected: bool) -> None:  # noqa: FBT001 (pymodbus' signature)
+            if not connected:
+                lost.set()
+
+        def on_packet(sending: bool, data: bytes) -> bytes:  # noqa: FBT001 (pymodbus' signature)
+            if not sending:
+                self._received = data
+            return data
+
+        if settings.line == "serial":
+            return AsyncModbusSerialClient(
+                settings.serial_port,
+                framer=FramerType.RTU,
+                baudrate=settings.baud_rate,
+                timeout=self._answer_timeout_s,
+                retries=0,
+                reconnect_delay=0,
+                trace_connect=on_connect,
+                trace_packet=on_packet,
+            )
+        return AsyncModbusTcpClient(
+            settings.host,
+            port=settings.port,
+            framer=FramerType.RTU,
+            timeout=self._answer_timeout_s,
+            retries=0,
+            reconnect_delay=0,
+            trace_connect=on_connect,
+            trace_packet=on_packet,
+        )
+
+
+async def _called(request: Callable[[_Client], Awaitable[ModbusPDU]], client: _Client) -> ModbusPDU:
+    """Makes what pymodbus raises before it awaits anything an outcome like the others."""
+    return await request(client)

@@ -1,0 +1,242 @@
+"""The Robotiq 2F-85: the verbs, the same over both wires. Unverified on hardware."""
+
+import asyncio
+import time
+from contextlib import suppress
+
+from station.devices.gripper.calibration import (
+    WEAKEST_N,
+    count_for_width,
+    force_setting,
+    max_width_mm,
+    speed_setting,
+    width_of_count,
+)
+from station.devices.gripper.errors import (
+    GripperError,
+    GripperFaultError,
+    GripperNotActiveError,
+    GripperStoppedError,
+    GripperTimeoutError,
+)
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.devices.gripper.link import Link, State, Status
+from station.devices.gripper.modbus_rtu import ModbusRtuLink
+from station.devices.gripper.urcap import UrcapLink
+from station.settings.gripper import GripperSettings
+
+_POLL_S = 0.005
+"""The gripper refreshes its registers at 200 Hz (manual, Modbus RTU communication)."""
+_RESET_HOLD_S = 0.5
+"""Between reset and activation, as in the drivers that are known to work; also how long an old fault may linger."""
+_MUTE_GRACE_S = 0.5
+"""Fault 9 says that the line was silent for a second, which being asked again cures; only one that stays is real."""
+_AT_POSITION_COUNTS = 2
+"""How far from the request the gripper may stand and still be at position."""
+_NO_COMMUNICATION = 0x9
+
+_OBJECT_STATES = {
+    0: ObjectState.MOVING,
+    1: ObjectState.CONTACT_OPENING,
+    2: ObjectState.CONTACT_CLOSING,
+    3: ObjectState.AT_POSITION,
+}
+
+
+class RobotiqGripper:
+    """A 2F-85 behind a wire. Verbs that move take turns; `read` and `stop` may be called at any time.
+
+    After a lost link the error comes at once and the next verb connects again. Nothing is ever repeated on its own:
+    where the fingers are then is for `read` to say.
+    """
+
+    def __init__(self, link: Link, settings: GripperSettings) -> None:
+        self.link = link
+        self._settings = settings
+        self._calibration = settings.calibration
+        self._turn = asyncio.Lock()
+        self._stops = 0
+        self._held_request: int | None = None
+        self._mute_since_s: float | None = None
+
+    @property
+    def max_width_mm(self) -> float:
+        """The widest gap for fruit that the fingers leave."""
+        return max_width_mm(self._calibration)
+
+    async def activate(self) -> GripperReading:
+        """Make the gripper ready. Idempotent: one that is active and without fault does not move.
+
+        Otherwise **the fingers travel their whole way**, also when the wait for them is cancelled, and `stop` does not
+        end it: nothing may be between them.
+
+        Raises:
+            GripperFaultError: a fault that a reset and an activation do not clear.
+            GripperTimeoutError: it answers, but does not become active.
+            GripperError: the wire.
+        """
+        async with self._turn:
+            status, at_s = await self._look()
+            if status.state == State.ACTIVE and not status.fault:
+                return self._reading(status, at_s)
+            self._held_request = None
+            deadline_s = time.monotonic() + self._settings.activation_timeout_s
+            await self.link.reset()
+            while (await self._look())[0].state != State.RESET:
+                await self._wait_until(deadline_s, "its reset", None)
+                await self.link.reset()
+            await asyncio.sleep(_RESET_HOLD_S)
+            await self.link.begin_activation()
+            began_s = time.monotonic()
+            while True:
+                status, at_s = await self._look()
+                if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
+                    raise GripperFaultError(status.fault)
+                if status.state == State.ACTIVE and not status.fault:
+                    return self._reading(status, at_s)
+                await self._wait_until(deadline_s, "its activation", status)
+
+    async def open(self) -> MoveResult:
+        """Let go: open fully. Idempotent. Raises as `move_to_width`."""
+        return await self.move_to_width(self.max_width_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
+
+    async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:  # noqa: N803
+        """Move until the width is reached or something is felt. Idempotent.
+
+        A move that fails or is cancelled stops the fingers where the wire still allows it.
+
+        Args:
+            width_mm: gap between the finger surfaces, 0 to `max_width_mm`; the nearest count is requested.
+            speed_mm_s: 20 to 150.
+            force_N: 20 to 235, where to stop on contact.
+
+        Raises:
+            GripperRequestError: out of reach; nothing was sent.
+            GripperNotActiveError: not activated; nothing was sent.
+            GripperFaultError: the gripper reports a fault.
+            GripperStoppedError: `stop` was called meanwhile.
+            GripperTimeoutError: it answers, but does not get there.
+            GripperError: the wire.
+        """
+        count = count_for_width(width_mm, self._calibration)
+        speed, force = speed_setting(speed_mm_s), force_setting(force_N)
+        async with self._turn:
+            stops = self._stops
+            before, _ = await self._ready()
+            travel_s = abs(before.position - count) * self._calibration.mm_per_count / speed_mm_s
+            deadline_s = time.monotonic() + travel_s + self._settings.move_margin_s
+            self._held_request = None
+            try:
+                await self.link.go_to(count, speed, force)
+                status, at_s = await self._arrival(count, deadline_s, stops)
+            except (GripperError, asyncio.CancelledError):
+                with suppress(GripperError):
+                    await self.link.halt()
+                raise
+            reading = self._reading(status, at_s)
+            if reading.object_state == ObjectState.CONTACT_CLOSING:
+                self._held_request = count
+            return MoveResult(width_mm, count, reading)
+
+    async def stop(self) -> GripperReading:
+        """Stop where the fingers are; a move under way ends with `GripperStoppedError`. Idempotent.
+
+        Raises:
+            GripperError: the wire.
+        """
+        self._stops += 1
+        self._held_request = None
+        await self.link.halt()
+        return await self.read()
+
+    async def read(self) -> GripperReading:
+        """Ask the gripper, without moving it; a fault is told in the reading, not raised.
+
+        Raises:
+            GripperError: the wire.
+        """
+        return self._reading(*await self._look())
+
+    async def close(self) -> None:
+        """Give the wire back, not the fingers. Idempotent; a later verb opens the wire again."""
+        await self.link.close()
+
+    async def _look(self) -> tuple[Status, float]:
+        at_s = time.monotonic()
+        return await self.link.status(), at_s
+
+    async def _ready(self) -> tuple[Status, float]:
+        """The status of a gripper that may be told to move."""
+        status, at_s = await self._look()
+        fault = self._standing_fault(status, at_s)
+        if fault:
+            raise GripperFaultError(fault)
+        if status.state != State.ACTIVE:
+            raise GripperNotActiveError(
+                "it is not activated",
+                "clear the fingers and activate it: they will travel their whole way",
+            )
+        return status, at_s
+
+    async def _arrival(self, count: int, deadline_s: float, stops: int) -> tuple[Status, float]:
+        """The status once two looks in a row found the fingers at rest, and in the same place."""
+        position = None
+        while True:
+            status, at_s = await self._ready()
+            if self._stops != stops:
+                raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+            if status.echo == count and self._at_rest(status, count) and status.position == position:
+                return status, at_s
+            position = status.position
+            await self._wait_until(deadline_s, f"the move to count {count}", status)
+
+    @staticmethod
+    def _at_rest(status: Status, count: int) -> bool:
+        state = _OBJECT_STATES[status.object_]
+        if state == ObjectState.AT_POSITION:
+            return abs(status.position - count) <= _AT_POSITION_COUNTS
+        return state != ObjectState.MOVING
+
+    @staticmethod
+    async def _wait_until(deadline_s: float, what: str, status: Status | None) -> None:
+        if time.monotonic() > deadline_s:
+            seen = f": it reads {status}" if status else ""
+            raise GripperTimeoutError(
+                f"{what} did not end in time{seen}",
+                "look for what holds the fingers, and for a second master that commands the gripper",
+            )
+        await asyncio.sleep(_POLL_S)
+
+    def _standing_fault(self, status: Status, now_s: float) -> int:
+        if status.fault != _NO_COMMUNICATION:
+            self._mute_since_s = None
+            return status.fault
+        if self._mute_since_s is None:
+            self._mute_since_s = now_s
+        return status.fault if now_s - self._mute_since_s > _MUTE_GRACE_S else 0
+
+    def _reading(self, status: Status, at_s: float) -> GripperReading:
+        state = _OBJECT_STATES[status.object_] if status.go_to else ObjectState.IDLE
+        if state == ObjectState.AT_POSITION and self._held_request == status.echo:
+            state = ObjectState.LOST
+        return GripperReading(
+            width_mm=width_of_count(status.position, self._calibration),
+            position_count=status.position,
+            echoed_count=status.echo,
+            object_state=state,
+            active=status.state == State.ACTIVE,
+            fault_code=status.fault,
+            current_a=status.current_a,
+            at_s=at_s,
+        )
+
+
+def make_gripper(settings: GripperSettings) -> RobotiqGripper:
+    """The gripper that the settings name; nothing is sent yet.
+
+    Args:
+        settings: driver, wire, finger set and times.
+    """
+    if settings.driver == "urcap":
+        return RobotiqGripper(UrcapLink(settings.urcap, settings.answer_timeout_s), settings)
+    return RobotiqGripper(ModbusRtuLink(settings.modbus_rtu, settings.answer_timeout_s), settings)

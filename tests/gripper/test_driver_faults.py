@@ -1,0 +1,315 @@
+"""The station's driver over each wire, with everything wrong that can be."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from station.devices.gripper.errors import (
+    FAULTS,
+    GripperEmergencyStopError,
+    GripperError,
+    GripperFaultError,
+    GripperLinkLostError,
+    GripperProtocolError,
+    GripperSilentError,
+    GripperTimeoutError,
+    GripperUnreachableError,
+)
+from station.devices.gripper.interface import ObjectState
+from station.devices.gripper.robotiq import make_gripper
+from station.devices.gripper.urcap import UrcapLink
+from station.settings.gripper import GripperSettings, ModbusRtuSettings, UrcapSettings
+from station.twin.robotiq.registers import Command
+from station.twin.robotiq.rtu import framed
+
+OnWire = Callable[..., Any]
+
+
+async def under_way(rig: Any) -> asyncio.Task[Any]:
+    """A slow closing move that has begun."""
+    moving = asyncio.create_task(rig.driver.move_to_width(0.0, 20.0, 20.0))
+    await rig.until(lambda: rig.twin.status().go_to)
+    return moving
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [
+        ("over_temperature", 0x8),
+        ("under_voltage", 0xA),
+        ("automatic_release", 0xB),
+        ("internal_fault", 0xC),
+        ("overcurrent", 0xE),
+    ],
+)
+def test_each_fault_ends_a_move_by_its_name_and_the_fingers_stay(on_wire: OnWire, fault: str, code: int):
+    async def scenario(rig: Any) -> None:
+        moving = await under_way(rig)
+        rig.faults.set(fault)
+        with pytest.raises(GripperFaultError) as caught:
+            await moving
+        assert caught.value.fault_code == code
+        assert caught.value.code == FAULTS[code].name
+        assert caught.value.remedy in str(caught.value)
+        assert not rig.twin.status().go_to
+        assert (await rig.driver.read()).fault_code in {code, 0xF if fault == "automatic_release" else code}
+        rig.faults.clear()
+        rig.clock.skip(20.0)
+        before_mm = rig.twin.opening_mm(rig.clock.now_s())
+        rig.clock.skip(5.0)
+        assert rig.twin.opening_mm(rig.clock.now_s()) == before_mm
+        await rig.activate()
+        assert (await rig.driver.open()).reading.object_state == ObjectState.AT_POSITION
+
+    on_wire(scenario)
+
+
+def test_a_failed_activation_is_told_by_its_name(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.twin.write(Command())
+        rig.faults.set("activation_fault")
+        with pytest.raises(GripperFaultError, match="blocks the fingers") as caught:
+            await rig.driver.activate()
+        assert caught.value.fault_code == 0xD
+
+    on_wire(scenario)
+
+
+def test_an_activation_that_never_ends_is_given_up(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.twin.write(Command())
+        rig.faults.set("slow", 100.0)
+        with pytest.raises(GripperTimeoutError, match="activation"):
+            await rig.driver.activate()
+
+    on_wire(scenario, activation_timeout_s=1.0)
+
+
+def test_a_passing_report_of_no_communication_is_forgiven_and_a_lasting_one_is_not(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("no_communication")
+        moving = await under_way(rig)
+        await rig.until(lambda: rig.twin.status().position > 10)
+        rig.faults.clear()
+        await rig.until(lambda: rig.twin.status().position > 15)
+        assert not moving.done()
+        rig.faults.set("no_communication")
+        with pytest.raises(GripperFaultError, match="terminator"):
+            await moving
+
+    on_wire(scenario)
+
+
+def test_an_emergency_stop_is_told_as_such(on: OnWire):
+    async def scenario(rig: Any) -> None:
+        moving = await under_way(rig)
+        rig.faults.set("emergency_stopped")
+        with pytest.raises(GripperEmergencyStopError, match="release the button"):
+            await moving
+        with pytest.raises(GripperEmergencyStopError):
+            await rig.driver.read()
+
+    on("urcap", scenario)
+
+
+def test_over_modbus_a_gripper_that_stands_still_is_a_time_out(on: OnWire):
+    async def scenario(rig: Any) -> None:
+        moving = asyncio.create_task(rig.driver.move_to_width(40.0, 150.0, 20.0))
+        await rig.until(lambda: rig.twin.status().go_to)
+        rig.faults.set("emergency_stopped")
+        with pytest.raises(GripperTimeoutError):
+            await moving
+
+    on("rtu over tcp", scenario)
+
+
+@pytest.mark.parametrize(("fault", "amount"), [("stuck", 1.0), ("wrong", 9.0), ("slow", 50.0)])
+def test_what_answers_but_does_not_do_it_is_given_up_in_time(on_wire: OnWire, fault: str, amount: float):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set(fault, amount)
+        began_s = time.monotonic()
+        with pytest.raises(GripperTimeoutError, match="did not end in time"):
+            await rig.driver.move_to_width(45.0, 100.0, 20.0)
+        assert time.monotonic() - began_s < 5.0
+        rig.faults.clear()
+        assert (await rig.driver.move_to_width(45.0, 100.0, 20.0)).width_mm == pytest.approx(45.0, abs=0.2)
+
+    on_wire(scenario)
+
+
+def test_garbage_is_told_from_silence(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("garbage")
+        with pytest.raises(GripperProtocolError, match="answered"):
+            await rig.driver.read()
+        rig.faults.clear()
+        assert (await rig.driver.read()).active
+
+    on_wire(scenario)
+
+
+def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("delayed", 0.3)
+        with pytest.raises(GripperSilentError):
+            await rig.driver.read()
+        rig.faults.clear()
+        rig.twin.write(Command(activate=True, go_to=True, position=99))
+        assert (await rig.driver.read()).echoed_count == 99
+
+    on_wire(scenario)
+
+
+def test_a_short_delay_is_borne(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("delayed", 0.02)
+        assert (await rig.driver.move_to_width(51.0, 100.0, 20.0)).width_mm == pytest.approx(51.0, abs=0.2)
+
+    on_wire(scenario)
+
+
+def test_a_link_cut_in_mid_move_is_an_error_at_once_and_nothing_moves_by_itself_after(on_wire: OnWire, wire: str):
+    async def scenario(rig: Any) -> None:
+        moving = await under_way(rig)
+        rig.faults.set("off")
+        with pytest.raises((GripperLinkLostError, GripperSilentError) if wire == "serial" else GripperLinkLostError):
+            await moving
+        with pytest.raises(GripperSilentError if wire == "serial" else GripperUnreachableError):
+            await rig.driver.read()
+        rig.faults.clear()
+        rig.twin.write(Command(activate=True))
+        reading = await reached(rig)
+        rig.clock.skip(5.0)
+        assert (await rig.driver.read()).position_count == reading.position_count
+        assert (await rig.driver.open()).reading.object_state == ObjectState.AT_POSITION
+
+    on_wire(scenario)
+
+
+async def reached(rig: Any) -> Any:
+    """The first reading that comes through; the scenario's own limit is the deadline."""
+    while True:
+        try:
+            return await rig.driver.read()
+        except GripperError:
+            await asyncio.sleep(0.01)
+
+
+def test_what_comes_and_goes_gives_errors_and_then_readings(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("intermittent", 1.0)
+        seen = set()
+        while seen != {True, False}:
+            try:
+                seen.add((await rig.driver.read()).active)
+            except GripperError:
+                seen.add(False)
+            await asyncio.sleep(0.01)
+
+    on_wire(scenario)
+
+
+@pytest.mark.parametrize(
+    "wire_settings",
+    [
+        GripperSettings(urcap=UrcapSettings(host="127.0.0.1", port=1)),
+        GripperSettings(driver="modbus_rtu", modbus_rtu=ModbusRtuSettings(line="tcp", host="127.0.0.1", port=1)),
+        GripperSettings(driver="modbus_rtu", modbus_rtu=ModbusRtuSettings(serial_port="/dev/no-such-adapter")),
+    ],
+    ids=["urcap", "rtu over tcp", "serial"],
+)
+def test_nobody_there_is_told_with_the_place(wire_settings: GripperSettings):
+    gripper = make_gripper(wire_settings)
+    with pytest.raises(GripperUnreachableError, match=r"127\.0\.0\.1:1|no-such-adapter"):
+        asyncio.run(gripper.read())
+
+
+def test_an_adapter_pulled_out_is_an_error(on: OnWire):
+    async def scenario(rig: Any) -> None:
+        moving = await under_way(rig)
+        await rig.server.stop()
+        with pytest.raises(GripperError):
+            await moving
+
+    on("serial", scenario)
+
+
+@settings(max_examples=40, deadline=None)
+@given(reply=st.binary(min_size=1, max_size=80), rtu=st.booleans())
+def test_no_answer_whatsoever_does_more_than_raise_a_gripper_error(reply: bytes, rtu: bool):
+    unseen: list[Any] = []
+
+    async def scenario() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
+
+        async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while await reader.read(100):
+                writer.write(reply)
+            writer.close()
+
+        server = await asyncio.start_server(mad, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        address = {"host": "127.0.0.1", "port": port}
+        wire: dict[str, Any] = (
+            {"driver": "modbus_rtu", "modbus_rtu": ModbusRtuSettings(line="tcp", **address)}
+            if rtu
+            else {"urcap": UrcapSettings(**address)}
+        )
+        gripper = make_gripper(GripperSettings(answer_timeout_s=0.02, **wire))
+        try:
+            with pytest.raises(GripperError):
+                await gripper.read()
+            with pytest.raises(GripperError):
+                await gripper.open()
+        finally:
+            await gripper.close()
+            server.close()
+            await asyncio.sleep(0)
+
+    asyncio.run(scenario())
+    assert not unseen
+
+
+def test_an_answer_to_another_question_is_refused():
+    status = framed(bytes.fromhex("09 04 06 31 00 00 00 03 00"))
+
+    async def scenario() -> None:
+        async def deaf(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while await reader.read(100):
+                writer.write(status)
+            writer.close()
+
+        server = await asyncio.start_server(deaf, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        wire = ModbusRtuSettings(line="tcp", host="127.0.0.1", port=port)
+        gripper = make_gripper(GripperSettings(driver="modbus_rtu", modbus_rtu=wire))
+        assert (await gripper.read()).active
+        with pytest.raises(GripperProtocolError, match="function 4 where 16 was asked for"):
+            await gripper.move_to_width(40.0, 50.0, 20.0)
+        await gripper.close()
+        server.close()
+        await asyncio.sleep(0.01)
+
+    asyncio.run(scenario())
+
+
+def test_a_number_beyond_a_byte_is_refused(on: OnWire):
+    async def scenario() -> None:
+        async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while line := await reader.readline():
+                writer.write(line.replace(b"GET ", b"").strip() + b" 300\n")
+            writer.close()
+
+        server = await asyncio.start_server(mad, "127.0.0.1", 0)
+        link = UrcapLink(UrcapSettings(host="127.0.0.1", port=server.sockets[0].getsockname()[1]), 0.2)
+        with pytest.raises(GripperProtocolError, match="300"):
+            await link.status()
+        server.close()
+        await asyncio.sleep(0.01)
+
+    asyncio.run(scenario())
