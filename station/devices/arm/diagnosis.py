@@ -17,6 +17,9 @@ SAFETY_CAUSES: tuple[tuple[int, ArmCause, str], ...] = (
 )
 """Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first."""
 
+STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
+"""The causes that the state alone shows, and shows the end of."""
+
 
 def from_state(snapshot: Snapshot) -> ArmFault | None:
     """What the state alone tells; None where it shows nothing that keeps the arm from moving, but perhaps no program."""

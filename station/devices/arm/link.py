@@ -12,7 +12,7 @@ from collections import deque
 
 from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
-from station.devices.arm.diagnosis import PLAYING, from_state, from_words, why_not_done
+from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, from_state, from_words, why_not_done
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.settings.arm import ArmSettings
@@ -22,6 +22,7 @@ BEAT_DEADLINE_S = 1.0
 FIRST_PAUSE_S = 0.2
 LONGEST_PAUSE_S = 3.0
 UPLOAD_TRIES = 3
+SETTLE_S = 0.5
 FIRST_LEASE_S = 2.0
 SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
 
@@ -34,7 +35,8 @@ class ArmLink:
     def __init__(self, settings: ArmSettings) -> None:
         self._settings = settings
         self._process: ArmProcess | None = None
-        self._fault: ArmFault | None = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet")
+        self._lost: ArmFault | None = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet")
+        self._latched: ArmFault | None = None
         self._starts_s: deque[float] = deque()
         self._failures = 0
         self._healthy_until_s = 0.0
@@ -47,8 +49,8 @@ class ArmLink:
 
     @property
     def fault(self) -> ArmFault | None:
-        """Why nothing can be moved; None where the link is up and the program plays."""
-        return self._fault
+        """Why nothing can be moved: a lost link, else what waits for a person; None where the program plays."""
+        return self._lost or self._latched
 
     @property
     def pid(self) -> int | None:
@@ -88,11 +90,11 @@ class ArmLink:
         """
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(deadline_s):
-                while self._fault is not None and self._fault.cause in SELF_HEALING:
+                while self._lost is not None:
                     self._changed.clear()
                     await self._changed.wait()
-        if self._fault is not None:
-            raise self._fault
+        if self.fault is not None:
+            raise self.fault
 
     async def snapshot(self) -> Snapshot:
         """The controller's state, asked for now.
@@ -102,8 +104,13 @@ class ArmLink:
         """
         process = self._process
         if process is None:
-            raise self._fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
-        return await process.ask(self._beat_message(), Snapshot, deadline_s=self._settings.stale_after_s)
+            raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+        try:
+            return await process.ask(self._beat_message(), Snapshot, deadline_s=self._settings.stale_after_s)
+        except ArmFault as fault:
+            if process.ended and self.fault is None:
+                self._set(fault)
+            raise
 
     async def order(self, request: Move | Reachable | Halt) -> Outcome:
         """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
@@ -114,7 +121,7 @@ class ArmLink:
         async with self._lock:
             process = self._process
             if process is None:
-                raise self._fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+                raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
             try:
                 return await process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s)
             except ArmFault as fault:
@@ -134,23 +141,22 @@ class ArmLink:
                 try:
                     await self._play()
                 except ArmFault as fault:
-                    await self._drop()
                     self._set(fault)
-                    if attempt == UPLOAD_TRIES - 1 or fault.cause not in SELF_HEALING | {ArmCause.PROGRAM_STOPPED}:
+                    anew = fault.cause in SELF_HEALING or fault.cause is ArmCause.PROGRAM_STOPPED
+                    if anew:
+                        await self._drop()
+                    if not anew or attempt == UPLOAD_TRIES - 1:
                         raise
                 else:
                     return
 
     async def _play(self) -> None:
         process = self._process or await self._connect()
-        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        fault = from_state(snapshot)
-        if fault is not None:
-            raise fault
+        snapshot = await self._free_to_move(process)
         if not snapshot.commanding:
             await self._command(process)
-            if self._fault is not None:
-                raise self._fault
+            if self.fault is not None:
+                raise self.fault
         elif snapshot.runtime_state != PLAYING:
             done = await process.ask(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:
@@ -158,6 +164,18 @@ class ArmLink:
             self._up()
         else:
             self._set(None)
+
+    async def _free_to_move(self, process: ArmProcess) -> Snapshot:
+        # The RTDE state may lag a little behind what the dashboard server has just said.
+        deadline_s = time.monotonic() + SETTLE_S
+        while True:
+            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            fault = from_state(snapshot)
+            if fault is None:
+                return snapshot
+            if time.monotonic() > deadline_s:
+                raise fault
+            await asyncio.sleep(BEAT_S)
 
     async def _keep(self) -> None:
         while True:
@@ -174,14 +192,14 @@ class ArmLink:
     async def _step(self) -> None:
         if self._process is not None:
             await self._watch(self._process)
-        elif self._fault is None or self._fault.cause is not ArmCause.RESTARTS:
+        elif self._latched is None or self._latched.cause is not ArmCause.RESTARTS:
             process = await self._connect()
             snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-            fault = from_state(snapshot)
-            if fault is not None:
-                self._set(fault)
-            elif self._fault is None or self._fault.cause in SELF_HEALING:
+            fault = from_state(snapshot) or self._latched
+            if fault is None:
                 await self._command(process)
+            else:
+                self._set(fault)
 
     async def _watch(self, process: ArmProcess) -> None:
         if not self.healthy:
@@ -191,10 +209,11 @@ class ArmLink:
             raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
         self._failures = 0
         seen = from_state(snapshot)
+        latched = self._latched.cause if self._latched is not None else None
         if seen is not None:
-            if self._fault is None or self._fault.cause is not seen.cause:
+            if seen.cause is not latched:
                 self._set(seen)
-        elif self._fault is None and snapshot.runtime_state != PLAYING:
+        elif snapshot.runtime_state != PLAYING and (latched is None or latched in STATE_CAUSES):
             self._set(await self._explain(""))
 
     async def _connect(self) -> ArmProcess:
@@ -265,8 +284,7 @@ class ArmLink:
     async def _lose(self, fault: ArmFault) -> None:
         self._failures += 1
         await self._drop()
-        if self._fault is None or self._fault.cause in SELF_HEALING:
-            self._set(fault)
+        self._set(fault)
 
     async def _drop(self) -> None:
         process, self._process = self._process, None
@@ -274,7 +292,11 @@ class ArmLink:
             await process.end()
 
     def _set(self, fault: ArmFault | None) -> None:
-        if str(fault) != str(self._fault):
-            log.info("arm link: %s", fault or "ready")
-        self._fault = fault
+        before = str(self.fault)
+        if fault is not None and fault.cause in SELF_HEALING:
+            self._lost = fault
+        else:
+            self._lost, self._latched = None, fault
+        if str(self.fault) != before:
+            log.info("arm link: %s", self.fault or "ready")
         self._changed.set()

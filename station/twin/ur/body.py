@@ -1,6 +1,6 @@
 """The arm itself: joints that move in real time along a path."""
 
-from station.twin.ur.kinematics import Joints, forward, inverse, nearest, within_range
+from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints, forward, inverse, nearest
 from station.twin.ur.paths import JointPath, Path, ToolPath, UnreachableError
 from station.twin.ur.poses import Pose, inverse_transform, pose_from_transform, transform_from_pose
 from station.twin.ur.profile import Braking, Profile, Trapezoid
@@ -14,8 +14,9 @@ REST_S = 0.05
 class Body:
     """The joints, what they do at the moment, and the tool at their end."""
 
-    def __init__(self, joints_rad: Joints, now_s: float) -> None:
+    def __init__(self, joints_rad: Joints, now_s: float, joint_range_rad: float = JOINT_RANGE_RAD) -> None:
         self.joints_rad = joints_rad
+        self._joint_range_rad = joint_range_rad
         self.speeds_rad_s: Joints = RESTING
         self.tcp_offset: Pose = NO_OFFSET
         self._path: Path | None = None
@@ -62,8 +63,8 @@ class Body:
         Raises:
             UnreachableError: the target is out of the joints' range.
         """
-        if not within_range(target):
-            raise UnreachableError("a joint would leave its range of plus and minus one turn")
+        if not self.within_range(target):
+            raise UnreachableError("a joint would leave its range")
         path = JointPath.between(self.joints_rad, target)
         speed = min(speed_rad_s, path.speed_limit_rad_s())
         self._begin(path, Trapezoid(path.length, speed, acceleration_rad_s2))
@@ -77,7 +78,7 @@ class Body:
         end = transform_from_pose(target) @ inverse_transform(transform_from_pose(self.tcp_offset))
         path = ToolPath(self.joints_rad, forward(self.joints_rad), end)
         profile = Trapezoid(path.length, speed_m_s, acceleration_m_s2)
-        if not within_range(path.end_joints) or path.steepest() * profile.peak_speed > 1.0:
+        if not self.within_range(path.end_joints) or path.steepest() * profile.peak_speed > 1.0:
             raise UnreachableError("a joint would leave its range or exceed its speed on the straight way")
         self._begin(path, profile)
 
@@ -119,6 +120,10 @@ class Body:
         """The joint positions nearest to given or present ones that bring the tool to a pose; None where none do."""
         flange = transform_from_pose(pose) @ inverse_transform(transform_from_pose(self.tcp_offset))
         return nearest(inverse(flange[None])[0], near_rad or self.joints_rad)
+
+    def within_range(self, joints_rad: Joints) -> bool:
+        """Whether each joint is a number and within its range either way."""
+        return all(abs(q) <= self._joint_range_rad for q in joints_rad)
 
     def _begin(self, path: Path, profile: Profile) -> None:
         self._path, self._profile = path, profile

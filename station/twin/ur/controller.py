@@ -10,7 +10,7 @@ from station.twin.ur import primary
 from station.twin.ur.body import Body
 from station.twin.ur.dashboard import BANNER, LONGEST_LINE, Dashboard
 from station.twin.ur.dashboard import PORT as DASHBOARD_PORT
-from station.twin.ur.kinematics import Joints
+from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints
 from station.twin.ur.outputs import output_table
 from station.twin.ur.registers import Registers
 from station.twin.ur.rtde import FREQUENCY_HZ, RtdeConnection
@@ -32,6 +32,7 @@ OWN_FAULTS = (
     "pendant_stop",
     "registers_in_use",
     "silent",
+    "rtde_silent",
     "link_cut",
     "safety_fault",
 )
@@ -59,6 +60,7 @@ class UrController:
         pendant_stop: switching it on stops the program.
         registers_in_use: a fieldbus holds input registers 0 to 23 against new clients.
         silent: connections are taken, and nothing is ever said.
+        rtde_silent: the same on the RTDE port alone.
         link_cut: connections are cut and refused; the controller itself goes on.
         safety_fault: switching it on is the event; it stays until the safety system is restarted.
     """
@@ -71,6 +73,7 @@ class UrController:
         *,
         polyscope: Literal["5.22", "5.25"] = "5.22",
         joints_rad: Joints = START_POSE_RAD,
+        joint_range_rad: float = JOINT_RANGE_RAD,
         running: bool = True,
     ) -> None:
         """Prepare a controller.
@@ -81,6 +84,7 @@ class UrController:
             faults: from `arm_faults`.
             polyscope: the version that is told.
             joints_rad: where the arm stands.
+            joint_range_rad: how far the safety configuration lets each joint turn either way.
             running: powered and released from the start.
         """
         self.host, self.clock, self.faults = host, clock, faults
@@ -100,11 +104,12 @@ class UrController:
         self._cut_at_s = 0.0
         self._script_drops: set[asyncio.StreamWriter] = set()
         self._switching: asyncio.Task[None] | None = None
+        self._joint_range_rad = joint_range_rad
         self._boot(joints_rad, running=running)
 
     def _boot(self, joints_rad: Joints, *, running: bool) -> None:
         self._booted_at_s = self.clock.now_s()
-        self.body = Body(joints_rad, self._booted_at_s)
+        self.body = Body(joints_rad, self._booted_at_s, self._joint_range_rad)
         self.registers = Registers()
         self.safety = Safety(running=running)
         self.script = ControlScript(self.body, self.registers, self.safety)

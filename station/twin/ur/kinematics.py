@@ -135,12 +135,6 @@ def nearest(solutions: npt.NDArray[np.float64], near_rad: npt.ArrayLike) -> Join
     return q1, q2, q3, q4, q5, q6
 
 
-def within_range(joints_rad: npt.ArrayLike) -> bool:
-    """Whether each joint, shape (6,), is within plus and minus one turn."""
-    q = np.asarray(joints_rad, dtype=np.float64)
-    return bool(np.isfinite(q).all() and (np.abs(q) <= JOINT_RANGE_RAD).all())
-
-
 def _cosine(value: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     # Rounding may carry a stretched arm's cosine past 1; what is past it by more has no solution.
     return np.where(np.abs(value) <= 1 + 1e-9, np.clip(value, -1.0, 1.0), np.nan)

@@ -105,6 +105,11 @@ class RtdeConnection(asyncio.Protocol):
         """The client reads again."""
         self._blocked_since_s = None
 
+    @property
+    def _silent(self) -> bool:
+        faults = self._controller.faults
+        return faults.active("silent") or faults.active("rtde_silent")
+
     def cut(self) -> None:
         """Drop the client without a word."""
         if self._transport is not None:
@@ -112,7 +117,7 @@ class RtdeConnection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take in bytes and answer every whole package."""
-        if self._controller.faults.active("silent"):
+        if self._silent:
             return
         self._buffer += data
         while len(self._buffer) >= HEADER.size:
@@ -142,7 +147,7 @@ class RtdeConnection(asyncio.Protocol):
         if self._output is None or not self._started or tick % self._output.divider:
             return
         faults = self._controller.faults
-        if faults.active("silent"):
+        if self._silent:
             return
         if faults.active(CommonFault.GARBAGE):
             self._write(self._noise.randbytes(64))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from station.twin.ur.body import Body
-from station.twin.ur.kinematics import Joints, within_range
+from station.twin.ur.kinematics import Joints
 from station.twin.ur.paths import UnreachableError
 from station.twin.ur.poses import Pose, pose_from_transform, transform_from_pose
 from station.twin.ur.registers import Registers
@@ -67,7 +67,7 @@ class ControlScript:
             34: self._stop_motion,
             35: self._set_watchdog,
             36: lambda: self._say(self._body.solve(self._pose()) is not None),
-            37: lambda: self._say(within_range(self._joints())),
+            37: lambda: self._say(self._body.within_range(self._joints())),
             38: lambda: self._answer(*(0.0,) * 6),
             39: lambda: self._answer(
                 *pose_from_transform(transform_from_pose(self._pose()) @ transform_from_pose(self._pose(6)))
