@@ -1,0 +1,106 @@
+"""The asking side of a channel."""
+
+import asyncio
+import itertools
+import time
+from typing import Self, TypeVar
+
+import zmq
+import zmq.asyncio
+from pydantic import ValidationError
+
+from station.channel.messages import (
+    ENVELOPE,
+    LARGEST_MESSAGE_BYTES,
+    ChannelError,
+    DeadlineError,
+    Message,
+    RefusedError,
+    check_endpoint,
+)
+
+ReplyT = TypeVar("ReplyT", bound=Message)
+RECONNECT_MS = 10
+
+
+class ChannelClient:
+    """Asks one server; many requests may be under way at once. Belongs to the event loop that it was made in."""
+
+    def __init__(self, endpoint: str, peer: str) -> None:
+        """Begin to connect; a server that is not there yet is waited for by each request within its deadline.
+
+        Args:
+            endpoint: `ipc://PATH` or `tcp://127.…:PORT`.
+            peer: what messages call the other side, such as `the arm's process`.
+
+        Raises:
+            BadInputError: the endpoint is not a local one.
+        """
+        self._peer = peer
+        self._context = zmq.asyncio.Context()
+        self._socket = self._context.socket(zmq.DEALER)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT_MS)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_MESSAGE_BYTES)
+        self._socket.connect(check_endpoint(endpoint))
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, asyncio.Future[tuple[bytes, bytes]]] = {}
+        self._receiving = asyncio.create_task(self._receive(), name=f"channel to {peer}")
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+        """Send a request and wait for its reply.
+
+        Args:
+            request: what to ask; a server that finds it older than the deadline does not begin it.
+            reply: the type that the answer must have.
+            deadline_s: how long to wait in all.
+
+        Raises:
+            DeadlineError: no answer came in time.
+            RefusedError: the peer refused or failed; its words are the message.
+            ChannelError: the answer is not of the reply's type.
+        """
+        number = next(self._numbers)
+        answer: asyncio.Future[tuple[bytes, bytes]] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = answer
+        envelope = ENVELOPE.pack(number, time.monotonic() + deadline_s)
+        name = type(request).__name__
+        try:
+            async with asyncio.timeout(deadline_s):
+                await self._socket.send_multipart([envelope, name.encode(), request.model_dump_json().encode()])
+                status, body = await answer
+        except TimeoutError:
+            raise DeadlineError(f"{self._peer} gave no answer to {name} within {deadline_s:g} s") from None
+        finally:
+            self._waiting.pop(number, None)
+        if status != b"ok":
+            raise RefusedError(body.decode("utf-8", "replace"))
+        try:
+            return reply.model_validate_json(body)
+        except ValidationError as error:
+            raise ChannelError(f"{self._peer} answered {name} with something else than {reply.__name__}: {error}") from error
+
+    async def close(self) -> None:
+        """Give up every request that is under way and let the socket go; closing twice does nothing."""
+        self._receiving.cancel()
+        await asyncio.gather(self._receiving, return_exceptions=True)
+        self._socket.close(linger=0)
+        self._context.term()
+        for answer in self._waiting.values():
+            answer.cancel()
+
+    async def _receive(self) -> None:
+        while True:
+            frames = await self._socket.recv_multipart()
+            if len(frames) != 3 or len(frames[0]) != ENVELOPE.size:
+                continue
+            number, _ = ENVELOPE.unpack(frames[0])
+            answer = self._waiting.get(number)
+            if answer is not None and not answer.done():
+                answer.set_result((frames[1], frames[2]))

@@ -1,0 +1,41 @@
+"""What goes over a channel, and what can go wrong with it."""
+
+import struct
+
+from pydantic import BaseModel, ConfigDict
+
+from station.errors import BadInputError, StationError
+
+ENVELOPE = struct.Struct(">Qd")
+"""The request's number, and the end of its life on the machine's monotonic clock, which all its processes share."""
+
+LARGEST_MESSAGE_BYTES = 16 * 1024 * 1024
+
+
+class Message(BaseModel):
+    """A request or a reply: strict, frozen, nothing unknown. Its class name is its name on the wire."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class ChannelError(StationError):
+    """A request that was not answered as it had to be."""
+
+
+class DeadlineError(ChannelError):
+    """No answer came in time; whether the request was carried out is unknown."""
+
+
+class RefusedError(ChannelError):
+    """The peer answered that it did not carry the request out."""
+
+
+def check_endpoint(endpoint: str) -> str:
+    """Let only addresses pass that cannot be reached from another machine.
+
+    Raises:
+        BadInputError: the endpoint is neither `ipc://PATH` nor `tcp://127.…:PORT`.
+    """
+    if endpoint.startswith(("ipc://", "tcp://127.")):
+        return endpoint
+    raise BadInputError(f"channel endpoint {endpoint!r}: expected ipc://PATH or tcp://127.0.0.1:PORT")

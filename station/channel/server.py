@@ -1,0 +1,92 @@
+"""The answering side of a channel."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
+
+import zmq
+import zmq.asyncio
+from pydantic import ValidationError
+
+from station.channel.messages import ENVELOPE, LARGEST_MESSAGE_BYTES, Message, check_endpoint
+from station.errors import StationError
+
+Handler = Callable[[Any], Awaitable[Message]]
+"""Takes the request that it is registered for and gives the reply."""
+
+log = logging.getLogger(__name__)
+
+
+class ChannelServer:
+    """Answers any number of clients, each request in a task of its own."""
+
+    def __init__(self, endpoint: str, handlers: Mapping[type[Message], Handler]) -> None:
+        """Bind the endpoint.
+
+        Args:
+            endpoint: `ipc://PATH` or `tcp://127.…:PORT`.
+            handlers: what answers each type of request. A handler's `StationError` is the refusal that the client
+                reads; any other exception is logged and told as a failure.
+
+        Raises:
+            BadInputError: the endpoint is not a local one.
+            zmq.ZMQError: the endpoint cannot be bound.
+        """
+        self._handlers = {kind.__name__: (kind, handler) for kind, handler in handlers.items()}
+        self._context = zmq.asyncio.Context()
+        self._socket = self._context.socket(zmq.ROUTER)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_MESSAGE_BYTES)
+        self._tasks: set[asyncio.Task[None]] = set()
+        try:
+            self._socket.bind(check_endpoint(endpoint))
+        except BaseException:
+            self._close()
+            raise
+
+    async def serve(self) -> None:
+        """Answer until cancelled; requests that are under way are then cancelled too."""
+        try:
+            while True:
+                frames = await self._socket.recv_multipart()
+                if len(frames) != 4 or len(frames[1]) != ENVELOPE.size:
+                    log.warning("a channel message of %d frames was dropped", len(frames))
+                    continue
+                task = asyncio.create_task(self._answer(*frames))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+        finally:
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+            self._close()
+
+    def _close(self) -> None:
+        self._socket.close(linger=0)
+        self._context.term()
+
+    async def _answer(self, client: bytes, envelope: bytes, name: bytes, body: bytes) -> None:
+        _, expires_s = ENVELOPE.unpack(envelope)
+        status, answer = await self._carry_out(name.decode("utf-8", "replace"), body, expires_s)
+        await self._socket.send_multipart([client, envelope, status, answer])
+
+    async def _carry_out(self, name: str, body: bytes, expires_s: float) -> tuple[bytes, bytes]:
+        if time.monotonic() > expires_s:
+            return b"refused", f"{name} came after its deadline and was not begun".encode()
+        if name not in self._handlers:
+            return b"refused", f"{name} is no request that this process knows".encode()
+        kind, handler = self._handlers[name]
+        try:
+            request = kind.model_validate_json(body)
+        except ValidationError as error:
+            return b"refused", f"{name} is malformed: {error}".encode()
+        try:
+            reply = await handler(request)
+        except StationError as error:
+            return b"refused", str(error).encode()
+        except Exception as error:  # a handler's bug must not end the server
+            log.exception("the handler of %s failed", name)
+            return b"failed", f"{type(error).__name__}: {error}".encode()
+        return b"ok", reply.model_dump_json().encode()

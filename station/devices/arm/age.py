@@ -1,0 +1,33 @@
+"""How old a state is that carries the time of another machine's clock."""
+
+from collections import deque
+
+WINDOW_S = 30.0
+"""Long against any network's pauses, short against the drift of two clocks: 50 ppm make 1.5 ms of it."""
+
+
+class TimestampAge:
+    """The age of a stream's latest timestamp.
+
+    The two clocks share neither their zero nor quite their rate. The least difference seen lately between them stands
+    for a state that came at once; what a state's difference exceeds it by is its age. A stream that froze ages with our
+    own clock, and one that comes late shows how late.
+    """
+
+    def __init__(self) -> None:
+        self._lows: deque[tuple[float, float]] = deque()
+
+    def age_s(self, timestamp_s: float, now_s: float) -> float:
+        """The age of a state.
+
+        Args:
+            timestamp_s: the latest timestamp, on the sender's clock.
+            now_s: the time on our own clock, which does not go back.
+        """
+        difference = now_s - timestamp_s
+        while self._lows and self._lows[-1][1] >= difference:
+            self._lows.pop()
+        self._lows.append((now_s, difference))
+        while now_s - self._lows[0][0] > WINDOW_S:
+            self._lows.popleft()
+        return difference - self._lows[0][1]

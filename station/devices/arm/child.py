@@ -1,0 +1,113 @@
+"""The driver's handle on the process that ur-rtde lives in."""
+
+import asyncio
+import contextlib
+import os
+import sys
+import tempfile
+from collections import deque
+from typing import Self, TypeVar
+
+from station.channel.client import ChannelClient
+from station.channel.messages import ChannelError, Message
+from station.devices.arm.faults import ArmCause, ArmFault
+
+ReplyT = TypeVar("ReplyT", bound=Message)
+LAST_WORDS = 5
+LONGEST_LINE = 65536
+
+
+class ArmProcess:
+    """One start of the process; whatever goes wrong with it ends it, and a new one is made."""
+
+    def __init__(self, process: asyncio.subprocess.Process, channel: ChannelClient, folder: str) -> None:
+        self._process, self._channel, self._folder = process, channel, folder
+        self._words: deque[str] = deque(maxlen=LAST_WORDS)
+        self._listening = asyncio.create_task(self._listen(), name="words of the arm's process")
+
+    @classmethod
+    async def spawn(cls, host: str, frequency_hz: float) -> Self:
+        """Start the process; it is not connected to anything yet.
+
+        Args:
+            host: the controller's address.
+            frequency_hz: how often the controller shall send its state.
+
+        Raises:
+            OSError: no process can be started.
+        """
+        folder = tempfile.mkdtemp(prefix="fruit-station-arm-")
+        endpoint = f"ipc://{folder}/channel"
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "station.devices.arm.process",
+            endpoint,
+            host,
+            str(frequency_hz),
+            str(os.getpid()),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+            limit=LONGEST_LINE,
+        )
+        return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
+
+    @property
+    def pid(self) -> int:
+        """The process's id."""
+        return self._process.pid
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process is gone."""
+        return self._process.returncode is not None
+
+    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+        """Ask the process; it also ends the wait when the process dies.
+
+        Raises:
+            ArmFault: no answer in time, the process has ended, or it refused.
+        """
+        asking = asyncio.create_task(self._channel.ask(request, reply, deadline_s=deadline_s))
+        dying = asyncio.create_task(self._process.wait())
+        try:
+            await asyncio.wait({asking, dying}, return_when=asyncio.FIRST_COMPLETED)
+            if asking.done():
+                return asking.result()
+        except ChannelError as error:
+            raise ArmFault(ArmCause.DEADLINE, str(error)) from error
+        finally:
+            for task in (asking, dying):
+                task.cancel()
+            await asyncio.gather(asking, dying, return_exceptions=True)
+        raise ArmFault(ArmCause.LINK_LOST, f"the arm's process ended with {self._process.returncode}{self.last_words}")
+
+    @property
+    def last_words(self) -> str:
+        """What ur-rtde said last, to be put at a message's end."""
+        return f" ({' / '.join(self._words)})" if self._words else ""
+
+    async def end(self) -> None:
+        """Kill the process and clear up after it; ending it twice does nothing."""
+        with contextlib.suppress(ProcessLookupError):
+            if not self.ended:
+                self._process.kill()
+        await self._process.wait()
+        await self._listening
+        await self._channel.close()
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(f"{self._folder}/channel")
+        with contextlib.suppress(FileNotFoundError):
+            os.rmdir(self._folder)
+
+    async def _listen(self) -> None:
+        stderr = self._process.stderr
+        while stderr is not None:
+            try:
+                line = await stderr.readline()
+            except ValueError:
+                continue
+            if not line:
+                return
+            self._words.append(line.decode("utf-8", "replace").strip())

@@ -1,0 +1,102 @@
+"""A client of the controller's dashboard server: one short connection for each conversation.
+
+Source of commands and answers: Universal Robots, "Dashboard Server e-Series".
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+from station.devices.arm.faults import ArmCause, ArmFault
+
+PORT = 29999
+LINE_DEADLINE_S = 2.5
+LONGEST_LINE = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class DashboardFacts:
+    """What the controller says of itself."""
+
+    version: str
+    serial_number: str
+    model: str
+    robot_mode: str
+    safety_status: str
+    remote: bool
+
+
+class DashboardConversation:
+    """Lines to and fro on one connection."""
+
+    def __init__(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._host, self._reader, self._writer = host, reader, writer
+
+    async def hear(self) -> str:
+        """The next line.
+
+        Raises:
+            ArmFault: none came in time, or it is no text.
+        """
+        try:
+            async with asyncio.timeout(LINE_DEADLINE_S):
+                line = await self._reader.readline()
+        except (TimeoutError, OSError, ValueError) as error:
+            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} says nothing") from error
+        if not line.endswith(b"\n") or not line.isascii():
+            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} does not speak its protocol")
+        return line.decode("ascii").strip()
+
+    async def say(self, command: str) -> str:
+        """Send a line and give the answer.
+
+        Raises:
+            ArmFault: none came in time.
+        """
+        try:
+            self._writer.write(command.encode("ascii") + b"\n")
+            await self._writer.drain()
+        except OSError as error:
+            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} hung up") from error
+        return await self.hear()
+
+    async def facts(self) -> DashboardFacts:
+        """Everything that the driver and the device check want to know.
+
+        Raises:
+            ArmFault: an answer did not come in time.
+        """
+        return DashboardFacts(
+            version=(await self.say("PolyscopeVersion")).removeprefix("URSoftware "),
+            serial_number=await self.say("get serial number"),
+            model=await self.say("get robot model"),
+            robot_mode=(await self.say("robotmode")).removeprefix("Robotmode: "),
+            safety_status=(await self.say("safetystatus")).removeprefix("Safetystatus: "),
+            remote="true" in await self.say("is in remote control"),
+        )
+
+
+@contextlib.asynccontextmanager
+async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
+    """Connect and hear the greeting.
+
+    Args:
+        host: the controller's address.
+
+    Raises:
+        ArmFault: nobody answers, or not in the protocol.
+    """
+    try:
+        async with asyncio.timeout(LINE_DEADLINE_S):
+            reader, writer = await asyncio.open_connection(host, PORT, limit=LONGEST_LINE)
+    except (TimeoutError, OSError) as error:
+        raise ArmFault(ArmCause.LINK_LOST, f"no controller answers at {host}:{PORT}") from error
+    try:
+        conversation = DashboardConversation(host, reader, writer)
+        greeting = await conversation.hear()
+        if "Dashboard Server" not in greeting:
+            raise ArmFault(ArmCause.LINK_LOST, f"what answers at {host}:{PORT} is no dashboard server: {greeting!r}")
+        yield conversation
+    finally:
+        writer.transport.abort()

@@ -1,0 +1,64 @@
+"""From what was seen of a controller to the cause why its arm cannot move."""
+
+from station.devices.arm.dashboard import DashboardFacts
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.messages import Snapshot
+
+RUNNING = 7
+"""RTDE `robot_mode`: powered, brakes released."""
+PLAYING = 2
+"""RTDE `runtime_state`."""
+
+SAFETY_CAUSES: tuple[tuple[int, ArmCause, str], ...] = (
+    (1 << 5 | 1 << 6 | 1 << 7, ArmCause.EMERGENCY_STOP, "an emergency stop is active"),
+    (1 << 8 | 1 << 9, ArmCause.SAFETY_FAULT, "the safety system reports a violation or a fault"),
+    (1 << 2, ArmCause.PROTECTIVE_STOP, "the arm is in a protective stop"),
+    (1 << 4, ArmCause.SAFEGUARD_STOP, "a safeguard stop is active"),
+)
+"""Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first."""
+
+STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
+"""The causes that the state alone shows, and shows the end of."""
+
+
+def from_state(snapshot: Snapshot) -> ArmFault | None:
+    """What the state alone tells; None where it shows nothing that keeps the arm from moving, but perhaps no program."""
+    for bits, cause, words in SAFETY_CAUSES:
+        if snapshot.safety_bits & bits:
+            return ArmFault(cause, words)
+    if snapshot.robot_mode != RUNNING:
+        return ArmFault(ArmCause.NOT_POWERED, "the arm is not powered, or its brakes are on")
+    return None
+
+
+def why_not_done(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healthy: bool) -> ArmFault:
+    """The cause why a command was not done or no program plays.
+
+    Args:
+        snapshot: the controller's state.
+        facts: what its dashboard server said.
+        words: what ur-rtde said, if anything.
+        was_healthy: whether the station had said without a gap that it is healthy.
+    """
+    fault = from_state(snapshot)
+    if fault is not None:
+        return fault
+    if not facts.remote:
+        return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
+    if snapshot.runtime_state == PLAYING:
+        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {words}".rstrip())
+    if not was_healthy:
+        return ArmFault(ArmCause.WATCHDOG, "the controller's watchdog stopped the program: the station was not healthy")
+    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {words}".rstrip())
+
+
+def from_words(words: str) -> ArmFault | None:
+    """What ur-rtde's own exceptions tell; None where they leave it open."""
+    lowered = words.lower()
+    if "remote control" in lowered:
+        return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
+    if "already in use" in lowered:
+        return ArmFault(ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers")
+    if "could not connect" in lowered or "timeout connecting" in lowered:
+        return ArmFault(ArmCause.LINK_LOST, f"ur-rtde could not connect: {words}")
+    return None

@@ -1,0 +1,302 @@
+"""The link to the controller: it brings up the process that ur-rtde lives in, watches it, and puts another in its place.
+
+The link comes back by itself after a drop. What a person has to look at stays as a fault until that person's verb:
+a stop of any kind, a program that no longer plays, a budget of restarts that is used up.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections import deque
+
+from station.devices.arm.child import ArmProcess
+from station.devices.arm.dashboard import dashboard
+from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, from_state, from_words, why_not_done
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.settings.arm import ArmSettings
+
+BEAT_S = 0.1
+BEAT_DEADLINE_S = 1.0
+FIRST_PAUSE_S = 0.2
+LONGEST_PAUSE_S = 3.0
+UPLOAD_TRIES = 3
+SETTLE_S = 0.5
+FIRST_LEASE_S = 2.0
+SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
+
+log = logging.getLogger(__name__)
+
+
+class ArmLink:
+    """One controller's link, kept up by a task of its own. Everything that touches the process goes one at a time."""
+
+    def __init__(self, settings: ArmSettings) -> None:
+        self._settings = settings
+        self._process: ArmProcess | None = None
+        self._lost: ArmFault | None = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet")
+        self._latched: ArmFault | None = None
+        self._starts_s: deque[float] = deque()
+        self._failures = 0
+        self._healthy_until_s = 0.0
+        self._was_healthy = True
+        self._lock = asyncio.Lock()
+        self._keeping: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        self.attachment = 0
+        """Counts the programs that were brought to play: what was learnt from an earlier one may not hold any more."""
+
+    @property
+    def fault(self) -> ArmFault | None:
+        """Why nothing can be moved: a lost link, else what waits for a person; None where the program plays."""
+        return self._lost or self._latched
+
+    @property
+    def pid(self) -> int | None:
+        """The id of the process at the moment."""
+        return self._process.pid if self._process is not None else None
+
+    @property
+    def healthy(self) -> bool:
+        """Whether the lease of the station's health still runs."""
+        return time.monotonic() < self._healthy_until_s
+
+    def renew_health(self, lease_s: float) -> None:
+        """The station is healthy for so many seconds from now."""
+        self._healthy_until_s = time.monotonic() + lease_s
+
+    async def open(self) -> None:
+        """Begin to keep the link up."""
+        self.renew_health(FIRST_LEASE_S)
+        if self._keeping is None:
+            self._keeping = asyncio.create_task(self._keep(), name="the arm's link")
+
+    async def close(self) -> None:
+        """End the process; closing twice does nothing."""
+        if self._keeping is not None:
+            self._keeping.cancel()
+            await asyncio.gather(self._keeping, return_exceptions=True)
+            self._keeping = None
+        async with self._lock:
+            await self._drop()
+        self._set(ArmFault(ArmCause.CLOSED, "the arm was closed"))
+
+    async def settled(self, deadline_s: float) -> None:
+        """Wait until the arm is ready or waits for a person.
+
+        Raises:
+            ArmFault: why it is not ready.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(deadline_s):
+                while self._lost is not None:
+                    self._changed.clear()
+                    await self._changed.wait()
+        if self.fault is not None:
+            raise self.fault
+
+    async def snapshot(self) -> Snapshot:
+        """The controller's state, asked for now.
+
+        Raises:
+            ArmFault: there is none.
+        """
+        process = self._process
+        if process is None:
+            raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+        try:
+            return await process.ask(self._beat_message(), Snapshot, deadline_s=self._settings.stale_after_s)
+        except ArmFault as fault:
+            if process.ended and self.fault is None:
+                self._set(fault)
+            raise
+
+    async def order(self, request: Move | Reachable | Halt) -> Outcome:
+        """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
+
+        Raises:
+            ArmFault: there is no process, or it gave no answer.
+        """
+        async with self._lock:
+            process = self._process
+            if process is None:
+                raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+            try:
+                return await process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s)
+            except ArmFault as fault:
+                await self._lose(fault)
+                raise
+
+    async def upload(self) -> None:
+        """Bring the program to play, over the standing link or a new one; a playing one is left alone.
+
+        Raises:
+            ArmFault: it does not play.
+        """
+        async with self._lock:
+            self._starts_s.clear()
+            self._was_healthy = self.healthy
+            for attempt in range(UPLOAD_TRIES):
+                try:
+                    await self._play()
+                except ArmFault as fault:
+                    self._set(fault)
+                    anew = fault.cause in SELF_HEALING or fault.cause is ArmCause.PROGRAM_STOPPED
+                    if anew:
+                        await self._drop()
+                    if not anew or attempt == UPLOAD_TRIES - 1:
+                        raise
+                else:
+                    return
+
+    async def _play(self) -> None:
+        process = self._process or await self._connect()
+        snapshot = await self._free_to_move(process)
+        if not snapshot.commanding:
+            await self._command(process)
+            if self.fault is not None:
+                raise self.fault
+        elif snapshot.runtime_state != PLAYING:
+            done = await process.ask(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
+            if not done.done:
+                raise await self._explain(done.words)
+            self._up()
+        else:
+            self._set(None)
+
+    async def _free_to_move(self, process: ArmProcess) -> Snapshot:
+        # The RTDE state may lag a little behind what the dashboard server has just said.
+        deadline_s = time.monotonic() + SETTLE_S
+        while True:
+            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            fault = from_state(snapshot)
+            if fault is None:
+                return snapshot
+            if time.monotonic() > deadline_s:
+                raise fault
+            await asyncio.sleep(BEAT_S)
+
+    async def _keep(self) -> None:
+        while True:
+            async with self._lock:
+                try:
+                    await self._step()
+                except ArmFault as fault:
+                    await self._lose(fault)
+                except OSError as error:
+                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}"))
+            pause_s = min(FIRST_PAUSE_S * 2**self._failures, LONGEST_PAUSE_S) if self._failures else BEAT_S
+            await asyncio.sleep(pause_s)
+
+    async def _step(self) -> None:
+        if self._process is not None:
+            await self._watch(self._process)
+        elif self._latched is None or self._latched.cause is not ArmCause.RESTARTS:
+            process = await self._connect()
+            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            fault = from_state(snapshot) or self._latched
+            if fault is None:
+                await self._command(process)
+            else:
+                self._set(fault)
+
+    async def _watch(self, process: ArmProcess) -> None:
+        if not self.healthy:
+            self._was_healthy = False
+        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        if snapshot.age_s > self._settings.link_lost_after_s:
+            raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
+        self._failures = 0
+        seen = from_state(snapshot)
+        latched = self._latched.cause if self._latched is not None else None
+        if seen is not None:
+            if seen.cause is not latched:
+                self._set(seen)
+        elif snapshot.runtime_state != PLAYING and (latched is None or latched in STATE_CAUSES):
+            self._set(await self._explain(""))
+
+    async def _connect(self) -> ArmProcess:
+        async with dashboard(self._settings.host):
+            pass  # whether anybody is there at all is asked before a start is spent on it
+        now_s = time.monotonic()
+        while self._starts_s and now_s - self._starts_s[0] > self._settings.restart_window_s:
+            self._starts_s.popleft()
+        if len(self._starts_s) >= self._settings.restart_budget:
+            raise ArmFault(
+                ArmCause.RESTARTS,
+                f"the driver's process ended {len(self._starts_s)} times in {self._settings.restart_window_s:g} s",
+            )
+        self._starts_s.append(now_s)
+        self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
+        outcome = await self._process.ask(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
+        if not outcome.done:
+            raise from_words(outcome.words) or ArmFault(ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}")
+        return self._process
+
+    async def _command(self, process: ArmProcess) -> None:
+        settings = self._settings
+        request = Command(
+            tool_centre_mm=settings.tool_centre_mm,
+            payload_kg=settings.payload_kg,
+            payload_centre_mm=settings.payload_centre_mm,
+            watchdog_hz=settings.watchdog_hz,
+        )
+        outcome = await process.ask(request, Outcome, deadline_s=settings.constructor_limit_s)
+        if outcome.done:
+            self._up()
+        else:
+            self._set(await self._explain(outcome.words))
+
+    async def _explain(self, words: str) -> ArmFault:
+        fault = from_words(words)
+        if fault is not None or self._process is None:
+            return fault or ArmFault(ArmCause.LINK_LOST, f"the arm is not connected: {words}")
+        async with dashboard(self._settings.host) as conversation:
+            facts = await conversation.facts()
+        snapshot = await self._process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy)
+
+    async def explain(self, words: str) -> ArmFault:
+        """The cause why a command was not done, which is then the link's fault.
+
+        Args:
+            words: what ur-rtde said.
+        """
+        async with self._lock:
+            try:
+                fault = await self._explain(words)
+            except ArmFault as lost:
+                fault = lost
+                await self._lose(lost)
+            self._set(fault)
+            return fault
+
+    def _beat_message(self) -> Beat:
+        return Beat(healthy_for_s=max(0.0, self._healthy_until_s - time.monotonic()))
+
+    def _up(self) -> None:
+        self._failures = 0
+        self._was_healthy = self.healthy
+        self.attachment += 1
+        self._set(None)
+
+    async def _lose(self, fault: ArmFault) -> None:
+        self._failures += 1
+        await self._drop()
+        self._set(fault)
+
+    async def _drop(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            await process.end()
+
+    def _set(self, fault: ArmFault | None) -> None:
+        before = str(self.fault)
+        if fault is not None and fault.cause in SELF_HEALING:
+            self._lost = fault
+        else:
+            self._lost, self._latched = None, fault
+        if str(self.fault) != before:
+            log.info("arm link: %s", self.fault or "ready")
+        self._changed.set()

@@ -1,0 +1,75 @@
+"""What the driver and its process say to each other."""
+
+from station.channel.messages import Message
+
+Six = tuple[float, float, float, float, float, float]
+
+
+class Watch(Message):
+    """Connect to receive the controller's state."""
+
+
+class Command(Message):
+    """Connect to command the arm, which uploads the control program."""
+
+    tool_centre_mm: tuple[float, float, float]
+    payload_kg: float
+    payload_centre_mm: tuple[float, float, float]
+    watchdog_hz: float
+
+
+class Upload(Message):
+    """Send the control program again over the standing connection and see that it plays."""
+
+
+class Beat(Message):
+    """Tell the state; the station is healthy for so long from now."""
+
+    healthy_for_s: float
+
+
+class Move(Message):
+    """Begin a motion to joint positions, straight for the tool or straight for the joints."""
+
+    joints_rad: Six
+    straight: bool
+    speed: float
+    """rad/s, or mm/s where straight."""
+    acceleration: float
+    """rad/s², or mm/s² where straight."""
+
+
+class Reachable(Message):
+    """Ask whether joint positions are within the safety limits and have a solution."""
+
+    joints_rad: Six
+
+
+class Halt(Message):
+    """Begin to brake."""
+
+    deceleration_rad_s2: float
+
+
+class Outcome(Message):
+    """Whether it was done; where not, what ur-rtde said."""
+
+    done: bool
+    words: str = ""
+
+
+class Snapshot(Message):
+    """The controller's state."""
+
+    age_s: float
+    joints_rad: Six
+    speeds_rad_s: Six
+    tool_pose: Six
+    """x, y, z in m and the rotation vector in rad."""
+    robot_mode: int
+    safety_bits: int
+    runtime_state: int
+    commanding: bool
+    """Whether the connection that commands stands."""
+    underway: bool
+    """Whether the control program reports a motion."""

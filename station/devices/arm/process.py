@@ -1,0 +1,211 @@
+"""The process that ur-rtde lives in: `python -m station.devices.arm.process ENDPOINT HOST FREQUENCY PARENT`.
+
+ur-rtde's constructors hold the interpreter's lock, hang on a silent peer, and a dropped link ends the process with a
+segmentation fault. So there is one such process for each connection; whoever started it kills it when it does not
+answer, and the kernel kills it when that one dies, which works even while ur-rtde holds the lock.
+"""
+
+import asyncio
+import ctypes
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+
+from station.channel.server import ChannelServer
+from station.devices.arm.age import TimestampAge
+from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.errors import StationError
+
+VARIABLES = [
+    "timestamp",
+    "actual_q",
+    "actual_qd",
+    "actual_TCP_pose",
+    "robot_mode",
+    "safety_status_bits",
+    "runtime_state",
+]
+PLAYING = 2
+UPLOAD_S = 2.0
+POLL_S = 0.01
+KICKS_PER_LIMIT = 4
+PR_SET_PDEATHSIG = 1
+
+
+class UrRtdeProcess:
+    """The handlers of the channel. Whatever commands the arm runs in one thread, one after the other."""
+
+    def __init__(self, host: str, frequency_hz: float) -> None:
+        self._host, self._frequency_hz = host, frequency_hz
+        self._control: RTDEControlInterface | None = None
+        self._receive: RTDEReceiveInterface | None = None
+        self._age = TimestampAge()
+        self._commander = ThreadPoolExecutor(max_workers=1)
+        self._healthy_until_s = 0.0
+        self._kicking: asyncio.Task[None] | None = None
+
+    async def watch(self, _request: Watch) -> Outcome:
+        """Make the receiving connection; this holds the interpreter's lock until it stands."""
+        try:
+            self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
+        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+            return Outcome(done=False, words=str(error))
+        return Outcome(done=True)
+
+    async def command(self, request: Command) -> Outcome:
+        """Make the commanding connection; this holds the interpreter's lock until it stands."""
+        try:
+            control = RTDEControlInterface(self._host, self._frequency_hz)
+        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+            return Outcome(done=False, words=str(error))
+        self._control = control
+        self._set_up = request
+        if self._kicking is None:
+            self._kicking = asyncio.create_task(self._kick(1.0 / (request.watchdog_hz * KICKS_PER_LIMIT)))
+        return await self._on_arm(self._prepare)
+
+    async def upload(self, _request: Upload) -> Outcome:
+        """Send the program again; ur-rtde's own answer says nothing, only a playing program counts."""
+        return await self._on_arm(lambda: self._commanding().reuploadScript() and self._plays() and self._prepare())
+
+    async def beat(self, request: Beat) -> Snapshot:
+        """Tell the state."""
+        receive = self._receive
+        if receive is None:
+            raise StationError("the state is not received yet")
+        self._healthy_until_s = time.monotonic() + request.healthy_for_s
+        age_s = self._age.age_s(receive.getTimestamp(), time.monotonic())
+        progress = self._control.getAsyncOperationProgressEx() if self._control is not None else None
+        return Snapshot(
+            age_s=age_s,
+            joints_rad=tuple(receive.getActualQ()),
+            speeds_rad_s=tuple(receive.getActualQd()),
+            tool_pose=tuple(receive.getActualTCPPose()),
+            robot_mode=receive.getRobotMode(),
+            safety_bits=receive.getSafetyStatusBits(),
+            runtime_state=receive.getRuntimeState(),
+            commanding=self._control is not None,
+            underway=progress is not None and progress.isAsyncOperationRunning(),
+        )
+
+    async def move(self, request: Move) -> Outcome:
+        """Begin a motion."""
+        joints = list(request.joints_rad)
+
+        def begin() -> bool:
+            control = self._commanding()
+            if request.straight:
+                return control.moveL_FK(joints, request.speed / 1000, request.acceleration / 1000, True)  # noqa: FBT003
+            return control.moveJ(joints, request.speed, request.acceleration, True)  # noqa: FBT003
+
+        return await self._on_arm(begin)
+
+    async def reachable(self, request: Reachable) -> Outcome:
+        """Ask the controller about joint positions, and about the tool's pose that they make."""
+        joints = list(request.joints_rad)
+
+        def ask() -> bool:
+            control = self._commanding()
+            if not control.isJointsWithinSafetyLimits(joints):
+                return False
+            pose = control.getForwardKinematics(joints, self._tool())
+            return control.isPoseWithinSafetyLimits(pose) and control.getInverseKinematicsHasSolution(pose)
+
+        return await self._on_arm(ask)
+
+    async def halt(self, request: Halt) -> Outcome:
+        """Begin to brake."""
+
+        def brake() -> bool:
+            self._commanding().stopJ(request.deceleration_rad_s2, True)  # noqa: FBT003
+            return True
+
+        return await self._on_arm(brake)
+
+    async def _kick(self, period_s: float) -> None:
+        """Keep the controller's watchdog quiet as long as the station says that it is healthy."""
+        while True:
+            await asyncio.sleep(period_s)
+            control = self._control
+            if control is not None and time.monotonic() < self._healthy_until_s and self._playing():
+                await self._on_arm(control.kickWatchdog)
+
+    def _prepare(self) -> bool:
+        control, wanted = self._commanding(), self._set_up
+        centre_m = [value / 1000 for value in wanted.payload_centre_mm]
+        return (
+            control.setTcp(self._tool())
+            and control.setPayload(wanted.payload_kg, centre_m)
+            and control.setWatchdog(wanted.watchdog_hz)
+        )
+
+    def _tool(self) -> list[float]:
+        # Never all zeros: for those ur-rtde's getForwardKinematics leaves the offset's registers as they were.
+        x, y, z = (value / 1000 for value in self._set_up.tool_centre_mm)
+        return [x, y, z or 1e-9, 0.0, 0.0, 0.0]
+
+    def _commanding(self) -> RTDEControlInterface:
+        if self._control is None:
+            raise StationError("the arm is not commanded yet")
+        return self._control
+
+    def _playing(self) -> bool:
+        return self._receive is not None and self._receive.getRuntimeState() == PLAYING
+
+    def _plays(self) -> bool:
+        deadline_s = time.monotonic() + UPLOAD_S
+        while time.monotonic() < deadline_s:
+            if self._commanding().isProgramRunning():
+                return True
+            time.sleep(POLL_S)
+        return False
+
+    async def _on_arm(self, call: Callable[[], bool]) -> Outcome:
+        try:
+            done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
+        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+            return Outcome(done=False, words=str(error))
+        return Outcome(done=bool(done))
+
+
+def die_with(parent: int) -> None:
+    """Have the kernel kill this process when the one that started it ends."""
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+async def serve(endpoint: str, host: str, frequency_hz: float) -> None:
+    """Answer on the channel until killed."""
+    process = UrRtdeProcess(host, frequency_hz)
+    server = ChannelServer(
+        endpoint,
+        {
+            Watch: process.watch,
+            Command: process.command,
+            Upload: process.upload,
+            Beat: process.beat,
+            Move: process.move,
+            Reachable: process.reachable,
+            Halt: process.halt,
+        },
+    )
+    await server.serve()
+
+
+def main() -> None:
+    """Run the process; its arguments are the endpoint, the controller's host, the frequency and the parent's id."""
+    endpoint, host, frequency_hz, parent = sys.argv[1:]
+    die_with(int(parent))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    asyncio.run(serve(endpoint, host, float(frequency_hz)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,254 @@
+"""The driver of a Universal Robots arm. Unverified on hardware."""
+
+import asyncio
+import time
+from typing import Self
+
+from station.devices.arm.arm import ArmState
+from station.devices.arm.dashboard import DashboardConversation, dashboard
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.link import ArmLink
+from station.devices.arm.messages import Halt, Move, Reachable, Six, Snapshot
+from station.settings.arm import ArmSettings, PoseName
+
+POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
+POLL_S = 0.02
+RECOVERY_POLL_S = 0.25
+AT_REST_RAD_S = 1e-3
+SHORT_AFTER_S = 0.3
+"""How long a motion that has ended elsewhere may look so before it counts."""
+START_TRIES = 3
+
+
+class UrArm:
+    """An `Arm` on ur-rtde, which lives in a process of its own. Belongs to the event loop in which it is opened.
+
+    A move to the nest, and the move that leaves it, is straight for the tool; the others are straight for the joints.
+    """
+
+    def __init__(self, settings: ArmSettings) -> None:
+        self._settings = settings
+        self._link = ArmLink(settings)
+        self._moving = asyncio.Lock()
+        self._stopped = asyncio.Event()
+        self._last_target: PoseName | None = None
+        self._reachable: set[tuple[int, PoseName]] = set()
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def open(self) -> None:
+        """Begin to connect; `ready` says whether it went well. Opening twice does nothing."""
+        await self._link.open()
+
+    async def ready(self, deadline_s: float) -> None:
+        """Wait until the arm is ready.
+
+        Raises:
+            ArmFault: why it is not, as soon as only a person can help, or at the deadline.
+        """
+        await self._link.settled(deadline_s)
+
+    async def close(self) -> None:
+        """End the driver's process; the program that plays is stopped by the controller's watchdog."""
+        await self._link.close()
+
+    @property
+    def process_id(self) -> int | None:
+        """The id of the process that ur-rtde lives in; None where there is none."""
+        return self._link.pid
+
+    def renew_health(self, lease_s: float) -> None:
+        """Say that the station is healthy for so many seconds; when they are over, the controller stops the arm."""
+        self._link.renew_health(lease_s)
+
+    async def state(self) -> ArmState:
+        """What is known now; it waits at most for as long as a state is good."""
+        try:
+            snapshot = await self._link.snapshot()
+        except ArmFault as fault:
+            return ArmState(None, None, None, None, None, self._link.fault or fault)
+        if snapshot.age_s > self._settings.stale_after_s:
+            stale = ArmFault(ArmCause.STALE, f"the controller's state is {snapshot.age_s:.2f} s old")
+            return ArmState(snapshot.age_s, None, None, None, None, self._link.fault or stale)
+        moving = _moves(snapshot)
+        x, y, z = (1000 * value for value in snapshot.tool_pose[:3])
+        at = None if moving else self._place(snapshot.joints_rad)
+        return ArmState(snapshot.age_s, snapshot.joints_rad, (x, y, z), moving, at, self._link.fault)
+
+    async def move_to(self, pose: PoseName) -> None:
+        """Go to a pose and return when it is reached.
+
+        Raises:
+            ArmFault: the arm is not ready, cannot go there, was stopped, or did not arrive.
+        """
+        if self._moving.locked():
+            raise ArmFault(ArmCause.BUSY, f"the arm cannot go to {pose}: it is still on its way elsewhere")
+        async with self._moving:
+            self._stopped.clear()
+            snapshot = await self._require_ready()
+            await self._require_reachable(pose)
+            straight = "nest" in {pose, self._last_target or self._place(snapshot.joints_rad)}
+            self._last_target = pose
+            try:
+                await self._begin(pose, straight=straight)
+                await self._arrive(pose)
+            except asyncio.CancelledError:
+                await asyncio.shield(self._brake())
+                raise
+
+    async def stop(self) -> None:
+        """Brake to rest, and end a `move_to` that is under way.
+
+        Raises:
+            ArmFault: the controller does not confirm; its watchdog then stops the arm.
+        """
+        self._stopped.set()
+        if self._link.fault is not None:
+            return
+        await self._brake()
+        deadline_s = time.monotonic() + self._settings.call_deadline_s
+        while time.monotonic() < deadline_s:
+            if self._link.fault is not None or not _moves(await self._link.snapshot()):
+                return
+            await asyncio.sleep(POLL_S)
+        raise ArmFault(ArmCause.DEADLINE, "the arm did not come to rest in time")
+
+    async def confirm_protective_stop(self) -> None:
+        """Leave the protective stop, which the controller refuses in its first 5 s, and make the arm ready again."""
+        async with self._recovering("the protective stop"), dashboard(self._settings.host) as conversation:
+            await _require_remote(conversation)
+            while "PROTECTIVE_STOP" in await conversation.say("safetystatus"):
+                await conversation.say("close safety popup")
+                await conversation.say("unlock protective stop")
+                await asyncio.sleep(RECOVERY_POLL_S)
+            await self._link.upload()
+
+    async def power_on_and_release_brakes(self) -> None:
+        """Power on, release the brakes and start the program; after a safety fault, restart the safety system first."""
+        async with self._recovering("powering on"), dashboard(self._settings.host) as conversation:
+            await _require_remote(conversation)
+            status = await conversation.say("safetystatus")
+            if "EMERGENCY_STOP" in status:
+                raise ArmFault(ArmCause.EMERGENCY_STOP, "an emergency stop button is still pressed")
+            if "FAULT" in status or "VIOLATION" in status:
+                await conversation.say("restart safety")
+            while "RUNNING" not in (mode := await conversation.say("robotmode")):
+                await conversation.say("close safety popup")
+                await conversation.say("brake release" if "IDLE" in mode else "power on")
+                await asyncio.sleep(RECOVERY_POLL_S)
+            await self._link.upload()
+
+    async def upload_again(self) -> None:
+        """Start the program again after it was stopped; a program that plays is left alone."""
+        async with self._recovering("the upload"):
+            await self._link.upload()
+
+    def _recovering(self, what: str) -> "_Recovery":
+        return _Recovery(what, self._settings.recovery_deadline_s)
+
+    async def _require_ready(self) -> Snapshot:
+        if self._link.fault is not None:
+            raise self._link.fault
+        if not self._link.healthy:
+            raise ArmFault(ArmCause.UNHEALTHY, "the station has not said that it is healthy")
+        snapshot = await self._link.snapshot()
+        if snapshot.age_s > self._settings.stale_after_s:
+            raise ArmFault(ArmCause.STALE, f"the controller's state is {snapshot.age_s:.2f} s old")
+        return snapshot
+
+    async def _require_reachable(self, pose: PoseName) -> None:
+        known = (self._link.attachment, pose)
+        if known in self._reachable:
+            return
+        outcome = await self._link.order(Reachable(joints_rad=self._settings.poses.joints_rad(pose)))
+        if outcome.words or (await self._link.snapshot()).runtime_state != 2:
+            raise await self._link.explain(outcome.words)
+        if not outcome.done:
+            raise ArmFault(ArmCause.UNREACHABLE, f"the controller says that {pose} is out of reach or its safety limits")
+        self._reachable.add(known)
+
+    async def _begin(self, pose: PoseName, *, straight: bool) -> None:
+        settings = self._settings
+        request = Move(
+            joints_rad=settings.poses.joints_rad(pose),
+            straight=straight,
+            speed=settings.tool_speed_mm_s if straight else settings.joint_speed_rad_s,
+            acceleration=settings.tool_acceleration_mm_s2 if straight else settings.joint_acceleration_rad_s2,
+        )
+        outcome = await self._link.order(request)
+        if not outcome.done:
+            raise await self._link.explain(outcome.words)
+
+    async def _arrive(self, pose: PoseName) -> None:
+        target = self._settings.poses.joints_rad(pose)
+        deadline_s = time.monotonic() + self._settings.move_deadline_s
+        resting_since_s: float | None = None
+        while time.monotonic() < deadline_s:
+            if self._stopped.is_set():
+                raise ArmFault(ArmCause.STOPPED, f"the way to {pose} was stopped by the station")
+            if self._link.fault is not None:
+                raise self._link.fault
+            snapshot = await self._fresh_enough()
+            if snapshot is None or _moves(snapshot):
+                resting_since_s = None
+            elif _near(snapshot.joints_rad, target, self._settings.reached_tolerance_rad):
+                return
+            elif resting_since_s is None:
+                resting_since_s = time.monotonic()
+            elif time.monotonic() - resting_since_s > SHORT_AFTER_S:
+                raise ArmFault(ArmCause.NOT_REACHED, f"the arm came to rest elsewhere than at {pose}")
+            await asyncio.sleep(POLL_S)
+        await self._brake()
+        raise ArmFault(ArmCause.DEADLINE, f"the arm did not reach {pose} within {self._settings.move_deadline_s:g} s")
+
+    async def _fresh_enough(self) -> Snapshot | None:
+        try:
+            snapshot = await self._link.snapshot()
+        except ArmFault:
+            return None
+        return snapshot if snapshot.age_s <= self._settings.stale_after_s else None
+
+    async def _brake(self) -> None:
+        outcome = await self._link.order(Halt(deceleration_rad_s2=self._settings.stop_deceleration_rad_s2))
+        if not outcome.done:
+            raise await self._link.explain(outcome.words)
+
+    def _place(self, joints_rad: Six) -> PoseName | None:
+        poses, tolerance = self._settings.poses, self._settings.reached_tolerance_rad
+        return next((name for name in POSES if _near(joints_rad, poses.joints_rad(name), tolerance)), None)
+
+
+class _Recovery:
+    """A person's verb under the recovery deadline: running out of time is a fault like another."""
+
+    def __init__(self, what: str, deadline_s: float) -> None:
+        self._what, self._deadline_s = what, deadline_s
+        self._timeout = asyncio.timeout(deadline_s)
+
+    async def __aenter__(self) -> None:
+        await self._timeout.__aenter__()
+
+    async def __aexit__(self, *details: object) -> None:
+        try:
+            await self._timeout.__aexit__(*details)  # pyright: ignore[reportArgumentType]
+        except TimeoutError as error:
+            words = f"{self._what} did not come to its end within {self._deadline_s:g} s"
+            raise ArmFault(ArmCause.DEADLINE, words) from error
+
+
+async def _require_remote(conversation: DashboardConversation) -> None:
+    if not (await conversation.facts()).remote:
+        raise ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no orders")
+
+
+def _moves(snapshot: Snapshot) -> bool:
+    return snapshot.underway or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
+
+
+def _near(joints_rad: Six, target_rad: Six, tolerance_rad: float) -> bool:
+    return all(abs(a - b) <= tolerance_rad for a, b in zip(joints_rad, target_rad, strict=True))

@@ -1,0 +1,138 @@
+"""The arm itself: joints that move in real time along a path."""
+
+from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints, forward, inverse, nearest
+from station.twin.ur.paths import JointPath, Path, ToolPath, UnreachableError
+from station.twin.ur.poses import Pose, inverse_transform, pose_from_transform, transform_from_pose
+from station.twin.ur.profile import Braking, Profile, Trapezoid
+
+RESTING: Joints = (0.0,) * 6
+NO_OFFSET: Pose = (0.0,) * 6
+REST_S = 0.05
+"""How long the arm stands before it counts as steady."""
+
+
+class Body:
+    """The joints, what they do at the moment, and the tool at their end."""
+
+    def __init__(self, joints_rad: Joints, now_s: float, joint_range_rad: float = JOINT_RANGE_RAD) -> None:
+        self.joints_rad = joints_rad
+        self._joint_range_rad = joint_range_rad
+        self.speeds_rad_s: Joints = RESTING
+        self.tcp_offset: Pose = NO_OFFSET
+        self._path: Path | None = None
+        self._profile: Profile | None = None
+        self._elapsed_s = 0.0
+        self._speed = 0.0
+        self._travel = 0.0
+        self._now_s = now_s
+        self._resting_since_s = now_s
+        self._tool_cache: tuple[Joints, Pose, Pose] | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motion has not come to its end."""
+        return self._path is not None
+
+    @property
+    def steady(self) -> bool:
+        """Whether the arm has stood still for a moment."""
+        return not self.moving and self._now_s - self._resting_since_s >= REST_S
+
+    def advance(self, now_s: float, scaling: float) -> None:
+        """Let time pass.
+
+        Args:
+            now_s: the clock's time.
+            scaling: the share of the commanded speed at which the arm goes, 0 to 1.
+        """
+        passed_s, self._now_s = now_s - self._now_s, now_s
+        if self._path is None or self._profile is None:
+            return
+        self._elapsed_s += passed_s * scaling
+        self._travel, self._speed = self._profile.at(self._elapsed_s)
+        self._travel = min(self._travel, self._path.length)
+        self.joints_rad, slope = self._path.at(self._travel)
+        pace = self._speed * scaling
+        self.speeds_rad_s = tuple(pace * s for s in slope)  # pyright: ignore[reportAttributeAccessIssue]
+        if self._elapsed_s >= self._profile.duration_s:
+            self._rest()
+
+    def move_joints(self, target: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
+        """Begin a joint motion; joints that are slower than asked for slow the others down.
+
+        Raises:
+            UnreachableError: the target is out of the joints' range.
+        """
+        if not self.within_range(target):
+            raise UnreachableError("a joint would leave its range")
+        path = JointPath.between(self.joints_rad, target)
+        speed = min(speed_rad_s, path.speed_limit_rad_s())
+        self._begin(path, Trapezoid(path.length, speed, acceleration_rad_s2))
+
+    def move_tool(self, target: Pose, speed_m_s: float, acceleration_m_s2: float) -> None:
+        """Begin a straight motion of the tool.
+
+        Raises:
+            UnreachableError: part of the way is out of reach, or a joint would have to go faster than it can.
+        """
+        end = transform_from_pose(target) @ inverse_transform(transform_from_pose(self.tcp_offset))
+        path = ToolPath(self.joints_rad, forward(self.joints_rad), end)
+        profile = Trapezoid(path.length, speed_m_s, acceleration_m_s2)
+        if not self.within_range(path.end_joints) or path.steepest() * profile.peak_speed > 1.0:
+            raise UnreachableError("a joint would leave its range or exceed its speed on the straight way")
+        self._begin(path, profile)
+
+    def brake(self, deceleration_rad_s2: float) -> None:
+        """Come to rest on the path, the leading joint at a deceleration; nothing happens to an arm at rest."""
+        if self._path is None or self._speed == 0.0:
+            self._rest()
+            return
+        leading = max(abs(slope) for slope in self._path.at(self._travel)[1])
+        deceleration = deceleration_rad_s2 / leading if leading else deceleration_rad_s2
+        self._profile = Braking(self._travel, self._speed, deceleration)
+        self._elapsed_s = 0.0
+
+    def tool_pose(self) -> Pose:
+        """The tool centre point in the base's frame."""
+        joints, offset = self.joints_rad, self.tcp_offset
+        if self._tool_cache is None or self._tool_cache[0] is not joints or self._tool_cache[1] is not offset:
+            self._tool_cache = joints, offset, self.forward(joints, offset)
+        return self._tool_cache[2]
+
+    def tool_speed(self) -> Pose:
+        """The tool's speed in m/s and the rate of its rotation vector in rad/s."""
+        if self.speeds_rad_s == RESTING:
+            return NO_OFFSET
+        step_s = 1e-4
+        ahead: Joints = tuple(  # pyright: ignore[reportAssignmentType]
+            q + v * step_s for q, v in zip(self.joints_rad, self.speeds_rad_s, strict=True)
+        )
+        pairs = zip(self.tool_pose(), self.forward(ahead, self.tcp_offset), strict=True)
+        x, y, z, rx, ry, rz = ((b - a) / step_s for a, b in pairs)
+        return x, y, z, rx, ry, rz
+
+    @staticmethod
+    def forward(joints_rad: Joints, offset: Pose) -> Pose:
+        """The tool's pose at joint positions."""
+        return pose_from_transform(forward(joints_rad) @ transform_from_pose(offset))
+
+    def solve(self, pose: Pose, near_rad: Joints | None = None) -> Joints | None:
+        """The joint positions nearest to given or present ones that bring the tool to a pose; None where none do."""
+        flange = transform_from_pose(pose) @ inverse_transform(transform_from_pose(self.tcp_offset))
+        return nearest(inverse(flange[None])[0], near_rad or self.joints_rad)
+
+    def within_range(self, joints_rad: Joints) -> bool:
+        """Whether each joint is a number and within its range either way."""
+        return all(abs(q) <= self._joint_range_rad for q in joints_rad)
+
+    def _begin(self, path: Path, profile: Profile) -> None:
+        self._path, self._profile = path, profile
+        self._elapsed_s = self._travel = self._speed = 0.0
+        if path.length == 0.0:
+            self._rest()
+
+    def _rest(self) -> None:
+        self._path = self._profile = None
+        self._speed = 0.0
+        self.speeds_rad_s = RESTING
+        self._resting_since_s = self._now_s

@@ -1,0 +1,329 @@
+"""The whole controller: its cycle of 2 ms, its servers, and the faults that can be switched on in it."""
+
+import asyncio
+import contextlib
+from typing import Any, Literal
+
+from station.twin.clock import Clock
+from station.twin.faults import CommonFault, FaultBoard
+from station.twin.ur import primary
+from station.twin.ur.body import Body
+from station.twin.ur.dashboard import BANNER, LONGEST_LINE, Dashboard
+from station.twin.ur.dashboard import PORT as DASHBOARD_PORT
+from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints
+from station.twin.ur.outputs import output_table
+from station.twin.ur.registers import Registers
+from station.twin.ur.rtde import FREQUENCY_HZ, RtdeConnection
+from station.twin.ur.rtde import PORT as RTDE_PORT
+from station.twin.ur.safety import Safety
+from station.twin.ur.script import ControlScript
+
+SCRIPT_PORT = 30003
+CYCLE_S = 1.0 / FREQUENCY_HZ
+LATE_CYCLES = 10
+LONGEST_SCRIPT = 1_000_000
+GARBAGE_LINE = b"\xff\x00\x13 garbage\n"
+START_POSE_RAD: Joints = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
+
+OWN_FAULTS = (
+    "protective_stop",
+    "emergency_stop",
+    "local_mode",
+    "pendant_stop",
+    "registers_in_use",
+    "silent",
+    "rtde_silent",
+    "link_cut",
+    "safety_fault",
+)
+
+
+def arm_faults() -> FaultBoard:
+    """A board with every fault that the controller knows."""
+    return FaultBoard("arm", OWN_FAULTS)
+
+
+class UrController:
+    """A UR10e with its controller on one loopback address, on the ports that a real one has.
+
+    Faults, and what their amount means:
+        off: without power: connections cut and refused; afterwards the controller has started anew, the arm unpowered.
+        stuck: alive, but packages repeat and nothing moves.
+        garbage: RTDE packages and dashboard answers are noise.
+        wrong: `actual_q` is off by the amount, rad, in every joint.
+        slow: the arm moves at 1 / (1 + amount) of its speed.
+        delayed: everything that is sent comes later by the amount, s.
+        intermittent: every amount of seconds all connections are cut; new ones are taken.
+        protective_stop: switching it on is the event; it stays until it is unlocked.
+        emergency_stop: the button is pressed as long as it is on.
+        local_mode: local control as long as it is on; script and primary connections drop.
+        pendant_stop: switching it on stops the program.
+        registers_in_use: a fieldbus holds input registers 0 to 23 against new clients.
+        silent: connections are taken, and nothing is ever said.
+        rtde_silent: the same on the RTDE port alone.
+        link_cut: connections are cut and refused; the controller itself goes on.
+        safety_fault: switching it on is the event; it stays until the safety system is restarted.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        clock: Clock,
+        faults: FaultBoard,
+        *,
+        polyscope: Literal["5.22", "5.25"] = "5.22",
+        joints_rad: Joints = START_POSE_RAD,
+        joint_range_rad: float = JOINT_RANGE_RAD,
+        running: bool = True,
+    ) -> None:
+        """Prepare a controller.
+
+        Args:
+            host: any 127.0.0.N; the ports are the real ones.
+            clock: what moves the arm.
+            faults: from `arm_faults`.
+            polyscope: the version that is told.
+            joints_rad: where the arm stands.
+            joint_range_rad: how far the safety configuration lets each joint turn either way.
+            running: powered and released from the start.
+        """
+        self.host, self.clock, self.faults = host, clock, faults
+        self.polyscope = (5, int(polyscope.split(".")[1]))
+        self.version = (*self.polyscope, 0, 1202319)
+        self.version_text = ".".join(map(str, self.version))
+        self.serial_number = "20245500001"
+        self.speed_slider = 1.0
+        self.digital_outputs = 0
+        self.connections: set[RtdeConnection] = set()
+        self._streams: set[asyncio.StreamWriter] = set()
+        self._servers: list[asyncio.Server] = []
+        self._tick = 0
+        self._timer: asyncio.TimerHandle | None = None
+        self._due_s = 0.0
+        self._known_faults: dict[str, float] = {}
+        self._cut_at_s = 0.0
+        self._script_drops: set[asyncio.StreamWriter] = set()
+        self._switching: asyncio.Task[None] | None = None
+        self._joint_range_rad = joint_range_rad
+        self._boot(joints_rad, running=running)
+
+    def _boot(self, joints_rad: Joints, *, running: bool) -> None:
+        self._booted_at_s = self.clock.now_s()
+        self.body = Body(joints_rad, self._booted_at_s, self._joint_range_rad)
+        self.registers = Registers()
+        self.safety = Safety(running=running)
+        self.script = ControlScript(self.body, self.registers, self.safety)
+        self.outputs = output_table(self)
+        self._dashboard = Dashboard(self)
+
+    @property
+    def joints_rad(self) -> Joints:
+        """Where the joints are, rad."""
+        return self.body.joints_rad
+
+    @property
+    def uptime_s(self) -> float:
+        """RTDE `timestamp`."""
+        return self.clock.now_s() - self._booted_at_s
+
+    @property
+    def timestamp_us(self) -> int:
+        """The primary stream's timestamp."""
+        return int(self.uptime_s * 1e6)
+
+    @property
+    def speed_scaling(self) -> float:
+        """The share of the commanded speed at which the arm really moves."""
+        return self.speed_slider / (1.0 + self.faults.amount(CommonFault.SLOW))
+
+    def tool_position_m(self) -> tuple[float, float, float]:
+        """The tool centre point in the base's frame, m."""
+        return self.body.tool_pose()[:3]
+
+    def measured_joints_rad(self) -> tuple[float, ...]:
+        """RTDE `actual_q`."""
+        error = self.faults.amount(CommonFault.WRONG)
+        return tuple(q + error for q in self.body.joints_rad) if error else self.body.joints_rad
+
+    def write_inputs(self, values: list[tuple[str, Any]]) -> None:
+        """Take a client's package of inputs."""
+        if self.faults.active(CommonFault.STUCK):
+            return
+        now_s = self.clock.now_s()
+        for name, value in values:
+            self.registers.write(name, value, now_s)
+        written = dict(values)
+        if written.get("speed_slider_mask"):
+            self.speed_slider = min(max(written.get("speed_slider_fraction", 1.0), 0.0), 1.0)
+        mask = written.get("standard_digital_output_mask", 0)
+        wanted = written.get("standard_digital_output", 0)
+        self.digital_outputs = (self.digital_outputs & ~mask) | (wanted & mask)
+
+    async def start(self) -> None:
+        """Open the ports and start the cycle.
+
+        Raises:
+            OSError: one of the ports is taken.
+        """
+        try:
+            await self._open()
+        except OSError:
+            await self._close()
+            raise
+        loop = asyncio.get_running_loop()
+        self._due_s = loop.time()
+        self._timer = loop.call_soon(self._cycle)  # pyright: ignore[reportAttributeAccessIssue]
+
+    async def stop(self) -> None:
+        """Cut every connection and close the ports; the controller may be started again."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._switching is not None:
+            await self._switching
+        await self._close()
+
+    async def _open(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._servers.append(await loop.create_server(lambda: RtdeConnection(self), self.host, RTDE_PORT))
+        for port, serve in (
+            (DASHBOARD_PORT, self._serve_dashboard),
+            (SCRIPT_PORT, self._serve_script),
+            (primary.PORT, self._serve_primary),
+        ):
+            self._servers.append(await asyncio.start_server(serve, self.host, port, limit=LONGEST_LINE * 64))
+
+    async def _close(self) -> None:
+        servers, self._servers = self._servers, []
+        for server in servers:
+            server.close()
+        self._cut_all()
+        while self.connections or self._streams:
+            await asyncio.sleep(0)
+        for server in servers:
+            await server.wait_closed()
+
+    def _cut_all(self) -> None:
+        for connection in list(self.connections):
+            connection.cut()
+        for writer in list(self._streams):
+            writer.transport.abort()
+
+    def _cycle(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._due_s += CYCLE_S
+        if loop.time() - self._due_s > LATE_CYCLES * CYCLE_S:
+            self._due_s = loop.time()
+        self._timer = loop.call_at(self._due_s, self._cycle)
+        now_s = self.clock.now_s()
+        self._apply_faults(now_s)
+        if not self.faults.active(CommonFault.STUCK):
+            self.safety.advance(now_s)
+            self.body.advance(now_s, self.speed_scaling)
+            self.script.step(now_s)
+        self._tick += 1
+        for connection in list(self.connections):
+            connection.publish(self._tick, now_s)
+
+    def _apply_faults(self, now_s: float) -> None:
+        period_s = self.faults.amount(CommonFault.INTERMITTENT)
+        if period_s and now_s - self._cut_at_s > period_s:
+            self._cut_at_s = now_s
+            self._cut_all()
+        if self._switching is not None and self._switching.done():
+            self._switching = None
+        faults = self.faults.snapshot()
+        if faults.keys() == self._known_faults.keys() or self._switching is not None:
+            return
+        begun, ended = faults.keys() - self._known_faults.keys(), self._known_faults.keys() - faults.keys()
+        self._known_faults = faults
+        self._begin_faults(begun, now_s)
+        if "emergency_stop" in ended:
+            self.safety.release_emergency_stop()
+        if "local_mode" in begun | ended:
+            self.safety.remote = "local_mode" not in begun
+            for writer in list(self._script_drops):
+                writer.transport.abort()
+        reachable = {CommonFault.OFF, "link_cut"}
+        if (begun | ended) & reachable:
+            self._switching = asyncio.create_task(self._switch_network(on=not faults.keys() & reachable))
+        if CommonFault.OFF in ended:
+            self._boot(self.body.joints_rad, running=False)
+
+    def _begin_faults(self, begun: set[str], now_s: float) -> None:
+        if "protective_stop" in begun:
+            self.safety.stop_protectively(now_s)
+        if "emergency_stop" in begun:
+            self.safety.press_emergency_stop()
+        if "safety_fault" in begun:
+            self.safety.fail()
+        if "pendant_stop" in begun:
+            self.script.end("a person stopped the program on the pendant")
+        if CommonFault.OFF in begun:
+            self.safety.power_off()
+
+    async def _switch_network(self, *, on: bool) -> None:
+        await self._close()
+        if on:
+            with contextlib.suppress(OSError):
+                await self._open()
+
+    async def _serve_dashboard(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async with self._stream(writer):
+            await self._say(writer, BANNER.encode() + b"\n")
+            while line := await reader.readline():
+                text = line.decode("ascii", "replace")
+                await self._say(writer, self._dashboard.answer(text).encode() + b"\n", garbage=GARBAGE_LINE)
+                if text.strip().lower() in {"quit", "shutdown"}:
+                    return
+
+    async def _serve_script(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._script_drops.add(writer)
+        async with self._stream(writer):
+            await self._take_scripts(reader)
+
+    async def _serve_primary(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._script_drops.add(writer)
+        async with self._stream(writer):
+            await self._say(writer, primary.version_message(self))
+            taking = asyncio.create_task(self._take_scripts(reader))
+            try:
+                while not taking.done():
+                    await self._say(writer, primary.robot_mode_message(self))
+                    await asyncio.wait({taking}, timeout=primary.PERIOD_S)
+            finally:
+                taking.cancel()
+                with contextlib.suppress(asyncio.CancelledError, OSError):
+                    await taking
+
+    async def _take_scripts(self, reader: asyncio.StreamReader) -> None:
+        """Wait for programs; ur-rtde's control script is recognised by the names that it uses, at its last line."""
+        text = bytearray()
+        while part := await reader.read(65536):
+            text += part
+            if text.endswith(b"\nend\n"):
+                if b"process_cmd(" in text and b"read_input_integer_reg" in text:
+                    self.script.upload(self.clock.now_s())
+                text.clear()
+            if len(text) > LONGEST_SCRIPT:
+                return
+
+    @contextlib.asynccontextmanager
+    async def _stream(self, writer: asyncio.StreamWriter):  # noqa: ANN202
+        self._streams.add(writer)
+        try:
+            with contextlib.suppress(OSError, ValueError, asyncio.LimitOverrunError, asyncio.IncompleteReadError):
+                yield
+        finally:
+            self._streams.discard(writer)
+            self._script_drops.discard(writer)
+            writer.transport.abort()
+
+    async def _say(self, writer: asyncio.StreamWriter, data: bytes, *, garbage: bytes | None = None) -> None:
+        if self.faults.active("silent"):
+            return
+        if garbage is not None and self.faults.active(CommonFault.GARBAGE):
+            data = garbage
+        await asyncio.sleep(self.faults.amount(CommonFault.DELAYED))
+        writer.write(data)
+        await writer.drain()

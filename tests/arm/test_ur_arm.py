@@ -1,0 +1,482 @@
+"""The driver against the emulated controller, over the wire, with the real ur-rtde."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.ur import UrArm
+from station.settings.arm import ArmPoses
+from station.twin.ur.script import RuntimeState
+
+AWAY = ArmPoses(home=(2.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0))
+"""A home that is a long way off."""
+
+
+async def moving(bench) -> bool:
+    return max(map(abs, bench.controller.body.speeds_rad_s)) > 0.1
+
+
+async def cause_of(awaitable) -> ArmCause:
+    with pytest.raises(ArmFault) as caught:
+        await awaitable
+    assert caught.value.remedy in str(caught.value)
+    return caught.value.cause
+
+
+def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            for pose in ("above_nest", "nest", "above_nest", "accept", "accept"):
+                await arm.move_to(pose)
+                state = await arm.state()
+                assert state.ready
+                assert state.at == pose
+                assert state.moving is False
+                assert state.age_s is not None
+                assert state.age_s < 0.1
+                assert bench.controller.joints_rad == pytest.approx(bench_pose(arm, pose), abs=1e-6)
+            x, y, z = (await arm.state()).tool_position_mm
+            assert (x / 1000, y / 1000, z / 1000) == pytest.approx(bench.controller.tool_position_m(), abs=1e-6)
+
+    asyncio.run(run())
+
+
+def bench_pose(arm: UrArm, pose):
+    return arm._settings.poses.joints_rad(pose)
+
+
+def test_it_keeps_to_the_speeds_and_goes_straight_to_the_nest(healthy_arm):
+    async def run():
+        async with healthy_arm(joint_speed_rad_s=0.8, tool_speed_mm_s=80.0) as (bench, arm):
+            joint_peak, tool_peak, off_line_m = 0.0, 0.0, 0.0
+
+            async def watch():
+                nonlocal joint_peak, tool_peak, off_line_m
+                while True:
+                    joint_peak = max(joint_peak, *map(abs, bench.controller.body.speeds_rad_s))
+                    x, y, z = bench.controller.body.tool_speed()[:3]
+                    tool_peak = max(tool_peak, (x * x + y * y + z * z) ** 0.5)
+                    x, y, _ = bench.controller.tool_position_m()
+                    off_line_m = max(off_line_m, ((x + 0.75) ** 2 + (y + 0.15) ** 2) ** 0.5)
+                    await asyncio.sleep(0.002)
+
+            watching = asyncio.create_task(watch())
+            await arm.move_to("accept")
+            assert joint_peak == pytest.approx(0.8, rel=1e-3)
+            await arm.move_to("above_nest")
+            tool_peak = off_line_m = 0.0
+            await arm.move_to("nest")
+            assert tool_peak == pytest.approx(0.08, rel=0.01)
+            assert off_line_m < 0.0005
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+
+    asyncio.run(run())
+
+
+def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            assert await cause_of(arm.move_to("accept")) is ArmCause.BUSY
+            await arm.stop()
+            assert await cause_of(move) is ArmCause.STOPPED
+            assert not bench.controller.body.moving
+            state = await arm.state()
+            assert state.ready
+            assert state.at is None
+            await arm.stop()
+            await arm.move_to("home")
+            assert (await arm.state()).at == "home"
+
+    asyncio.run(run())
+
+
+def test_a_cancelled_move_is_stopped(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            move.cancel()
+            await asyncio.gather(move, return_exceptions=True)
+            await until(lambda: not bench.controller.body.moving)
+            assert bench.controller.joints_rad[0] < 1.9
+
+    asyncio.run(run())
+
+
+def test_a_move_that_does_not_arrive_in_time_is_stopped(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.2, move_deadline_s=0.8) as (bench, arm):
+            assert await cause_of(arm.move_to("home")) is ArmCause.DEADLINE
+            await until(lambda: not bench.controller.body.moving)
+            assert bench.controller.joints_rad[0] < 1.0
+
+    asyncio.run(run())
+
+
+def test_a_protective_stop_in_mid_move_waits_for_a_person_and_for_its_five_seconds(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            bench.faults.set("protective_stop")
+            assert await cause_of(move) is ArmCause.PROTECTIVE_STOP
+            await until(lambda: not bench.controller.body.moving)
+            assert await cause_of(arm.move_to("home")) is ArmCause.PROTECTIVE_STOP
+            assert await cause_of(arm.upload_again()) is ArmCause.PROTECTIVE_STOP
+            confirming = asyncio.create_task(arm.confirm_protective_stop())
+            await asyncio.sleep(1.0)
+            assert not confirming.done()
+            assert bench.controller.safety.bits & 1 << 2
+            bench.clock.skip(4.5)
+            await confirming
+            await arm.move_to("home")
+            assert (await arm.state()).at == "home"
+
+    asyncio.run(run())
+
+
+def test_an_emergency_stop_needs_the_button_then_power_then_brakes(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            bench.faults.set("emergency_stop")
+            assert await cause_of(move) is ArmCause.EMERGENCY_STOP
+            assert await cause_of(arm.power_on_and_release_brakes()) is ArmCause.EMERGENCY_STOP
+            bench.faults.clear("emergency_stop")
+
+            async def unpowered():
+                return (await arm.state()).fault.cause is ArmCause.NOT_POWERED
+
+            await until(unpowered)
+            assert await cause_of(arm.move_to("home")) is ArmCause.NOT_POWERED
+            await arm.power_on_and_release_brakes()
+            await arm.move_to("home")
+            assert (await arm.state()).at == "home"
+
+    asyncio.run(run())
+
+
+def test_a_safety_fault_is_mended_by_a_restart_of_the_safety_system(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("safety_fault")
+            await until(lambda: has_cause(arm, ArmCause.SAFETY_FAULT))
+            await arm.power_on_and_release_brakes()
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+async def has_cause(arm: UrArm, cause: ArmCause) -> bool:
+    fault = (await arm.state()).fault
+    return fault is not None and fault.cause is cause
+
+
+def test_a_program_stopped_on_the_pendant_stays_stopped_until_a_person_uploads_it(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            bench.faults.set("pendant_stop")
+            assert await cause_of(move) is ArmCause.PROGRAM_STOPPED
+            bench.faults.clear("pendant_stop")
+            await asyncio.sleep(0.5)
+            assert bench.controller.script.runtime_state is RuntimeState.STOPPED
+            assert await cause_of(arm.move_to("home")) is ArmCause.PROGRAM_STOPPED
+            await arm.upload_again()
+            await arm.upload_again()
+            await arm.move_to("home")
+
+    asyncio.run(run())
+
+
+def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("local_mode")
+            await until(lambda: has_cause(arm, ArmCause.LOCAL_CONTROL))
+            assert await cause_of(arm.move_to("accept")) is ArmCause.LOCAL_CONTROL
+            assert await cause_of(arm.upload_again()) is ArmCause.LOCAL_CONTROL
+            assert await cause_of(arm.confirm_protective_stop()) is ArmCause.LOCAL_CONTROL
+            bench.faults.clear("local_mode")
+            await until(lambda: bench.controller.safety.remote)
+            # The script connection was dropped: ur-rtde's reuploadScript says True, and nothing plays.
+            await arm.upload_again()
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"), [("local_mode", ArmCause.LOCAL_CONTROL), ("registers_in_use", ArmCause.REGISTERS_IN_USE)]
+)
+def test_what_forbids_the_connection_is_named(bench, fault, cause):
+    async def run():
+        async with bench() as made:
+            made.faults.set(fault)
+            await asyncio.sleep(0.05)
+            async with UrArm(made.settings()) as arm:
+                assert await cause_of(arm.ready(20.0)) is cause
+                assert (await arm.state()).joints_rad is not None
+                made.faults.clear(fault)
+                await asyncio.sleep(0.05)
+                await arm.upload_again()
+                assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_registers_that_another_client_claimed_are_named(healthy_arm):
+    async def run():
+        async with healthy_arm() as (bench, _), UrArm(bench.settings()) as second:
+            assert await cause_of(second.ready(20.0)) is ArmCause.REGISTERS_IN_USE
+
+    asyncio.run(run())
+
+
+def test_a_pose_out_of_range_is_not_driven_to(bench, healthy):
+    async def run():
+        async with bench(joint_range_rad=3.2) as made:
+            poses = ArmPoses(accept=(0.0, -1.57, 3.3, -1.57, -1.57, 0.0))
+            async with UrArm(made.settings(poses=poses)) as arm, healthy(arm):
+                await arm.ready(20.0)
+                before = made.controller.joints_rad
+                assert await cause_of(arm.move_to("accept")) is ArmCause.UNREACHABLE
+                assert made.controller.joints_rad == before
+                await arm.move_to("reject")
+
+    asyncio.run(run())
+
+
+def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            bench.faults.set("link_cut")
+            assert await cause_of(move) is ArmCause.LINK_LOST
+            state = await arm.state()
+            assert state.joints_rad is None
+            assert not state.ready
+            await until(lambda: not bench.controller.body.moving)
+            assert bench.controller.joints_rad[0] < 1.9
+            bench.faults.clear("link_cut")
+            await arm.ready(15.0)
+            await arm.move_to("above_nest")
+
+    asyncio.run(run())
+
+
+def test_a_controller_that_was_switched_off_comes_back_without_power(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("off")
+            await until(lambda: has_cause(arm, ArmCause.LINK_LOST))
+            bench.faults.clear("off")
+            await until(lambda: has_cause(arm, ArmCause.NOT_POWERED))
+            await arm.power_on_and_release_brakes()
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_a_silent_controller_is_given_up_within_the_limit(bench, healthy):
+    async def run():
+        async with bench() as made:
+            async with UrArm(made.settings(constructor_limit_s=1.0)) as arm, healthy(arm):
+                made.faults.set("silent")
+                begun = time.monotonic()
+                assert await cause_of(arm.ready(3.0)) is ArmCause.LINK_LOST
+                assert time.monotonic() - begun < 4.0
+                made.faults.clear("silent")
+                await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+def test_a_controller_that_falls_silent_in_the_constructor_is_killed(bench, healthy, until):
+    """The dashboard answers and RTDE does not: ur-rtde's constructor hangs for ever, holding the interpreter's lock."""
+
+    async def run():
+        async with bench() as made:
+            made.faults.set("rtde_silent")
+            async with UrArm(made.settings(constructor_limit_s=1.0)) as arm, healthy(arm):
+                await until(lambda: arm.process_id is not None)
+                hung = psutil.Process(arm.process_id)
+                ticks = 0
+
+                async def tick():
+                    nonlocal ticks
+                    while True:
+                        ticks += 1
+                        await asyncio.sleep(0.02)
+
+                ticking = asyncio.create_task(tick())
+                await until(lambda: not hung.is_running())
+                assert ticks > 10
+                ticking.cancel()
+                await asyncio.gather(ticking, return_exceptions=True)
+                made.faults.clear("rtde_silent")
+                await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("fault", ["stuck", "delayed"])
+def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault):
+    async def run():
+        async with healthy_arm(link_lost_after_s=3.0) as (bench, arm):
+            bench.faults.set(fault, 0.4)
+            await until(lambda: has_cause(arm, ArmCause.STALE))
+            state = await arm.state()
+            assert state.joints_rad is None
+            assert state.at is None
+            assert state.age_s > 0.1
+            assert await cause_of(arm.move_to("accept")) is ArmCause.STALE
+            bench.faults.clear(fault)
+
+            async def ready():
+                return (await arm.state()).joints_rad is not None
+
+            await until(ready)
+
+    asyncio.run(run())
+
+
+def test_garbage_on_the_wire_hurts_nobody_but_the_process(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("garbage")
+            await until(lambda: has_cause(arm, ArmCause.LINK_LOST))
+            bench.faults.clear("garbage")
+            await arm.ready(15.0)
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_wrong_joint_angles_do_not_pass_for_arrival(healthy_arm):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("wrong", 0.05)
+            assert await cause_of(arm.move_to("accept")) is ArmCause.NOT_REACHED
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGSEGV])
+def test_a_process_that_dies_in_mid_move_is_put_back(healthy_arm, until, kind):
+    async def run():
+        async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            first = arm.process_id
+            os.kill(first, kind)
+            assert await cause_of(move) is ArmCause.LINK_LOST
+            await arm.ready(15.0)
+            assert arm.process_id != first
+            await until(lambda: not bench.controller.body.moving)
+            await arm.move_to("above_nest")
+
+    asyncio.run(run())
+
+
+def test_a_process_that_hangs_is_killed(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (_, arm):
+            hung = arm.process_id
+            os.kill(hung, signal.SIGSTOP)
+            await until(lambda: arm.process_id not in {hung, None})
+            assert not psutil.pid_exists(hung)
+            await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+def test_restarts_have_a_budget_and_a_person_gives_a_new_one(healthy_arm, until):
+    async def run():
+        async with healthy_arm(restart_budget=2) as (_, arm):
+            os.kill(arm.process_id, signal.SIGKILL)
+            await until(lambda: has_cause(arm, ArmCause.LINK_LOST))
+            await arm.ready(15.0)
+            os.kill(arm.process_id, signal.SIGKILL)
+            await until(lambda: has_cause(arm, ArmCause.RESTARTS))
+            assert await cause_of(arm.move_to("accept")) is ArmCause.RESTARTS
+            await arm.upload_again()
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_controller(bench, until):
+    async def run():
+        async with bench() as made, UrArm(made.settings(poses=AWAY, joint_speed_rad_s=0.2)) as arm:
+            await arm.ready(20.0)
+            arm.renew_health(0.5)
+            move = asyncio.create_task(arm.move_to("home"))
+            assert await cause_of(move) is ArmCause.WATCHDOG
+            assert made.controller.script.ended_because == "the RTDE watchdog expired"
+            await until(lambda: not made.controller.body.moving)
+            assert await cause_of(arm.move_to("home")) is ArmCause.WATCHDOG
+            arm.renew_health(60.0)
+            await arm.upload_again()
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_the_process_goes_when_its_caller_is_killed(bench, until):
+    """Killed, not closed: nothing of the caller's own can clean up."""
+    caller = """
+import asyncio, sys
+from station.devices.arm.ur import UrArm
+from station.settings.arm import ArmSettings
+
+async def main():
+    arm = UrArm(ArmSettings(host=sys.argv[1]))
+    await arm.open()
+    await arm.ready(20.0)
+    print(arm.process_id, flush=True)
+    await asyncio.sleep(60)
+
+asyncio.run(main())
+"""
+
+    async def run():
+        async with bench() as made:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, "-c", caller, made.host, stdout=subprocess.PIPE
+            )
+            line = await asyncio.wait_for(process.stdout.readline(), 30)
+            child = psutil.Process(int(line))
+            process.kill()
+            await process.wait()
+            await until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
+
+    asyncio.run(run())
+
+
+def test_an_arm_that_nobody_answers_for_is_a_fault_and_not_an_exception(host):
+    async def run():
+        from station.settings.arm import ArmSettings
+
+        async with UrArm(ArmSettings(host=host)) as arm:
+            assert await cause_of(arm.ready(1.0)) is ArmCause.LINK_LOST
+            state = await arm.state()
+            assert state.age_s is None
+            assert not state.ready
+            assert await cause_of(arm.move_to("home")) is ArmCause.LINK_LOST
+        assert await cause_of(arm.move_to("home")) is ArmCause.CLOSED
+
+    asyncio.run(run())
