@@ -87,7 +87,50 @@ class PaperParameters(Settings):
 
 
 class RobustParameters(Settings):
-    """The station's own method."""
+    """The station's own method; pixels are those of a 640x480 image and scale with the image."""
+
+    contacts: Literal["one", "several"] = setting(
+        "several",
+        title="Contacts",
+        description="`one` keeps the strongest contact only; `several` measures all, as a raspberry's drupelets make.",
+    )
+    gate_ratio: float = setting(
+        3.0,
+        title="Gate",
+        description="Contact is looked for where the gel bends more than this many times the background's median.",
+        ge=1.5,
+        le=20.0,
+    )
+    least_bend: float = setting(
+        0.16,
+        title="Least bending",
+        description="Bending below this is never contact, however quiet the image: light drifts by as much.",
+        unit="grey level/px",
+        ge=0.01,
+        le=10.0,
+    )
+    smallest_contact_px: int = setting(
+        500,
+        title="Smallest contact",
+        description="Contacts below this are dropped; 500 px of 640x480 are about 0.35 mm².",
+        unit="px",
+        ge=0,
+        le=307_200,
+    )
+    edge_stiffness: float = setting(
+        0.1,
+        title="Edge stiffness",
+        description="How smooth the edge is kept: the higher, the more it bridges where the light shows no fall.",
+        ge=0.0,
+        le=2.0,
+    )
+    least_confidence: float = setting(
+        0.5,
+        title="Least confidence",
+        description="Below this confidence an area is flagged.",
+        ge=0.0,
+        le=1.0,
+    )
 
 
 class Segmentation(Settings):

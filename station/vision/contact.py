@@ -14,6 +14,9 @@ Image = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.uint8]
 """A mask, shape (height, width), dtype uint8, 0 or 255."""
 
+FloatImage = npt.NDArray[np.float32]
+"""Signed grey levels or what is derived from them, shape (height, width) or (height, width, 3), dtype float32."""
+
 StageSink = Callable[[str, npt.NDArray[np.uint8]], None]
 """Takes a stage's name and its picture: (height, width, 3) BGR or (height, width) grey, dtype uint8."""
 
@@ -25,6 +28,12 @@ class Flag(StrEnum):
     """Nothing touches the gel: the area is 0."""
     CUT_BY_BORDER = "cut_by_border"
     """The contact reaches the image's border: the area is a lower bound."""
+    SATURATED = "saturated"
+    """Much of the contact is at the end of the grey scale: its edge may lie elsewhere."""
+    LOW_CONFIDENCE = "low_confidence"
+    """The confidence is below what the recipe asks for."""
+    REFERENCE_MISMATCH = "reference_mismatch"
+    """The frame differs from its reference by more than contact and drift explain: take a new reference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +45,12 @@ class Contact:
     centroid_px: tuple[float, float] | None
     """x to the right and y down from the centre of the upper left pixel."""
     flags: frozenset[Flag]
+    confidence: float | None = None
+    """How far the image supports the area, 0 to 1; None where the method does not say."""
+    gate: float | None = None
+    """The gate's statistic over its threshold: contact is looked for from 1 on; None where there is no gate."""
+    drift_levels: float | None = None
+    """Root mean square of the drift against the reference, grey levels; None where it is not measured."""
 
     @property
     def found(self) -> bool:
@@ -62,17 +77,28 @@ class Method(Protocol):
         ...
 
 
-def contact_from_mask(mask: Mask, flags: frozenset[Flag] = frozenset()) -> Contact:
+def contact_from_mask(
+    mask: Mask,
+    flags: frozenset[Flag] = frozenset(),
+    *,
+    confidence: float | None = None,
+    gate: float | None = None,
+    drift_levels: float | None = None,
+) -> Contact:
     """Measure a mask: its area and centroid, with the flags that follow from it added.
 
     Args:
         mask: shape (height, width), dtype uint8, 0 or 255.
         flags: what the method itself has to say.
+        confidence: as in `Contact`.
+        gate: as in `Contact`.
+        drift_levels: as in `Contact`.
     """
+    known = {"confidence": confidence, "gate": gate, "drift_levels": drift_levels}
     inside = mask > 0
     area_px = int(np.count_nonzero(inside))
     if area_px == 0:
-        return Contact(mask, 0, None, flags | {Flag.NO_CONTACT})
+        return Contact(mask, 0, None, flags | {Flag.NO_CONTACT}, **known)
     rows, columns = inside.sum(axis=1), inside.sum(axis=0)
     centroid_px = (
         float(np.arange(columns.size) @ columns) / area_px,
@@ -80,4 +106,4 @@ def contact_from_mask(mask: Mask, flags: frozenset[Flag] = frozenset()) -> Conta
     )
     if rows[0] or rows[-1] or columns[0] or columns[-1]:
         flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, centroid_px, flags)
+    return Contact(mask, area_px, centroid_px, flags, **known)

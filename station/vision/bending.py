@@ -1,0 +1,68 @@
+"""How much the gel bends at each place, as the colours show it, and the gate that asks whether anything touches.
+
+The colour of a place follows the gel's slope there (photometric stereo), so the gradient of the signed change follows
+its curvature. A body pressed into the gel curves it in both directions all over the contact, in its flat dark centre
+too; a smooth drift does so hardly, a streak in one direction only. Taken is twice the geometric mean of the two
+eigenvalues of the local structure tensor, summed over the channels, whose root has the unit grey level per pixel.
+"""
+
+import cv2
+import numpy as np
+
+from station.vision.contact import FloatImage
+from station.vision.drift import weighted_median
+from station.vision.working import resized
+
+_SIGMA_PX = 5.0
+_WINDOW_SIGMA_PX = 7.5
+_NOISE_CAP = 0.35
+_LEAST_BACKGROUND = 0.02
+
+
+def bending(change: FloatImage) -> FloatImage:
+    """The bending at half the change's size.
+
+    Args:
+        change: signed, shape (height, width, 3), grey levels.
+
+    Returns:
+        Shape (half the height, half the width), grey levels per pixel of `change`.
+    """
+    height, width = change.shape[:2]
+    half = resized(change, ((width + 1) // 2, (height + 1) // 2))
+    smooth = cv2.GaussianBlur(half, (0, 0), _SIGMA_PX / 2)
+    slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / 16)
+    slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / 16)
+    ones = np.ones((1, 3), np.float32)
+    xx, yy, xy = (
+        cv2.GaussianBlur(cv2.transform(cv2.multiply(a, b), ones), (0, 0), _WINDOW_SIGMA_PX / 2)
+        for a, b in ((slope_x, slope_x), (slope_y, slope_y), (slope_x, slope_y))
+    )
+    determinant = np.maximum(xx * yy - xy * xy, 0)
+    return np.sqrt(2 * np.sqrt(determinant), dtype=np.float32)
+
+
+def quiet(bend: FloatImage, least_bend: float) -> FloatImage:
+    """A first guess of the background: where it bends no more than the calmest twentieth of the frame, or least.
+
+    Args:
+        bend: of the difference with its drift, grey levels per pixel.
+        least_bend: what surely is not background, grey levels per pixel.
+
+    Returns:
+        Shape of `bend`, 0 to 1.
+    """
+    limit = min(2.8 * float(np.quantile(bend, 0.05)), 1.5 * least_bend) + 0.4 * least_bend
+    return np.maximum(0, 1 - (bend / limit) ** 4) ** 2
+
+
+def noise_of(bend: FloatImage, background: FloatImage) -> float:
+    """The bending that the background shows: its median there, at most what noise has been seen to reach.
+
+    Args:
+        bend: without drift, grey levels per pixel.
+        background: shape of `bend`, 0 to 1.
+    """
+    if background.sum() < _LEAST_BACKGROUND * background.size:
+        return 0.0
+    return min(weighted_median(bend, background), _NOISE_CAP)

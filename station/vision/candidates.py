@@ -1,0 +1,87 @@
+"""Where contacts may lie: regions of strong bending, one for each contact."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from station.vision.clusters import boundaries
+from station.vision.contact import FloatImage, Mask
+
+_FOOT_SHARE = 0.5
+_OWN_SHARE = 0.35
+_LEAST_BEND = 0.01
+_NECKS = (0.4, 0.55, 0.7, 0.8)
+_NECK_DEPTH = 0.12
+
+
+class Candidate(NamedTuple):
+    """A region that may hold one contact."""
+
+    region: Mask
+    """Shape of the bending, 0 or 1."""
+    weight: float
+    """The bending's square, summed: the larger, the more likely the contact meant."""
+
+
+def cluster_levels(bend: FloatImage) -> list[float]:
+    """The bendings that part the frame's clusters, clustered by their logarithm.
+
+    Args:
+        bend: shape (height, width), grey levels per pixel.
+    """
+    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend, _LEAST_BEND)))]
+
+
+def find_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
+    """The regions whose bending rises above the threshold, the heaviest first.
+
+    A region's foot is the highest cluster boundary between half the threshold and the threshold; of each region
+    counts what bends at least about a third as much as its own strongest place, which leaves tails behind.
+
+    Args:
+        bend: shape (height, width), grey levels per pixel.
+        levels: from `cluster_levels`.
+        threshold: the gate's, grey levels per pixel.
+    """
+    foot = max([_FOOT_SHARE * threshold, *(level for level in levels if level <= threshold)])
+    candidates: list[Candidate] = []
+    for whole in _parts((bend > foot).astype(np.uint8)):
+        peak = float(bend[whole > 0].max())
+        if peak <= threshold:
+            continue
+        for part in _parts(whole * (bend > _OWN_SHARE * peak)):
+            if bend[part > 0].max() > threshold:
+                candidates += [Candidate(piece, float((bend[piece > 0] ** 2).sum())) for piece in _split_at_necks(part)]
+    return sorted(candidates, key=lambda candidate: -candidate.weight)
+
+
+def _parts(region: Mask) -> list[Mask]:
+    count, labels = cv2.connectedComponents(region)
+    return [(labels == label).astype(np.uint8) for label in range(1, count)]
+
+
+def _split_at_necks(region: Mask) -> list[Mask]:
+    """The region in the parts that narrow necks join, or as it is; the border is no neck."""
+    depth = _depth(region)
+    deepest = float(depth.max())
+    found: list[Mask] = []
+    for share in _NECKS:
+        cores = [
+            core
+            for core in _parts((depth > share * deepest).astype(np.uint8))
+            if depth[core > 0].max() > (share + _NECK_DEPTH) * deepest
+        ]
+        if len(cores) > max(1, len(found)):
+            found = cores
+    if not found:
+        return [region]
+    apart = [cv2.distanceTransform(1 - core, cv2.DIST_L2, cv2.DIST_MASK_5) for core in found]
+    nearest = np.argmin(np.stack(apart), axis=0)
+    return [region * (nearest == index) for index in range(len(found))]
+
+
+def _depth(region: Mask) -> FloatImage:
+    """Each place's distance from the region's edge, with the region continued beyond the image's border."""
+    framed = cv2.copyMakeBorder(region, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1], np.float32)

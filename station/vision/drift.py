@@ -1,0 +1,153 @@
+"""What a frame differs from its reference by although nothing touches: light, exposure, warmth, streaks.
+
+A drift is described by few numbers per channel: low cosines over the frame (LEDs and exposure drift smoothly), a
+gain on the reference, and a displacement of the reference's own pattern of light, which wanders as the gel warms and
+shears and leaves streaks along the beams' edges. They are fitted by iterated re-weighting (Tukey's biweight), so that
+a contact, which follows none of these, does not pull them; a prior on each keeps them from explaining a contact that
+covers the whole frame.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import FloatImage, Image
+from station.vision.working import SATURATED_LEVEL, resized
+
+SPREAD_CAP_LEVELS = 8.0
+"""A residual beyond this is no sensor's noise: either a contact or a frame that does not belong to the reference."""
+
+_GRID_LONG_SIDE = 32
+_HIGHEST_COSINE = 4
+_PRIOR_COSINE_LEVELS = 10.0
+_PRIOR_GAIN = 0.1
+_PRIOR_DISPLACEMENT_PX = 2.0
+_CELL_NOISE_LEVELS = 2.0
+_LEAST_SPREAD_LEVELS = 0.5
+_ITERATIONS = 5
+_LEAST_BACKGROUND = 0.05
+_TUKEY_WIDTH = 3.0
+_PATTERN_SIGMA_PX = 4.0
+_STREAK_PRIOR_SHARE = 0.1
+_MEDIAN_SIDE_PX = 60
+
+_Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """The drift found in one frame."""
+
+    levels: FloatImage
+    """What to take off the difference, shape (height, width, 3), grey levels."""
+    background: FloatImage
+    """How surely a place is background, shape (height, width), 0 to 1."""
+    spread_levels: float
+    """Median length over the channels of what the background still differs by."""
+    strength_levels: float
+    """Root mean square of the drift over places and channels."""
+
+
+class DriftModel:
+    """The drifts that a reference can undergo, prepared once."""
+
+    def __init__(self, reference: Image) -> None:
+        height, width = reference.shape[:2]
+        cell = max(height, width) / _GRID_LONG_SIDE
+        self._size = (width, height)
+        self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
+        self._half = ((width + 1) // 2, (height + 1) // 2)
+        self._light = np.minimum(reference, SATURATED_LEVEL).astype(np.float32)
+        pattern = cv2.GaussianBlur(self._light, (0, 0), _PATTERN_SIGMA_PX)
+        x = (np.arange(width, dtype=np.float32) + 0.5) / width
+        y = (np.arange(height, dtype=np.float32)[:, None] + 0.5) / height
+        orders = [
+            (i, j)
+            for i in range(_HIGHEST_COSINE + 1)
+            for j in range(_HIGHEST_COSINE + 1)
+            if i * i + j * j <= _HIGHEST_COSINE**2
+        ]
+        cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
+        stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
+        slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
+        self._coarse: list[_Floats] = []
+        self._fine: list[FloatImage] = []
+        for channel in range(3):
+            shapes = cosines + [slope[..., channel] * stretch for slope in slopes for stretch in stretches]
+            gained = resized(self._light[..., channel], self._grid)
+            coarse = [resized(shape, self._grid) for shape in shapes]
+            self._coarse.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
+            self._fine.append(np.stack([resized(shape, self._half).ravel() for shape in shapes]))
+        prior = [
+            _PRIOR_GAIN,
+            *(_PRIOR_COSINE_LEVELS / (1 + i * i + j * j) for i, j in orders),
+            *([_PRIOR_DISPLACEMENT_PX] * (len(slopes) * len(stretches))),
+        ]
+        self._ridge = np.diag((_CELL_NOISE_LEVELS / np.array(prior)) ** 2)
+
+    def fit(self, difference: FloatImage, background: FloatImage) -> Drift:
+        """Find the drift in a frame.
+
+        Args:
+            difference: frame minus reference, shape (height, width, 3), float32, grey levels.
+            background: a first guess of where nothing touches, any size, float32, 0 to 1.
+        """
+        samples = resized(difference, self._grid).reshape(-1, 3).astype(np.float64)
+        weight = resized(background, self._grid).ravel().astype(np.float64)
+        spread = 0.0
+        coefficients: list[_Floats] = []
+        fitted = np.zeros_like(samples)
+        for _ in range(_ITERATIONS):
+            coefficients = [self._solve(channel, samples[:, channel], weight) for channel in range(3)]
+            fitted = np.stack([a @ c for a, c in zip(self._coarse, coefficients, strict=True)], axis=1)
+            residual = np.sqrt(((samples - fitted) ** 2).sum(axis=1))
+            spread = SPREAD_CAP_LEVELS / 2
+            if weight.sum() >= _LEAST_BACKGROUND * weight.size:
+                spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
+            weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2
+        smooth = [c[1:].astype(np.float32) @ f for c, f in zip(coefficients, self._fine, strict=True)]
+        levels = resized(np.stack(smooth, axis=-1).reshape(self._half[1], self._half[0], 3), self._size)
+        levels += self._light * np.array([c[0] for c in coefficients], np.float32)
+        strength = float(np.sqrt(np.mean(fitted**2)))
+        certain = weight.reshape(self._grid[1], self._grid[0]).astype(np.float32)
+        return Drift(levels, resized(certain, self._size), spread, strength)
+
+    def _solve(self, channel: int, samples: _Floats, weight: _Floats) -> _Floats:
+        shapes = self._coarse[channel]
+        weighted = shapes * weight[:, None]
+        return np.asarray(np.linalg.solve(weighted.T @ shapes + self._ridge, weighted.T @ samples), np.float64)
+
+
+def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
+    """The change with each column's and then each row's mean over its background taken off.
+
+    A column of which little is background is corrected by less: its mean is shrunk towards none.
+
+    Args:
+        change: shape (height, width, 3), grey levels.
+        background: shape (height, width), 0 to 1.
+    """
+    for axis in (0, 1):
+        weighted = cv2.reduce(cv2.multiply(change, cv2.merge([background] * 3)), axis, cv2.REDUCE_SUM)
+        support = cv2.reduce(background, axis, cv2.REDUCE_SUM) + _STREAK_PRIOR_SHARE * background.shape[axis]
+        change = change - weighted / support[..., None]
+    return change
+
+
+def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:
+    """The value below which half of the weight lies, 0 where there is no weight; of a field only every few pixels.
+
+    Args:
+        values: any shape.
+        weight: as many as `values`, not negative.
+    """
+    if values.ndim == 2:
+        thin = tuple(slice(None, None, max(1, side // _MEDIAN_SIDE_PX)) for side in values.shape)
+        values, weight = values[thin], weight[thin]
+    order = np.argsort(values, axis=None)
+    cumulated = np.cumsum(weight.ravel()[order])
+    if cumulated[-1] <= 0:
+        return 0.0
+    return float(values.ravel()[order[np.searchsorted(cumulated, cumulated[-1] / 2)]])

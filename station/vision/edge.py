@@ -1,0 +1,147 @@
+"""The contact's edge: where the change falls off most steeply on rays from the contact's middle.
+
+The change's length grows from the flat centre to the contact's edge and falls in the skirt of gel around it; the
+steepest fall marks the edge. On each ray the length is first replaced by the largest further out, so that the fall
+towards the flat centre is none. The steepest closed path over all rays that does not jump is found by dynamic
+programming (Viterbi), twice: about the bending's middle and about the first path's.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import FloatImage, Mask
+
+RAYS = 72
+_STEPS = 64
+_FIRST_SPAN = (0.3, 1.2)
+_SECOND_SPAN = (0.6, 1.4)
+_HIGHEST_HARMONIC = 3.0
+_LONGEST_JUMP = 2
+_STRONG_QUANTILE = 0.75
+_LEAST_STEEPNESS = 0.4
+_SIDE_SHARE = 0.15
+
+_Floats = npt.NDArray[np.float64]
+_ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A closed edge and what the image shows across it."""
+
+    points: _Floats
+    """Shape (72, 2), x and y in pixels, some perhaps beyond the image's border."""
+    seen: npt.NDArray[np.bool_]
+    """Shape (72,): whether the point lies in the image."""
+    drop_levels: _Floats
+    """Shape (72,): by how much the change falls across the edge there, grey levels."""
+
+
+def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
+    """Find the edge of the contact in a region.
+
+    Args:
+        length: length of the change over the channels, shape (height, width), grey levels.
+        region: where the contact lies, skirt and all, shape (height, width), 0 or not.
+        middle: x and y from which the region is star-shaped, px.
+        stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
+    """
+    radius = _smooth(_reach(region, middle))
+    radius, _ = _steepest(length, middle, radius, _FIRST_SPAN, stiffness)
+    points = _points(middle, radius)
+    moments = cv2.moments(points.astype(np.float32))
+    if moments["m00"] > 0:
+        height, width = length.shape
+        centre = (
+            float(np.clip(moments["m10"] / moments["m00"], 0, width - 1)),
+            float(np.clip(moments["m01"] / moments["m00"], 0, height - 1)),
+        )
+        away = points - centre
+        angle = np.arctan2(away[:, 1], away[:, 0])
+        order = np.argsort(angle)
+        again = np.interp(_ANGLES, angle[order], np.hypot(away[:, 0], away[:, 1])[order], period=2 * np.pi)
+        middle, radius = centre, _smooth(again)
+    radius, drop = _steepest(length, middle, radius, _SECOND_SPAN, stiffness)
+    points = _points(middle, radius)
+    height, width = length.shape
+    seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
+    return Edge(points, seen, drop)
+
+
+def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
+    return np.stack([middle[0] + _COSINES * radius, middle[1] + _SINES * radius], axis=1)
+
+
+def _reach(region: Mask, middle: tuple[float, float]) -> _Floats:
+    """How far the region reaches on each ray; beyond the border as far as it does elsewhere."""
+    height, width = region.shape
+    steps = np.arange(1.0, np.hypot(height, width))
+    x, y = middle[0] + _COSINES[:, None] * steps, middle[1] + _SINES[:, None] * steps
+    inside = (x >= -0.5) & (y >= -0.5) & (x <= width - 0.5) & (y <= height - 0.5)
+    values = cv2.remap(
+        region, x.astype(np.float32), y.astype(np.float32), cv2.INTER_NEAREST, None, cv2.BORDER_REPLICATE
+    )
+    reach = np.where((values > 0) & inside, steps, 2.0).max(axis=1)
+    cut = reach >= np.where(inside, steps, 0).max(axis=1) - 1.5
+    if cut.any() and not cut.all():
+        reach[cut] = np.maximum(reach[cut], np.median(reach[~cut]))
+    return reach
+
+
+def _smooth(radius: _Floats) -> _Floats:
+    spectrum = np.fft.rfft(radius)
+    spectrum *= np.exp(-0.5 * (np.arange(spectrum.size) / _HIGHEST_HARMONIC) ** 2)
+    return np.maximum(np.fft.irfft(spectrum, RAYS), 1.0)
+
+
+def _steepest(
+    length: FloatImage, middle: tuple[float, float], radius: _Floats, span: tuple[float, float], stiffness: float
+) -> tuple[_Floats, _Floats]:
+    """The radius of the steepest path and the drop across it, per ray."""
+    height, width = length.shape
+    shares = np.linspace(*span, _STEPS)
+    away = radius[:, None] * shares
+    x, y = middle[0] + _COSINES[:, None] * away, middle[1] + _SINES[:, None] * away
+    profile = cv2.remap(
+        length, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
+    )
+    profile = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
+    fall = -np.gradient(profile, axis=1)
+    fall[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
+    steepest = fall.max(axis=1)
+    strong = np.quantile(steepest[steepest > 0], _STRONG_QUANTILE) if (steepest > 0).any() else 1.0
+    reward = np.maximum(np.clip(fall / strong, 0, 1) - _LEAST_STEEPNESS, 0) / (1 - _LEAST_STEEPNESS)
+    path = _closed_path(-reward, stiffness)
+    side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
+    rays = np.arange(RAYS)
+    drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, _STEPS - 1)]
+    return radius * shares[path], drop.astype(np.float64)
+
+
+def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
+    """The cheapest path around: run over one and three quarter turns, of which the middle one is taken."""
+    rays, steps = cost.shape
+    turns = np.concatenate([cost, cost[: 3 * rays // 4]])
+    jumps = np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1)
+    price = (stiffness * jumps**2)[:, None]
+    padded = np.full(steps + 2 * _LONGEST_JUMP, np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, steps)
+    inner = padded[_LONGEST_JUMP:-_LONGEST_JUMP]
+    inner[:] = turns[0]
+    came_from = np.empty(turns.shape, np.intp)
+    columns = np.arange(steps)
+    for index in range(1, len(turns)):
+        candidates = windows + price
+        best = candidates.argmin(axis=0)
+        came_from[index] = columns + best - _LONGEST_JUMP
+        inner[:] = candidates[best, columns] + turns[index]
+    path = np.empty(len(turns), np.intp)
+    path[-1] = inner.argmin()
+    for index in range(len(turns) - 1, 0, -1):
+        path[index - 1] = came_from[index, path[index]]
+    start = 3 * rays // 8
+    return np.roll(path[start : start + rays], start)

@@ -1,0 +1,65 @@
+"""The robust method's stages as pictures for a person."""
+
+import cv2
+import numpy as np
+
+from station.vision.contact import FloatImage, Image, Mask, StageSink
+from station.vision.edge import Edge
+
+_GREY = 128.0
+_AMPLIFICATION = 4.0
+_BLUR_PX = 2.0
+_SUBPIXEL_BITS = 4
+
+
+def emit(
+    on_stage: StageSink,
+    names: tuple[str, ...],
+    *,
+    difference: FloatImage,
+    change: FloatImage,
+    bend: FloatImage,
+    levels: list[float],
+    threshold: float,
+    edges: list[Edge],
+    mask: Mask,
+) -> None:
+    """Hand every stage's picture on, all of the mask's size.
+
+    Args:
+        on_stage: takes name and picture.
+        names: seven, in the order of the stages.
+        difference: frame minus reference, shape (height, width, 3), grey levels.
+        change: the same without drift and streaks.
+        bend: shape (height, width), grey levels per pixel.
+        levels: the boundaries of the bending's clusters.
+        threshold: the gate's.
+        edges: of the contacts found, in pixels of `change`.
+        mask: 0 or 255, at the input's size.
+    """
+    denoised = np.asarray(cv2.GaussianBlur(change, (0, 0), _BLUR_PX), np.float32)
+    outlined = _signed(denoised, _AMPLIFICATION)
+    for edge in edges:
+        points = np.rint(edge.points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        cv2.polylines(
+            outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
+        )
+    strength = np.clip(bend * (255 / max(float(bend.max()), 2 * threshold)), 0, 255).astype(np.uint8)
+    clusters = (np.digitize(bend, levels) * (255 // (len(levels) + 1))).astype(np.uint8)
+    pictures = (
+        _signed(difference, 1),
+        _signed(change, _AMPLIFICATION),
+        _signed(denoised, _AMPLIFICATION),
+        cv2.applyColorMap(strength, cv2.COLORMAP_VIRIDIS),
+        clusters,
+        outlined,
+    )
+    size = (mask.shape[1], mask.shape[0])
+    for name, picture in zip(names, pictures, strict=False):
+        on_stage(name, np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST), np.uint8))
+    on_stage(names[-1], mask)
+
+
+def _signed(change: FloatImage, amplification: float) -> Image:
+    """No change as middle grey."""
+    return np.clip(_GREY + amplification * change, 0, 255).astype(np.uint8)

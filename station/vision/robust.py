@@ -1,0 +1,198 @@
+"""The station's own method: the contact's edge, under drift, streaks and weak light.
+
+Stages: signed difference to the reference; drift and streaks taken off; bending and the gate; clusters of the bending,
+as many as the data ask for; for each region the edge where the change falls off most steeply. `docs/robust.md`
+explains each with its reasons.
+"""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from station.settings.segmentation import RobustParameters
+from station.vision import pictures
+from station.vision.bending import bending, noise_of, quiet
+from station.vision.candidates import Candidate, cluster_levels, find_candidates
+from station.vision.confidence import edge_confidence
+from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
+from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, weighted_median, without_streaks
+from station.vision.edge import Edge, find_edge
+from station.vision.working import SATURATED_LEVEL, resized, working_image
+
+PRINTED_LONG_SIDE_PX = 640
+PRINTED_IMAGE_PX = 640 * 480
+"""The image for which parameters in pixels are given; they scale with the image."""
+
+_BLUR_SHARE = 0.045
+_BLUR_PX = (1.0, 3.5)
+_SUBPIXEL_BITS = 4
+_SATURATED_SHARE = 0.05
+_FOREIGN_DRIFT_SHARE = 0.35
+_ONE_SIDED = 0.6
+
+
+class RobustMethod:
+    """The robust measurement against one or several reference images."""
+
+    stages = ("difference", "amplified", "denoised", "bending", "clustered", "edge", "segmented")
+
+    def __init__(self, references: Sequence[Image], parameters: RobustParameters) -> None:
+        """Prepare the reference, which is the median of the references.
+
+        Args:
+            references: one or more images with nothing touching, each (height, width, 3), dtype uint8, BGR.
+            parameters: the recipe's.
+
+        Raises:
+            ValueError: there is no reference, or one is not a colour image of the others' size.
+        """
+        if not references:
+            raise ValueError("no reference image: at least one frame with nothing touching the gel is needed")
+        shape = references[0].shape
+        if any(r.shape != shape or r.dtype != np.uint8 or r.ndim != 3 or r.shape[2] != 3 for r in references):
+            raise ValueError(f"references must be uint8 images (height, width, 3) of one size, not {shape} and others")
+        self._shape = shape
+        self._parameters = parameters
+        reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
+        self._reference = working_image(reference)
+        self._light = np.minimum(self._reference, SATURATED_LEVEL).astype(np.float32)
+        self._drift = DriftModel(self._reference)
+        self._blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
+        self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+
+    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+        """Find the contact in an image.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8, BGR, of the references' size.
+            on_stage: gets the pictures named in `stages`.
+
+        Raises:
+            ValueError: the image's shape or dtype is not the references'.
+        """
+        if image.shape != self._shape or image.dtype != np.uint8:
+            raise ValueError(
+                f"image {image.shape} {image.dtype} must be uint8 and of the reference's shape {self._shape}"
+            )
+        work = working_image(image)
+        difference = np.minimum(work, SATURATED_LEVEL) - self._light
+        drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
+        change = difference - drift.levels
+        change[self._blind] = 0
+        change = without_streaks(change, drift.background)
+        bend = bending(change)
+        size = (bend.shape[1], bend.shape[0])
+        noise = noise_of(bend, resized(drift.background, size))
+        threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
+        levels = cluster_levels(bend)
+        candidates = find_candidates(bend, levels, threshold)
+        found = self._edges(change, bend, candidates, drift.background)
+        mask = self._mask([edge for edge, _ in found])
+        if on_stage:
+            edges = [edge for edge, _ in found]
+            pictures.emit(
+                on_stage,
+                self.stages,
+                difference=difference,
+                change=change,
+                bend=bend,
+                levels=levels,
+                threshold=threshold,
+                edges=edges,
+                mask=mask,
+            )
+        flags, confidence = self._judge(work, drift, mask, found)
+        return contact_from_mask(
+            mask,
+            flags,
+            confidence=confidence,
+            gate=float(bend.max()) / threshold,
+            drift_levels=drift.strength_levels,
+        )
+
+    def _edges(
+        self, change: FloatImage, bend: FloatImage, candidates: list[Candidate], background: FloatImage
+    ) -> list[tuple[Edge, float]]:
+        """The edges that the image supports, each with its confidence."""
+        found: list[tuple[Edge, float]] = []
+        height, width = change.shape[:2]
+        smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
+        for region, _ in candidates:
+            if found and self._parameters.contacts == "one":
+                break
+            middle = _middle(bend, region, (width, height))
+            full = cv2.resize(region, (width, height), interpolation=cv2.INTER_NEAREST)
+            radius = float(np.sqrt(full.sum() / np.pi))
+            sigma = float(np.clip(_BLUR_SHARE * radius, *_BLUR_PX))
+            denoised = np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+            length = _length(denoised)
+            edge = find_edge(length, np.asarray(full, np.uint8), middle, self._parameters.edge_stiffness)
+            inside = _filled(edge, (height, width), 1.0, 1.0) > 0
+            if np.count_nonzero(inside) < smallest_px or _one_sided(denoised[inside], edge):
+                continue
+            confidence = edge_confidence(edge, weighted_median(length, background))
+            if confidence > 0:
+                found.append((edge, confidence))
+        return found
+
+    def _mask(self, edges: list[Edge]) -> Mask:
+        height, width = self._shape[:2]
+        x_scale, y_scale = width / self._reference.shape[1], height / self._reference.shape[0]
+        mask = np.zeros((height, width), np.uint8)
+        for edge in edges:
+            mask |= _filled(edge, (height, width), x_scale, y_scale)
+        return mask
+
+    def _judge(
+        self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]]
+    ) -> tuple[frozenset[Flag], float]:
+        """The flags, and the confidence of the whole: the areas' confidences, weakest first."""
+        flags: set[Flag] = set()
+        light = float(np.sqrt(np.mean(self._light**2)))
+        if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
+            flags.add(Flag.REFERENCE_MISMATCH)
+        inside = cv2.resize(mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
+        looked_at = work[inside] if inside.any() else work.reshape(-1, 3)
+        if np.mean((looked_at >= SATURATED_LEVEL).any(axis=1)) > _SATURATED_SHARE:
+            flags.add(Flag.SATURATED)
+        confidence = min((confidence for _, confidence in found), default=1.0)
+        if Flag.REFERENCE_MISMATCH in flags:
+            confidence *= 0.5
+        if confidence < self._parameters.least_confidence:
+            flags.add(Flag.LOW_CONFIDENCE)
+        return frozenset(flags), confidence
+
+
+def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[float, float]:
+    """Where a region bends most, in pixels of an image of the given width and height."""
+    moments = cv2.moments((bend * region) ** 4)
+    x_scale, y_scale = size[0] / bend.shape[1], size[1] / bend.shape[0]
+    return (
+        (moments["m10"] / moments["m00"] + 0.5) * x_scale - 0.5,
+        (moments["m01"] / moments["m00"] + 0.5) * y_scale - 0.5,
+    )
+
+
+def _length(change: FloatImage) -> FloatImage:
+    squares = cv2.transform(cv2.multiply(change, change), np.ones((1, 3), np.float32))
+    return np.asarray(cv2.sqrt(squares), np.float32)
+
+
+def _filled(edge: Edge, shape: tuple[int, int], x_scale: float, y_scale: float) -> Mask:
+    points = (edge.points + 0.5) * (x_scale, y_scale) - 0.5
+    mask = np.zeros(shape, np.uint8)
+    fixed = np.rint(points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, _SUBPIXEL_BITS)
+    return mask
+
+
+def _one_sided(change: FloatImage, edge: Edge) -> bool:
+    """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
+
+    Not asked of a contact that the border cuts: its other slopes may lie outside.
+    """
+    if not edge.seen.all():
+        return False
+    mean = change.mean(axis=0)
+    return float(mean @ mean) > _ONE_SIDED * float(np.mean((change**2).sum(axis=1)))

@@ -1,0 +1,40 @@
+"""The size at which the robust method works, so that its parameters mean the same for every camera mode."""
+
+import cv2
+import numpy as np
+
+from station.vision.contact import FloatImage, Image
+
+LONG_SIDE_PX = 320
+"""Long side of a working image; a smaller image is taken as it is."""
+
+SATURATED_LEVEL = 248
+"""Grey level from which a channel is taken as saturated: the sensor's own processing stops short of 255."""
+
+
+def working_image(image: Image) -> Image:
+    """The image averaged down to the working size.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+    """
+    height, width = image.shape[:2]
+    shrink = LONG_SIDE_PX / max(height, width)
+    if shrink >= 1:
+        return image
+    size = (max(1, round(width * shrink)), max(1, round(height * shrink)))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
+    """A field at another size: averaged when it shrinks, linear when it grows.
+
+    Args:
+        field: shape (height, width) or (height, width, channels), float32.
+        size: width and height.
+    """
+    if size == (field.shape[1], field.shape[0]):
+        return field
+    shrinking = size[0] < field.shape[1]
+    method = cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(np.ascontiguousarray(field, np.float32), size, interpolation=method), np.float32)
