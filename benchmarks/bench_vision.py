@@ -9,15 +9,12 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-import cv2
 import numpy as np
 from skimage.restoration import denoise_nl_means
 from sklearn.cluster import KMeans
-from threadpoolctl import threadpool_limits
 
-from station.settings.segmentation import PaperParameters, RobustParameters
+from station.settings.segmentation import PaperParameters
 from station.vision.paper import PaperMethod, amplified_difference, brightest_cluster, clean, denoise
-from station.vision.robust import RobustMethod
 
 ROOT = Path(__file__).resolve().parents[1]
 RUNS = 15

@@ -134,7 +134,14 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
     if item.stages:
         gathered.stage_names = tuple(item.stages)
         gathered.stages.append((name, [thumbnail(stage, _STAGE_PX) for stage in item.stages.values()]))
-        gathered.qualities.append((name, denoising_quality(item.stages["difference"], item.stages["denoised"])))
+        gathered.qualities.append((name, _quality(item)))
+
+
+def _quality(item: Measured) -> DenoisingQuality:
+    """Compare the denoised stage with the one before it."""
+    names = list(item.stages)
+    denoised = names.index("denoised")
+    return denoising_quality(item.stages[names[denoised - 1]], item.stages["denoised"])
 
 
 def _write_summaries(

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from station.errors import BadInputError
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Image, Method
 from station.vision.paper import PaperMethod
+from station.vision.robust import RobustMethod
 
 
 def make_method(references: Sequence[Image], segmentation: Segmentation) -> Method:
@@ -26,7 +26,7 @@ def make_method(references: Sequence[Image], segmentation: Segmentation) -> Meth
         case "paper":
             return PaperMethod(median_image(references), segmentation.paper)
         case "robust":
-            raise BadInputError("the method robust is not built yet; choose --method paper")
+            return RobustMethod(references, segmentation.robust)
 
 
 def median_image(images: Sequence[Image]) -> Image:

@@ -58,7 +58,9 @@ def from_words(words: str) -> ArmFault | None:
     if "remote control" in lowered:
         return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
     if "already in use" in lowered:
-        return ArmFault(ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers")
+        return ArmFault(
+            ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers"
+        )
     if "could not connect" in lowered or "timeout connecting" in lowered:
         return ArmFault(ArmCause.LINK_LOST, f"ur-rtde could not connect: {words}")
     return None

@@ -231,7 +231,9 @@ class ArmLink:
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
         outcome = await self._process.ask(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
-            raise from_words(outcome.words) or ArmFault(ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}")
+            raise from_words(outcome.words) or ArmFault(
+                ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}"
+            )
         return self._process
 
     async def _command(self, process: ArmProcess) -> None:

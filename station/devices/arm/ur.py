@@ -169,7 +169,9 @@ class UrArm:
         if outcome.words or (await self._link.snapshot()).runtime_state != 2:
             raise await self._link.explain(outcome.words)
         if not outcome.done:
-            raise ArmFault(ArmCause.UNREACHABLE, f"the controller says that {pose} is out of reach or its safety limits")
+            raise ArmFault(
+                ArmCause.UNREACHABLE, f"the controller says that {pose} is out of reach or its safety limits"
+            )
         self._reachable.add(known)
 
     async def _begin(self, pose: PoseName, *, straight: bool) -> None:

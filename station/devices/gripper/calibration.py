@@ -66,7 +66,7 @@ def speed_setting(speed_mm_s: float) -> int:
     return round((speed_mm_s - SLOWEST_MM_S) / (FASTEST_MM_S - SLOWEST_MM_S) * _FULL_SCALE)
 
 
-def force_setting(force_N: float) -> int:  # noqa: N803 (the unit's symbol is a capital)
+def force_setting(force_N: float) -> int:
     """The force setting, 0 to 255, rounded down: never more force than asked for.
 
     Raises:

@@ -82,7 +82,7 @@ class Gripper(Protocol):
         """Let go: open fully. Idempotent."""
         ...
 
-    async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:  # noqa: N803
+    async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:
         """Move until the width is reached or something is felt. Idempotent.
 
         Args:

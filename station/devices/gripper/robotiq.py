@@ -100,7 +100,7 @@ class RobotiqGripper:
         """Let go: open fully. Idempotent. Raises as `move_to_width`."""
         return await self.move_to_width(self.max_width_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
 
-    async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:  # noqa: N803
+    async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:
         """Move until the width is reached or something is felt. Idempotent.
 
         A move that fails or is cancelled stops the fingers where the wire still allows it.

@@ -1,0 +1,174 @@
+"""The whole twin: arm, gripper, sensor and fruit on one loop, wired to each other as on the real cell."""
+
+import asyncio
+import signal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from station.errors import BadInputError
+from station.settings.arm import ArmPoses
+from station.settings.camera import TwinCameraSettings
+from station.twin.clock import Clock, SteadyClock
+from station.twin.console import ConsoleServer
+from station.twin.digit.sensor import DigitSensor
+from station.twin.digit.server import DigitCameraServer, digit_faults
+from station.twin.faults import FaultBoard
+from station.twin.fruit import Kind, draw_fruit
+from station.twin.robotiq.faults import gripper_faults
+from station.twin.robotiq.modbus import RtuOverTcpServer
+from station.twin.robotiq.model import RobotiqGripper
+from station.twin.robotiq.urcap import UrcapServer
+from station.twin.ur.controller import UrController, arm_faults
+from station.twin.ur.kinematics import forward
+from station.twin.world import World
+
+CONSOLE_PORT = 49211
+_AT_NEST_MM = 10.0
+_CAMERA = TwinCameraSettings()
+
+
+class _Server(Protocol):
+    async def start(self) -> None: ...
+
+    async def stop(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class TwinOptions:
+    """What the twin is, and where it listens; the UR controller's ports are those of a real one."""
+
+    fruit: Kind = Kind.STRAWBERRY
+    seed: int = 1
+    """Of the fruit, and of the sensor's noise and drift."""
+    bench: bool = False
+    """No arm: the fingers are always where the fruit lies."""
+    arm_host: str = "127.0.0.2"
+    """The arm's address, and the gripper's, which is reached through the arm."""
+    camera_host: str = _CAMERA.host
+    camera_port: int = _CAMERA.port
+    console_host: str = "127.0.0.1"
+    console_port: int = CONSOLE_PORT
+    polyscope: Literal["5.22", "5.25"] = "5.22"
+    poses: ArmPoses = ArmPoses()
+
+
+class Twin:
+    """The simulated cell."""
+
+    def __init__(self, options: TwinOptions, clock: Clock | None = None) -> None:
+        """Wire the cell; nothing listens before `start`.
+
+        Args:
+            options: what it is and where it listens.
+            clock: the twin's time; the machine's where left out.
+        """
+        clock = clock or SteadyClock()
+        self.boards: dict[str, FaultBoard] = {"camera": digit_faults(), "gripper": gripper_faults()}
+        self.world = World(clock)
+        self.gripper = RobotiqGripper(clock, self.boards["gripper"], self.world)
+        self.world.opening_mm = lambda: self.gripper.opening_mm(clock.now_s())
+        self.camera = DigitCameraServer(
+            self.world,
+            DigitSensor(options.seed),
+            clock,
+            self.boards["camera"],
+            host=options.camera_host,
+            port=options.camera_port,
+        )
+        self._servers: list[_Server] = [
+            self.camera,
+            UrcapServer(self.gripper, options.arm_host),
+            RtuOverTcpServer(self.gripper, options.arm_host),
+        ]
+        if not options.bench:
+            self.boards["arm"] = arm_faults()
+            arm = UrController(options.arm_host, clock, self.boards["arm"], polyscope=options.polyscope)
+            self.world.arm_at_nest = _near_nest(arm, options.poses)
+            self._servers.append(arm)
+        self.console = ConsoleServer(
+            self.boards,
+            {"fruit": self._lay, "remove": self._remove, "state": self._state},
+            options.console_host,
+            options.console_port,
+        )
+        self._servers.append(self.console)
+        self._started: list[_Server] = []
+        self._lay({"kind": options.fruit, "seed": options.seed})
+
+    async def start(self) -> None:
+        """Listen on every port.
+
+        Raises:
+            BadInputError: an address is in use or not this machine's; nothing listens then.
+        """
+        for server in self._servers:
+            try:
+                await server.start()
+            except OSError as error:
+                await self.stop()
+                raise BadInputError(
+                    f"the twin cannot listen: {error}; is another twin running? Stop it, or choose other addresses"
+                ) from error
+            self._started.append(server)
+
+    async def stop(self) -> None:
+        """Close every port and connection."""
+        while self._started:
+            await self._started.pop().stop()
+
+    def _lay(self, request: Mapping[str, Any]) -> str:
+        """Lay a fruit into the nest in the place of what was there."""
+        kind, seed = request.get("kind"), request.get("seed", 1)
+        if kind not in list(Kind):
+            raise ValueError(f"kind: expected one of {', '.join(Kind)}, found {kind!r}")
+        if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:
+            raise ValueError(f"seed: expected a whole number from 0 to {2**31 - 1}, found {seed!r}")
+        bruised = request.get("bruised", False)
+        if not isinstance(bruised, bool):
+            raise ValueError(f"bruised: expected true or false, found {bruised!r}")
+        fruit = draw_fruit(Kind(kind), seed, bruised=bruised)
+        self.world.place(fruit)
+        return f"{kind} {seed}, {fruit.width_mm:.1f} mm wide"
+
+    def _remove(self, _request: Mapping[str, Any]) -> None:
+        self.world.remove()
+
+    def _state(self, _request: Mapping[str, Any]) -> dict[str, Any]:
+        squeezed = self.world.squeezed()
+        return {
+            "fruit_width_mm": self.world.fruit.width_mm if self.world.fruit else None,
+            "width_mm": self.world.width_mm(self.world.opening_mm()),
+            "closing_mm": max(0.0, squeezed.closing_mm),
+            "force_n": squeezed.force_n,
+        }
+
+
+def _near_nest(arm: UrController, poses: ArmPoses) -> Callable[[], bool]:
+    nest_m = forward(poses.nest)[:3, 3]
+    return lambda: bool(np.linalg.norm(1000 * (np.asarray(arm.tool_position_m) - nest_m)) < _AT_NEST_MM)
+
+
+async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
+    """Run the twin until the process is told to end by SIGINT or SIGTERM.
+
+    Args:
+        options: what it is and where it listens.
+        on_started: called once every port is open.
+
+    Raises:
+        BadInputError: an address cannot be had.
+    """
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    twin = Twin(options)
+    await twin.start()
+    try:
+        on_started(twin)
+        await ended.wait()
+    finally:
+        await twin.stop()
