@@ -1,0 +1,257 @@
+"""The DIGIT on USB, through OpenCV's V4L2 capture. Unverified on hardware; its pure parts are tested.
+
+Sources: the sensor's published USB descriptor (vendor 2833, product 0209) and its public driver's behaviour: VGA at
+30 frames/s in YUYV, LEDs of 4 bits a colour packed into the UVC zoom control (firmware 2.00 and newer).
+"""
+
+import asyncio
+import contextlib
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import cv2
+import numpy as np
+
+from station.devices.camera.feed import FrameFeed
+from station.devices.camera.health import FrameHealth
+from station.devices.camera.interface import (
+    CameraDescription,
+    CameraError,
+    Frame,
+    Image,
+    Leds,
+    NoCameraError,
+    NoFrameError,
+)
+from station.settings.camera import CameraSettings
+
+SYSFS = Path("/sys/class/video4linux")
+_VENDOR, _PRODUCT = "2833", "0209"
+_MODE = (640, 480, 30.0)
+_RETRY_S = 0.5
+_STOP_DEADLINE_S = 12.0
+"""Longer than the 10 s for which OpenCV's V4L2 select may wait."""
+
+
+class Capture(Protocol):
+    """What is used of `cv2.VideoCapture`."""
+
+    def isOpened(self) -> bool: ...  # noqa: N802, D102 (OpenCV's name)
+    def set(self, propId: int, value: float, /) -> bool: ...  # noqa: N803, D102
+    def get(self, propId: int, /) -> float: ...  # noqa: N803, D102
+    def read(self) -> tuple[bool, Image]: ...  # noqa: D102
+    def release(self) -> None: ...  # noqa: D102
+
+
+class DigitDevice(NamedTuple):
+    """A DIGIT that the kernel knows."""
+
+    serial: str
+    node: str
+    """Such as /dev/video0."""
+
+
+def find_digits(sysfs: Path = SYSFS) -> list[DigitDevice]:
+    """The DIGITs that are plugged in, in the order of their nodes.
+
+    Args:
+        sysfs: the kernel's folder of video devices.
+    """
+    found = []
+    for entry in sorted(sysfs.glob("video*"), key=lambda path: (len(path.name), path.name)):
+        usb = (entry / "device").resolve().parent
+        identity = [_text(usb / name) for name in ("idVendor", "idProduct", "serial")]
+        # Index 0 is the node that captures; a UVC device's others carry metadata.
+        if identity[:2] == [_VENDOR, _PRODUCT] and _text(entry / "index") in {"0", ""}:
+            found.append(DigitDevice(identity[2], f"/dev/{entry.name}"))
+    return found
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii", errors="replace").strip()
+    except OSError:
+        return ""
+
+
+def packed_leds(leds: Leds) -> int:
+    """The value of the zoom control for a light: red in bits 8 to 11, green in 4 to 7, blue in 0 to 3.
+
+    Args:
+        leds: brightness of each colour.
+
+    Raises:
+        ValueError: a brightness is not from 0 to 15.
+    """
+    for colour, level in (("red", leds.red), ("green", leds.green), ("blue", leds.blue)):
+        if not 0 <= level <= 15:
+            raise ValueError(f"{colour} is {level}; expected 0 to 15")
+    return leds.red << 8 | leds.green << 4 | leds.blue
+
+
+def to_portrait(image: Image) -> Image:
+    """The sensor's landscape picture as the station sees it: transposed, then flipped upside down.
+
+    Args:
+        image: shape (480, 640, 3), dtype uint8.
+
+    Returns:
+        Shape (640, 480, 3).
+    """
+    return np.asarray(cv2.flip(cv2.transpose(image), 0), np.uint8)
+
+
+def set_mode(capture: Capture, serial: str) -> None:
+    """Ask for VGA at 30 frames/s in YUYV and read back what was given.
+
+    Args:
+        capture: an open capture.
+        serial: for the message.
+
+    Raises:
+        CameraError: another mode was given.
+    """
+    width, height, frames_per_s = _MODE
+    capture.set(cv2.CAP_PROP_FOURCC, float(cv2.VideoWriter.fourcc(*"YUYV")))
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
+    capture.set(cv2.CAP_PROP_FPS, frames_per_s)
+    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+    properties = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FPS)
+    given = tuple(capture.get(one) for one in properties)
+    if given != _MODE:
+        raise CameraError(
+            f"DIGIT {serial}: asked for {width}x{height} at {frames_per_s:g} frames/s, the driver gave "
+            f"{given[0]:g}x{given[1]:g} at {given[2]:g}; plug it into a USB port of its own and try again"
+        )
+
+
+def open_v4l2(node: str) -> Capture:
+    """Open a node with OpenCV.
+
+    Args:
+        node: such as /dev/video0.
+    """
+    return cv2.VideoCapture(node, cv2.CAP_V4L2)  # pyright: ignore[reportReturnType] (OpenCV's stub has MatLike)
+
+
+class DigitCamera:
+    """The driver `digit`: a thread reads frame after frame, so that the kernel's buffer never holds an old one.
+
+    A sensor that is lost is looked for by its serial number until the camera is closed.
+
+    Args:
+        settings: the camera's settings.
+        sysfs: where to look for sensors.
+        opener: opens a node.
+    """
+
+    def __init__(
+        self, settings: CameraSettings, sysfs: Path = SYSFS, opener: Callable[[str], Capture] = open_v4l2
+    ) -> None:
+        self._settings, self._sysfs, self._opener = settings, sysfs, opener
+        self._serial = settings.digit.serial
+        width, height = _MODE[1], _MODE[0]
+        self._feed = FrameFeed(f"DIGIT {self._serial}", FrameHealth(settings.oldest_s, (height, width)))
+        self._leds = Leds(settings.digit.red, settings.digit.green, settings.digit.blue)
+        self._leds_wanted = threading.Event()
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def description(self) -> CameraDescription:
+        """Which camera it is; portrait."""
+        return CameraDescription(f"DIGIT {self._serial}", _MODE[1], _MODE[0], self._settings.mm_per_px, _MODE[2])
+
+    async def open(self) -> None:
+        """Find the sensor and wait for its first frame. Idempotent.
+
+        Raises:
+            NoCameraError: no such sensor is plugged in, or it gives no frame within the settings' deadline.
+        """
+        if self._thread is None:
+            self._stopping.clear()
+            self._leds_wanted.set()
+            loop = asyncio.get_running_loop()
+            self._thread = threading.Thread(target=self._capture_for_ever, args=(loop,), name="digit", daemon=True)
+            self._thread.start()
+        try:
+            await self._feed.newer(-math.inf, self._settings.open_deadline_s)
+        except NoFrameError as error:
+            await self.close()
+            raise NoCameraError(
+                f"DIGIT {self._serial}: no frame within {self._settings.open_deadline_s} s; {self._feed.trouble}"
+            ) from error
+
+    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
+        """See `Camera.frame`.
+
+        Args:
+            newer_than_s: monotonic time that the capture must come after.
+            deadline_s: longest wait, in seconds.
+
+        Raises:
+            NoFrameError: no such frame came in time.
+        """
+        return await self._feed.newer(newer_than_s, deadline_s)
+
+    async def set_leds(self, leds: Leds) -> None:
+        """Set the light before the next frame. Idempotent.
+
+        Args:
+            leds: brightness of each colour.
+
+        Raises:
+            ValueError: a brightness is not from 0 to 15.
+        """
+        packed_leds(leds)
+        self._leds = leds
+        self._leds_wanted.set()
+
+    async def close(self) -> None:
+        """Let the sensor go. Idempotent."""
+        thread, self._thread = self._thread, None
+        if thread:
+            self._stopping.set()
+            await asyncio.to_thread(thread.join, _STOP_DEADLINE_S)
+
+    def _capture_for_ever(self, loop: asyncio.AbstractEventLoop) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._capture(loop)
+            except CameraError as error:
+                self._feed.trouble = str(error)
+            self._stopping.wait(_RETRY_S)
+
+    def _capture(self, loop: asyncio.AbstractEventLoop) -> None:
+        devices = find_digits(self._sysfs)
+        node = next((device.node for device in devices if device.serial == self._serial), None)
+        if node is None:
+            others = ", ".join(device.serial for device in devices) or "none"
+            raise NoCameraError(
+                f"no DIGIT {self._serial} is plugged in (found: {others}); check cable and serial number"
+            )
+        capture = self._opener(node)
+        try:
+            if not capture.isOpened():
+                raise NoCameraError(
+                    f"{node} cannot be opened; is another program using it, is the user in group video?"
+                )
+            set_mode(capture, self._serial)
+            self._leds_wanted.set()
+            while not self._stopping.is_set():
+                if self._leds_wanted.is_set():
+                    self._leds_wanted.clear()
+                    capture.set(cv2.CAP_PROP_ZOOM, packed_leds(self._leds))
+                read, image = capture.read()
+                captured_s = time.monotonic()
+                if not read or image is None:
+                    raise NoCameraError(f"{node} stopped giving frames; it is looked for again")
+                with contextlib.suppress(RuntimeError):  # the loop may have closed meanwhile
+                    loop.call_soon_threadsafe(self._feed.publish, to_portrait(image), captured_s)
+        finally:
+            capture.release()

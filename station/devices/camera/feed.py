@@ -1,0 +1,69 @@
+"""Where a driver puts its frames and the station takes the newest: nothing queues up, nothing old is given."""
+
+import asyncio
+import time
+
+from station.devices.camera.health import FrameHealth
+from station.devices.camera.interface import Frame, FrameFault, Image, NoFrameError, content_hash
+
+
+class FrameFeed:
+    """The newest frame of one camera, judged only when somebody takes it.
+
+    Args:
+        name: the camera's, for messages.
+        health: judges the frames.
+    """
+
+    def __init__(self, name: str, health: FrameHealth) -> None:
+        self._name, self._health = name, health
+        self._changed = asyncio.Event()
+        self._image: Image | None = None
+        self._before: Image | None = None
+        self._captured_s = 0.0
+        self._width_mm: float | None = None
+        self._sequence = 0
+        self._given: Frame | None = None
+        self.trouble = "it has sent nothing yet"
+        """What the driver last had to struggle with; said where no frame comes."""
+
+    def publish(self, image: Image, captured_s: float, width_mm: float | None = None) -> None:
+        """Put a new frame; only from the event loop's thread.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8; not changed from now on.
+            captured_s: monotonic time of its capture.
+            width_mm: the gripper's width recorded with it.
+        """
+        self._before, self._image = self._image, image
+        self._captured_s, self._width_mm = captured_s, width_mm
+        self._sequence += 1
+        self._changed.set()
+
+    async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:
+        """The newest frame, once there is one captured after a time.
+
+        Args:
+            newer_than_s: monotonic time.
+            deadline_s: longest wait, in seconds.
+
+        Raises:
+            NoFrameError: none came in time.
+        """
+        try:
+            async with asyncio.timeout(deadline_s):
+                while (image := self._image) is None or self._captured_s <= newer_than_s:
+                    self._changed.clear()
+                    await self._changed.wait()
+        except TimeoutError:
+            raise NoFrameError(
+                f"camera {self._name}: no frame newer than asked for within {deadline_s} s; {self.trouble}. "
+                "Check its cable and its light, then `station devices check`"
+            ) from None
+        if self._given is None or self._given.sequence != self._sequence:
+            self._given = self._judged(image)
+        return self._given
+
+    def _judged(self, image: Image) -> Frame:
+        faults: frozenset[FrameFault] = self._health.judge(image, self._before, time.monotonic() - self._captured_s)
+        return Frame(image, self._sequence, self._captured_s, content_hash(image), faults, self._width_mm)

@@ -1,0 +1,101 @@
+"""Whether a frame is fit to be measured, told from its pixels, its time and the frame before it."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.devices.camera.interface import FrameFault, Image
+
+_BLACK_LEVEL = 16
+_SATURATED_LEVEL = 250
+_SATURATED_SHARE = 0.2
+_BLOCKS = 16
+_SEAM_HALF_PX = 2
+_SEAM_SHARE = 25
+"""Percentile over the blocks along a line: a seam may be weak in a quarter of them."""
+_SEAM_LEVELS = 6.0
+"""Rendered frames of all fruit on many units stay below 3.6, torn and shifted ones above 8.8."""
+_BASELINE_SHAPE = (40, 30)
+_FITS_BETTER = 0.6
+
+
+class FrameHealth:
+    """Judges one camera's frames in their order.
+
+    A seam is a line right across the image at which all of it steps at once; nothing pressed into a gel makes one.
+    With the image rolled back to the seam it either fits the light as it was before (shifted) or not (torn).
+
+    Args:
+        oldest_s: age beyond which a frame is stale.
+        shape: rows and columns that a frame must have.
+    """
+
+    def __init__(self, oldest_s: float, shape: tuple[int, int]) -> None:
+        self._oldest_s, self._shape = oldest_s, shape
+        self._baseline: npt.NDArray[np.float32] | None = None
+
+    def judge(self, image: Image, before: Image | None, age_s: float) -> frozenset[FrameFault]:
+        """What is wrong with a frame; nothing, for a good one.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8.
+            before: the frame that the camera gave just before it; None for its first.
+            age_s: time since its capture.
+        """
+        faults: set[FrameFault] = set()
+        if age_s > self._oldest_s:
+            faults.add(FrameFault.STALE)
+        if before is not None and np.array_equal(image, before):
+            faults.add(FrameFault.REPEATED)
+        if image.shape[:2] != self._shape:
+            return frozenset(faults | {FrameFault.WRONG_SIZE})
+        coarse = cv2.resize(image, _BASELINE_SHAPE[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
+        if np.percentile(coarse.max(axis=2), 95) < _BLACK_LEVEL:
+            return frozenset(faults | {FrameFault.BLACK})
+        if np.mean(coarse.max(axis=2) >= _SATURATED_LEVEL) > _SATURATED_SHARE:
+            return frozenset(faults | {FrameFault.SATURATED})
+        broken = self._broken(image, coarse)
+        if broken:
+            faults.add(broken)
+        elif not faults:
+            self._baseline = coarse
+        return frozenset(faults)
+
+    def _broken(self, image: Image, coarse: npt.NDArray[np.float32]) -> FrameFault | None:
+        """Torn or shifted, where there is a seam; what is shifted has one alone."""
+        seams = [(axis, seam) for axis in (0, 1) if (seam := find_seam(image, axis)) is not None]
+        if not seams:
+            return None
+        if len(seams) > 1 or self._baseline is None:
+            return FrameFault.TORN
+        [(axis, seam)] = seams
+        rolled = np.roll(coarse, -round(seam * _BASELINE_SHAPE[axis] / image.shape[axis]), axis=axis)
+        as_is, put_right = np.abs(coarse - self._baseline).mean(), np.abs(rolled - self._baseline).mean()
+        return FrameFault.SHIFTED if put_right < _FITS_BETTER * as_is else FrameFault.TORN
+
+
+def find_seam(image: Image, axis: int) -> int | None:
+    """The line at which the whole image steps, or None where there is none.
+
+    A step is told from a steep but smooth slope by what the slopes on both sides would make of it.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+        axis: 0 for a seam between two rows, 1 for one between two columns.
+
+    Returns:
+        The index of the first line beyond the seam.
+    """
+    height, width = image.shape[:2]
+    size = (_BLOCKS, height) if axis == 0 else (width, _BLOCKS)
+    lines = np.moveaxis(cv2.resize(image, size, interpolation=cv2.INTER_AREA), axis, 0).astype(np.float32)
+    half = _SEAM_HALF_PX
+    total = np.cumsum(np.concatenate([np.zeros_like(lines[:1]), lines]), axis=0)
+    means = (total[half:] - total[:-half]) / half
+    change = means[half:] - means[:-half]
+    beside = (change[: -4 * half] + change[4 * half :]) / 2
+    step = np.abs(change[2 * half : -2 * half] - beside).max(axis=2)
+    whole = np.percentile(step, _SEAM_SHARE, axis=1)
+    place = int(np.argmax(whole))
+    around = np.median(whole[max(0, place - 20) : place + 21])
+    return place + 3 * half if whole[place] - around > _SEAM_LEVELS else None

@@ -1,0 +1,76 @@
+"""What `station devices check` says of the camera."""
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault
+from station.devices.camera.open import camera_from
+from station.settings.camera import CameraSettings
+
+_FRAMES = 15
+_FRAME_DEADLINE_S = 1.0
+_SLOW_SHARE = 0.8
+
+REMEDIES = {
+    FrameFault.STALE: "the computer or the link is too slow: close other programs, use a USB port of its own",
+    FrameFault.REPEATED: "the sensor is frozen: unplug it and plug it in again",
+    FrameFault.TORN: "the USB link drops data: change cable or port",
+    FrameFault.SHIFTED: "the USB link drops data: change cable or port",
+    FrameFault.BLACK: "no light: check the LED settings and the sensor's cable",
+    FrameFault.SATURATED: "too much light: lower the LED settings, shade the gel",
+    FrameFault.WRONG_SIZE: "another mode than asked for: close other programs that use the sensor",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of `station devices check`."""
+
+    device: str
+    found: str
+    """What answered, and how it does."""
+    verdict: Literal["ok", "warning", "fault"]
+    remedy: str
+    """What a person is to do; empty where the verdict is ok."""
+
+
+async def probe_camera(settings: CameraSettings) -> list[Finding]:
+    """Open the camera, look at half a second of frames, and close it again. Never raises for a bad camera.
+
+    Args:
+        settings: the camera's settings.
+    """
+    camera = camera_from(settings)
+    try:
+        await camera.open()
+        began_s = time.monotonic()
+        frames = await _some_frames(camera)
+        return [_judged(camera, frames, time.monotonic() - began_s)]
+    except CameraError as error:
+        return [Finding("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
+    finally:
+        await camera.close()
+
+
+async def _some_frames(camera: Camera) -> list[Frame]:
+    frames: list[Frame] = []
+    while len(frames) < _FRAMES:
+        newest_s = frames[-1].captured_s if frames else time.monotonic()
+        frames.append(await camera.frame(newest_s, _FRAME_DEADLINE_S))
+    return frames
+
+
+def _judged(camera: Camera, frames: list[Frame], taken_s: float) -> Finding:
+    description = camera.description
+    rate = len(frames) / taken_s
+    faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
+    found = f"{description.name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
+    if faults:
+        sick = sum(1 for frame in frames if frame.faults)
+        remedy = "; ".join(REMEDIES[fault] for fault in faults)
+        return Finding("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
+    if description.frames_per_s and rate < _SLOW_SHARE * description.frames_per_s:
+        remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
+        return Finding("camera", found, "warning", remedy)
+    return Finding("camera", found, "ok", "")

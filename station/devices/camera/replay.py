@@ -1,0 +1,175 @@
+"""Recorded frames in the place of a sensor: a folder of images or a video, in real time or as fast as asked."""
+
+import asyncio
+import csv
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from natsort import natsorted
+
+from station.devices.camera.feed import FrameFeed
+from station.devices.camera.health import FrameHealth
+from station.devices.camera.interface import CameraDescription, CameraError, Frame, Image, Leds, NoCameraError
+from station.settings.camera import CameraSettings
+
+_IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
+_ENDED = "the recording has ended"
+
+
+class ReplayCamera:
+    """The driver `replay`. A recording is played once; opening again starts it from the beginning.
+
+    Args:
+        settings: the camera's settings.
+    """
+
+    def __init__(self, settings: CameraSettings) -> None:
+        self._settings = settings
+        self._source = Path(settings.replay.source)
+        self._frames: Iterator[tuple[str, Image]] | None = None
+        self._widths: dict[str, float] = {}
+        self._feed: FrameFeed | None = None
+        self._playing: asyncio.Task[None] | None = None
+        self._size = (0, 0)
+
+    @property
+    def description(self) -> CameraDescription:
+        """Which recording it is; its size is known once it is open."""
+        height, width = self._size
+        replay = self._settings.replay
+        return CameraDescription(
+            f"replay of {self._source}", width, height, self._settings.mm_per_px, replay.frames_per_s
+        )
+
+    async def open(self) -> None:
+        """Read the first frame, and start the clock of a replay in real time. Idempotent.
+
+        Raises:
+            NoCameraError: the recording is missing, empty or no recording.
+            CameraError: the file of widths is not what it has to be.
+        """
+        if self._feed:
+            return
+        if self._settings.replay.widths:
+            self._widths = read_widths(Path(self._settings.replay.widths))
+        self._frames = read_frames(self._source)
+        first = await asyncio.to_thread(next, self._frames, None)
+        if first is None:
+            raise NoCameraError(f"replay: {self._source} holds no image; expected a folder of images or a video")
+        self._size = (first[1].shape[0], first[1].shape[1])
+        health = FrameHealth(self._settings.oldest_s, self._size)
+        self._feed = FrameFeed(f"replay of {self._source}", health)
+        self._publish(*first)
+        if self._settings.replay.frames_per_s:
+            self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
+
+    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
+        """See `Camera.frame`; as fast as asked, each call after the first gives the recording's next frame.
+
+        Args:
+            newer_than_s: monotonic time that the capture must come after; without a rate it is not looked at.
+            deadline_s: longest wait, in seconds.
+
+        Raises:
+            NoFrameError: no such frame came in time, or the recording has ended.
+            CameraError: the camera is not open.
+        """
+        if self._feed is None:
+            raise CameraError("replay: asked for a frame before it was opened")
+        if self._settings.replay.frames_per_s:
+            return await self._feed.newer(newer_than_s, deadline_s)
+        if self._feed.trouble == _ENDED:
+            return await self._feed.newer(math.inf, 0.0)
+        frame = await self._feed.newer(-math.inf, deadline_s)
+        await self._advance()
+        return frame
+
+    async def set_leds(self, leds: Leds) -> None:
+        """Does nothing: what is recorded keeps its light.
+
+        Args:
+            leds: not looked at.
+        """
+
+    async def close(self) -> None:
+        """Stop playing. Idempotent."""
+        task, self._playing = self._playing, None
+        if task:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        self._feed = self._frames = None
+
+    async def _play(self, period_s: float) -> None:
+        while await self._advance(period_s):
+            pass
+
+    async def _advance(self, wait_s: float = 0.0) -> bool:
+        """Publish the next frame after a wait; False at the end."""
+        if self._frames is None or self._feed is None:
+            return False
+        began_s = time.monotonic()
+        following = await asyncio.to_thread(next, self._frames, None)
+        if following is None:
+            self._feed.trouble = _ENDED
+            return False
+        await asyncio.sleep(max(0.0, began_s + wait_s - time.monotonic()))
+        self._publish(*following)
+        return True
+
+    def _publish(self, name: str, image: Image) -> None:
+        if self._feed:
+            self._feed.publish(image, time.monotonic(), self._widths.get(name))
+
+
+def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
+    """The frames of a recording with their names, read one by one.
+
+    Args:
+        source: a folder of images, taken in natural order, or a video, whose frames are named by their numbers.
+
+    Raises:
+        NoCameraError: there is no such recording, or an image in it cannot be read.
+    """
+    if source.is_dir():
+        for path in natsorted(path for path in source.iterdir() if path.suffix.lower() in _IMAGES):
+            image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+            if image is None:
+                raise NoCameraError(f"replay: {path} is no image that can be read; remove it or record it again")
+            yield path.name, np.asarray(image, np.uint8)
+        return
+    if not source.is_file():
+        raise NoCameraError(f"replay: there is no folder or video {source}; correct camera.replay.source")
+    video = cv2.VideoCapture(str(source))
+    try:
+        number = 0
+        while True:
+            read, image = video.read()
+            if not read:
+                return
+            yield str(number), np.asarray(image, np.uint8)
+            number += 1
+    finally:
+        video.release()
+
+
+def read_widths(path: Path) -> dict[str, float]:
+    """The gripper's width recorded with each image.
+
+    Args:
+        path: CSV with the columns `image` and `width_mm`.
+
+    Raises:
+        CameraError: the file cannot be read or is no such table.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            widths = {row["image"]: float(row["width_mm"]) for row in csv.DictReader(file)}
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise CameraError(f"replay: {path}: expected CSV with the columns image, width_mm: {error!r}") from error
+    if not all(math.isfinite(width) for width in widths.values()):
+        raise CameraError(f"replay: {path}: a width is not a finite number of millimetres")
+    return widths

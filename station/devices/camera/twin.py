@@ -1,0 +1,190 @@
+"""The simulated DIGIT over TCP; its messages are described in docs/twin.md.
+
+Everything that arrives is checked before it is believed; a connection that breaks the protocol, goes silent or is
+cut is given up and made again for as long as the camera is open.
+"""
+
+import asyncio
+import contextlib
+import json
+import math
+import struct
+import time
+from typing import Any
+
+import numpy as np
+
+from station.devices.camera.feed import FrameFeed
+from station.devices.camera.health import FrameHealth
+from station.devices.camera.interface import (
+    CameraDescription,
+    CameraError,
+    CameraProtocolError,
+    Frame,
+    Image,
+    Leds,
+    NoCameraError,
+    NoFrameError,
+)
+from station.settings.camera import CameraSettings
+
+_LENGTH = struct.Struct(">I")
+_LONGEST_HEADER = 4096
+_LONGEST_SIDE = 4096
+_SILENCE_S = 2.0
+_RETRY_S = 0.1
+_SIZE = (640, 480)
+_FRAMES_PER_S = 30.0
+
+
+class TwinCamera:
+    """The driver `twin`.
+
+    Args:
+        settings: the camera's settings.
+    """
+
+    def __init__(self, settings: CameraSettings) -> None:
+        self._settings = settings
+        self._where = f"{settings.twin.host}:{settings.twin.port}"
+        self._feed = FrameFeed(f"twin at {self._where}", FrameHealth(settings.oldest_s, _SIZE))
+        self._listening: asyncio.Task[None] | None = None
+
+    @property
+    def description(self) -> CameraDescription:
+        """Which camera it is."""
+        height, width = _SIZE
+        return CameraDescription(f"twin DIGIT at {self._where}", width, height, self._settings.mm_per_px, _FRAMES_PER_S)
+
+    async def open(self) -> None:
+        """Connect and wait for the first frame. Idempotent.
+
+        Raises:
+            NoCameraError: nothing answers there, or it sends no frame within the settings' deadline.
+        """
+        if self._listening is None:
+            self._listening = asyncio.create_task(self._listen_for_ever(), name="twin camera")
+        try:
+            await self._feed.newer(-math.inf, self._settings.open_deadline_s)
+        except NoFrameError as error:
+            await self.close()
+            raise NoCameraError(
+                f"camera twin at {self._where}: no frame within {self._settings.open_deadline_s} s; "
+                f"{self._feed.trouble}. Start it with `station twin`, or correct camera.twin in station.yaml"
+            ) from error
+
+    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
+        """See `Camera.frame`.
+
+        Args:
+            newer_than_s: monotonic time that the capture must come after.
+            deadline_s: longest wait, in seconds.
+
+        Raises:
+            NoFrameError: no such frame came in time.
+        """
+        return await self._feed.newer(newer_than_s, deadline_s)
+
+    async def set_leds(self, leds: Leds) -> None:
+        """Set the light. Idempotent.
+
+        Args:
+            leds: brightness of each colour.
+
+        Raises:
+            CameraError: the twin does not answer, or refuses.
+        """
+        try:
+            async with asyncio.timeout(_SILENCE_S):
+                reader, writer = await self._ask(
+                    {"kind": "leds", "red": leds.red, "green": leds.green, "blue": leds.blue}
+                )
+                try:
+                    answer = await _read_header(reader)
+                finally:
+                    await _close(writer)
+        except (OSError, EOFError, TimeoutError) as error:
+            raise CameraError(f"camera twin at {self._where}: the light could not be set ({error!r})") from error
+        if answer.get("kind") != "leds":
+            raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
+
+    async def close(self) -> None:
+        """Disconnect. Idempotent."""
+        task, self._listening = self._listening, None
+        if task:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    async def _listen_for_ever(self) -> None:
+        while True:
+            try:
+                await self._listen()
+            except CameraProtocolError as error:
+                self._feed.trouble = str(error)
+            except (OSError, EOFError, TimeoutError) as error:
+                self._feed.trouble = f"the connection failed ({error!r})"
+            await asyncio.sleep(_RETRY_S)
+
+    async def _listen(self) -> None:
+        async with asyncio.timeout(_SILENCE_S):
+            reader, writer = await self._ask({"kind": "stream"})
+        try:
+            last = -1
+            while True:
+                async with asyncio.timeout(_SILENCE_S):
+                    header = await _read_header(reader)
+                    image, sequence, age_s = await _read_frame(reader, header)
+                if sequence <= last:
+                    raise CameraProtocolError(f"frame {sequence} came after frame {last}; numbers must rise")
+                last = sequence
+                self._feed.publish(image, time.monotonic() - age_s)
+        finally:
+            await _close(writer)
+
+    async def _ask(self, request: dict[str, Any]) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        reader, writer = await asyncio.open_connection(self._settings.twin.host, self._settings.twin.port)
+        header = json.dumps(request).encode()
+        writer.write(_LENGTH.pack(len(header)) + header)
+        return reader, writer
+
+
+async def _close(writer: asyncio.StreamWriter) -> None:
+    writer.close()
+    with contextlib.suppress(OSError):
+        await writer.wait_closed()
+
+
+async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
+    (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
+    if length > _LONGEST_HEADER:
+        raise CameraProtocolError(f"a header of {length} bytes was announced; at most {_LONGEST_HEADER} are expected")
+    text = await reader.readexactly(length)
+    try:
+        header = json.loads(text)
+    except ValueError as error:
+        raise CameraProtocolError(f"a header is no JSON: {error}") from error
+    if not isinstance(header, dict):
+        raise CameraProtocolError("a header must be a JSON object")
+    return header
+
+
+async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> tuple[Image, int, float]:
+    if header.get("kind") != "frame":
+        raise CameraProtocolError(f"a frame was expected, {header.get('kind')!r} came: {header.get('message')}")
+    height, width, sequence = (_whole(header, key) for key in ("height", "width", "sequence"))
+    age_s = header.get("age_s")
+    if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < math.inf:
+        raise CameraProtocolError(f"age_s is {age_s!r}; expected seconds, 0 or more")
+    if not (0 < height <= _LONGEST_SIDE and 0 < width <= _LONGEST_SIDE):
+        raise CameraProtocolError(f"a frame of {width}x{height} pixels; at most {_LONGEST_SIDE} a side are expected")
+    if header.get("bytes") != height * width * 3:
+        raise CameraProtocolError(f"{header.get('bytes')!r} bytes for {width}x{height} pixels of 3 bytes")
+    pixels = await reader.readexactly(height * width * 3)
+    return np.frombuffer(pixels, np.uint8).reshape(height, width, 3), sequence, float(age_s)
+
+
+def _whole(header: dict[str, Any], key: str) -> int:
+    value = header.get(key)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise CameraProtocolError(f"{key} is {value!r}; expected a whole number, 0 or more")
+    return value
