@@ -1,5 +1,6 @@
 """`station twin`: the simulated world from the command line."""
 
+import asyncio
 import csv
 from io import StringIO
 from pathlib import Path
@@ -10,21 +11,80 @@ import numpy as np
 import numpy.typing as npt
 
 from station.errors import BadInputError
+from station.twin.console import ask
 from station.twin.digit.press import render_press
 from station.twin.fruit import Kind
+from station.twin.process import CONSOLE_PORT, TwinOptions, run
+from station.twin.robotiq.modbus import PORT as RTU_PORT
+from station.twin.robotiq.urcap import PORT as URCAP_PORT
 
+_LOOPBACK = "127.0.0.1"
 FRUIT = click.Choice([kind.value for kind in Kind])
 _OPEN_STEPS = 2
 
 
-@click.group("twin")
-def twin() -> None:
-    """Run the simulated world, or draw from it."""
+SEED = click.IntRange(0, 2**31 - 1)
+
+
+@click.group("twin", invoke_without_command=True)
+@click.option("--fruit", type=FRUIT, default=Kind.STRAWBERRY.value, show_default=True, help="What lies in the nest.")
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit, and the sensor's noise.")
+@click.option("--bench", is_flag=True, help="No arm: the fruit is always between the fingers.")
+@click.pass_context
+def twin(context: click.Context, fruit: str, seed: int, bench: bool) -> None:  # noqa: FBT001 (click's way)
+    """Run the simulated arm, gripper, sensor and fruit until Ctrl-C, or talk to the one that runs."""
+    if context.invoked_subcommand is None:
+        asyncio.run(run(TwinOptions(fruit=Kind(fruit), seed=seed, bench=bench), _announce))
+
+
+def _announce(options: TwinOptions) -> None:
+    gripper = f"{options.arm_host}:{URCAP_PORT} (URCap), {options.arm_host}:{RTU_PORT} (Modbus RTU over TCP)"
+    if not options.bench:
+        click.echo(f"arm      {options.arm_host}, on a UR controller's own ports")
+    click.echo(f"gripper  {gripper}")
+    click.echo(f"camera   {options.camera_host}:{options.camera_port}")
+    click.echo(f"console  {options.console_host}:{options.console_port}: station twin fault, station twin lay")
+    click.echo("running; Ctrl-C ends it")
+
+
+CONSOLE = click.option(
+    "--console", default=CONSOLE_PORT, show_default=True, type=click.IntRange(1, 65535), help="Port."
+)
+
+
+@twin.command("fault")
+@click.argument("device", required=False)
+@click.argument("fault", required=False)
+@click.option("--amount", type=float, default=1.0, show_default=True, help="Strength, in the fault's own unit.")
+@click.option("--clear", is_flag=True, help="Switch off the fault, or all of the device's.")
+@CONSOLE
+def fault_command(device: str | None, fault: str | None, amount: float, clear: bool, console: int) -> None:  # noqa: FBT001
+    """Switch a fault of a device on or off; without a DEVICE, list what is on, without a FAULT, what there is."""
+    if device is None:
+        state = ask(_LOOPBACK, console, {"do": "list"})
+        for name, active in state.items():
+            click.echo(f"{name}: {', '.join(f'{fault} {amount:g}' for fault, amount in active.items()) or 'sound'}")
+        return
+    request = {"do": "clear" if clear else "set", "device": device, "amount": amount}
+    if fault is not None or not clear:
+        request["fault"] = fault or ""
+    active = ask(_LOOPBACK, console, request)
+    click.echo(f"{device}: {', '.join(f'{name} {value:g}' for name, value in active.items()) or 'sound'}")
+
+
+@twin.command("lay")
+@click.argument("fruit", type=FRUIT)
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit of its kind.")
+@click.option("--bruised", is_flag=True, help="A soft one.")
+@CONSOLE
+def lay(fruit: str, seed: int, bruised: bool, console: int) -> None:  # noqa: FBT001
+    """Lay another fruit into the running twin's nest."""
+    click.echo(ask(_LOOPBACK, console, {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised}))
 
 
 @twin.command("press")
 @click.option("--fruit", type=FRUIT, default=Kind.STRAWBERRY.value, show_default=True, help="What is pressed.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruit, and noise.")
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit, and the sensor's noise.")
 @click.option("--steps", type=click.IntRange(1, 40), default=12, show_default=True, help="Images after first contact.")
 @click.option("--step-mm", type=click.FloatRange(0.1, 5), default=1.0, show_default=True, help="Closing per image.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the images; must not exist.")

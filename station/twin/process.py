@@ -148,10 +148,10 @@ class Twin:
 
 def _near_nest(arm: UrController, poses: ArmPoses) -> Callable[[], bool]:
     nest_m = forward(poses.nest)[:3, 3]
-    return lambda: bool(np.linalg.norm(1000 * (np.asarray(arm.tool_position_m) - nest_m)) < _AT_NEST_MM)
+    return lambda: bool(np.linalg.norm(1000 * (forward(arm.joints_rad)[:3, 3] - nest_m)) < _AT_NEST_MM)
 
 
-async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
+async def run(options: TwinOptions, on_started: Callable[[TwinOptions], None]) -> None:
     """Run the twin until the process is told to end by SIGINT or SIGTERM.
 
     Args:
@@ -168,7 +168,7 @@ async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
     twin = Twin(options)
     await twin.start()
     try:
-        on_started(twin)
+        on_started(options)
         await ended.wait()
     finally:
         await twin.stop()
