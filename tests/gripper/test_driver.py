@@ -112,13 +112,17 @@ def test_a_cancelled_move_stops_the_fingers(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         moving = asyncio.create_task(rig.driver.move_to_width(5.0, 20.0, 20.0))
         await rig.until(lambda: rig.twin.status().go_to)
+        rig.faults.set("delayed", 0.02)
+        await asyncio.sleep(0.03)  # most likely in mid-exchange, though no moment may do harm
         moving.cancel()
         with pytest.raises(asyncio.CancelledError):
             await moving
-        assert not rig.twin.status().go_to
+        status = rig.twin.status()
+        assert not status.go_to
+        assert status.position < status.echo
         assert (await rig.driver.open()).reading.object_state == ObjectState.AT_POSITION
 
-    on_wire(scenario)
+    on_wire(scenario, answer_timeout_s=4.0)
 
 
 def test_a_request_out_of_reach_sends_nothing(on_wire: OnWire):

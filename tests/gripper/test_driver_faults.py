@@ -165,6 +165,22 @@ def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
     on_wire(scenario)
 
 
+def test_an_answer_to_a_cancelled_question_is_not_taken_for_the_next(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set("delayed", 0.1)
+        reading = asyncio.create_task(rig.driver.read())
+        await asyncio.sleep(0.05)  # in mid-exchange, though no moment may do harm
+        reading.cancel()
+        rig.faults.clear()
+        with pytest.raises(asyncio.CancelledError):
+            await reading
+        rig.twin.write(Command(activate=True, go_to=True, position=99))
+        for _ in range(3):
+            assert (await rig.driver.read()).echoed_count == 99
+
+    on_wire(scenario)
+
+
 def test_a_short_delay_is_borne(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         rig.faults.set("delayed", 0.02)

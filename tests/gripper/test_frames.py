@@ -15,6 +15,7 @@ from station.twin.robotiq.faults import gripper_faults
 from station.twin.robotiq.fingers import Fingers
 from station.twin.robotiq.load import Spring
 from station.twin.robotiq.model import RobotiqGripper
+from station.twin.robotiq.registers import Command
 from station.twin.robotiq.rtu import RequestFramer, answer, crc16, framed
 
 RESET = "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30"
@@ -104,6 +105,23 @@ def test_the_manual_s_close_is_answered_byte_for_byte_on_every_wire(on: Callable
 def test_what_is_refused_and_how(request_: str, reply: str):
     expected = framed(bytes.fromhex(reply)).hex(" ").upper() if reply else ""
     assert Line().ask(framed(bytes.fromhex(request_)).hex()) == expected
+
+
+@given(
+    st.builds(
+        Command,
+        **{name: st.booleans() for name in ("activate", "go_to", "release", "release_opens")},
+        **{name: st.integers(0, 255) for name in ("position", "speed", "force")},
+    )
+)
+def test_a_command_survives_its_registers(command: Command):
+    assert Command.from_words(command.words()) == command
+
+
+def test_each_bit_of_the_action_is_where_the_manual_has_it():
+    bits = {"activate": 0x0100, "go_to": 0x0800, "release": 0x1000, "release_opens": 0x2000}
+    for name, word in bits.items():
+        assert Command(**{name: True}).words() == [word, 0, 0]
 
 
 def test_function_23_writes_before_it_reads_and_writes_nothing_when_the_read_is_refused():

@@ -35,8 +35,8 @@ class ArmLink:
     def __init__(self, settings: ArmSettings) -> None:
         self._settings = settings
         self._process: ArmProcess | None = None
-        self._lost: ArmFault | None = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet")
-        self._latched: ArmFault | None = None
+        self._lost: ArmFault | None = None
+        self._latched: ArmFault | None = ArmFault(ArmCause.CLOSED, "the arm was not opened")
         self._starts_s: deque[float] = deque()
         self._failures = 0
         self._healthy_until_s = 0.0
@@ -68,8 +68,9 @@ class ArmLink:
 
     async def open(self) -> None:
         """Begin to keep the link up."""
-        self.renew_health(FIRST_LEASE_S)
         if self._keeping is None:
+            self.renew_health(FIRST_LEASE_S)
+            self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet"), None
             self._keeping = asyncio.create_task(self._keep(), name="the arm's link")
 
     async def close(self) -> None:

@@ -113,7 +113,7 @@ class ModbusRtuLink:
         try:
             await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
         except asyncio.CancelledError:
-            # pymodbus ends it in time; an answer left on the line would be taken for the next one.
+            # It ends within the time-out, and ended well it spares the halt that follows the wait for a quiet line.
             await asyncio.wait({asking, breaking}, return_when=asyncio.FIRST_COMPLETED)
             raise
         finally:

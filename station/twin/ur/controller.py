@@ -197,13 +197,14 @@ class UrController:
         servers, self._servers = self._servers, []
         for server in servers:
             server.close()
-        self._cut_all()
+        self.cut_connections()
         while self.connections or self._streams:
             await asyncio.sleep(0)
         for server in servers:
             await server.wait_closed()
 
-    def _cut_all(self) -> None:
+    def cut_connections(self) -> None:
+        """Cut every connection, as a pulled cable does; new ones are taken."""
         for connection in list(self.connections):
             connection.cut()
         for writer in list(self._streams):
@@ -229,7 +230,7 @@ class UrController:
         period_s = self.faults.amount(CommonFault.INTERMITTENT)
         if period_s and now_s - self._cut_at_s > period_s:
             self._cut_at_s = now_s
-            self._cut_all()
+            self.cut_connections()
         if self._switching is not None and self._switching.done():
             self._switching = None
         faults = self.faults.snapshot()

@@ -28,6 +28,7 @@ LINKS: tuple[tuple[float, float, float], ...] = (
 """a in m, d in m and alpha in rad of each joint's link."""
 
 JOINT_RANGE_RAD = 2 * math.pi
+ROUNDING = 1e-9
 JOINT_SPEED_LIMITS_RAD_S: Joints = (
     *(math.radians(120.0),) * 2,
     *(math.radians(180.0),) * 4,
@@ -128,8 +129,8 @@ def nearest(solutions: npt.NDArray[np.float64], near_rad: npt.ArrayLike) -> Join
     if usable.size == 0:
         return None
     turned = usable + 2 * math.pi * np.round((near - usable) / (2 * math.pi))
-    turned = np.where(turned > JOINT_RANGE_RAD, turned - 2 * math.pi, turned)
-    turned = np.where(turned < -JOINT_RANGE_RAD, turned + 2 * math.pi, turned)
+    outside = np.abs(turned) > JOINT_RANGE_RAD + ROUNDING
+    turned = np.where(outside, turned - 2 * math.pi * np.sign(turned), turned)
     best = turned[np.abs(turned - near).max(axis=-1).argmin()]
     q1, q2, q3, q4, q5, q6 = best.tolist()
     return q1, q2, q3, q4, q5, q6
@@ -137,4 +138,4 @@ def nearest(solutions: npt.NDArray[np.float64], near_rad: npt.ArrayLike) -> Join
 
 def _cosine(value: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     # Rounding may carry a stretched arm's cosine past 1; what is past it by more has no solution.
-    return np.where(np.abs(value) <= 1 + 1e-9, np.clip(value, -1.0, 1.0), np.nan)
+    return np.where(np.abs(value) <= 1 + ROUNDING, np.clip(value, -1.0, 1.0), np.nan)

@@ -106,6 +106,11 @@ class RtdeConnection(asyncio.Protocol):
         self._blocked_since_s = None
 
     @property
+    def blocked(self) -> bool:
+        """Whether the client does not read."""
+        return self._blocked_since_s is not None
+
+    @property
     def _silent(self) -> bool:
         faults = self._controller.faults
         return faults.active("silent") or faults.active("rtde_silent")

@@ -1,0 +1,315 @@
+"""The emulated controller met by other clients than the driver: ur-rtde's receive and I/O, and plain sockets."""
+
+import asyncio
+import os
+import socket
+import struct
+import subprocess
+import sys
+
+import pytest
+
+from station.devices.arm.probe import probe_arm
+from station.devices.arm.ur import UrArm
+
+HEADER = struct.Struct(">HB")
+
+
+async def run_client(source: str, *arguments: str) -> list[str]:
+    """Run a client in a process of its own, because ur-rtde holds the interpreter's lock while it connects."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", source, *arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    async with asyncio.timeout(60):
+        output, _ = await process.communicate()
+    assert process.returncode == 0, output.decode()
+    return output.decode().splitlines()
+
+
+@pytest.mark.parametrize("polyscope", ["5.22", "5.25"])
+def test_bare_ur_rtde_connects_moves_and_asks(bench, polyscope):
+    client = """
+import math, sys, time
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+control, receive = RTDEControlInterface(sys.argv[1]), RTDEReceiveInterface(sys.argv[1])
+near = lambda a, b: max(abs(x - y) for x, y in zip(a, b)) < 1e-6
+there = [0.3, -1.3, 1.5, -1.5, -1.5, 0.2]
+assert control.moveJ(there, 2.0, 8.0)
+time.sleep(0.02)
+assert near(receive.getActualQ(), there)
+pose = receive.getActualTCPPose()
+pose[2] += 0.05
+assert control.moveL(pose, 0.5, 2.0)
+time.sleep(0.02)
+assert near(receive.getActualTCPPose(), pose)
+assert near(control.getInverseKinematics(pose), receive.getActualQ())
+assert control.getInverseKinematicsHasSolution(pose, there)
+assert not control.getInverseKinematicsHasSolution([9, 0, 0, 0, 0, 0])
+assert control.isPoseWithinSafetyLimits(pose)
+assert not control.isJointsWithinSafetyLimits([9, 0, 0, 0, 0, 0])
+assert control.setTcp([0, 0, 0.1, 0, 0, 0]) and near(control.getTCPOffset(), [0, 0, 0.1, 0, 0, 0])
+assert near(control.getForwardKinematics(), receive.getActualTCPPose())
+assert near(control.poseTrans([1, 2, 3, 0, 0, math.pi / 2], [1, 0, 0, 0, 0, 0]), [1, 3, 3, 0, 0, math.pi / 2])
+assert control.setPayload(1.5, [0, 0, 0.1])
+time.sleep(0.02)
+assert receive.getPayload() == 1.5
+before = control.getAsyncOperationProgressEx()
+assert control.moveJ_IK(pose, 0.5, 2.0, True)
+during = control.getAsyncOperationProgressEx()
+assert during.isAsyncOperationRunning() and during.operationId() != before.operationId()
+control.stopJ(8.0)
+time.sleep(0.2)
+assert not control.getAsyncOperationProgressEx().isAsyncOperationRunning()
+assert control.isSteady() and not any(receive.getActualQd())
+control.stopScript()
+control.disconnect()
+receive.disconnect()
+print("done")
+"""
+
+    async def run():
+        async with bench(polyscope=polyscope) as made:
+            assert (await run_client(client, made.host))[-1] == "done"
+            assert made.controller.script.ended_because == "the client stopped the script"
+
+    asyncio.run(run())
+
+
+def test_io_client_next_to_the_driver(bench, healthy):
+    client = """
+import sys, time
+from rtde_io import RTDEIOInterface
+from rtde_receive import RTDEReceiveInterface
+io, receive = RTDEIOInterface(sys.argv[1]), RTDEReceiveInterface(sys.argv[1])
+assert io.setSpeedSlider(0.5) and io.setStandardDigitalOut(3, True)
+time.sleep(0.05)
+assert receive.getSpeedScaling() == 0.5 and receive.getDigitalOutState(3) and not receive.getDigitalOutState(2)
+io.disconnect()
+receive.disconnect()
+print("done")
+"""
+
+    async def run():
+        async with bench() as made, UrArm(made.settings()) as arm, healthy(arm):
+            await arm.ready(20.0)
+            assert (await run_client(client, made.host))[-1] == "done"
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+class Rtde:
+    """A plain RTDE client."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer = reader, writer
+
+    def send(self, kind: str, payload: bytes = b"") -> None:
+        self._writer.write(HEADER.pack(3 + len(payload), ord(kind)) + payload)
+
+    async def hear(self, kind: str) -> bytes:
+        async with asyncio.timeout(5):
+            while True:
+                size, answered = HEADER.unpack(await self._reader.readexactly(3))
+                payload = await self._reader.readexactly(size - 3)
+                if answered == ord(kind):
+                    return payload
+
+    async def ask(self, kind: str, payload: bytes = b"") -> bytes:
+        self.send(kind, payload)
+        return await self.hear(kind)
+
+    def close(self) -> None:
+        self._writer.transport.abort()
+
+
+async def plain(host: str) -> Rtde:
+    return Rtde(*await asyncio.open_connection(host, 30004))
+
+
+def test_the_protocol_to_the_byte(bench):
+    async def run():
+        async with bench() as made:
+            client = await plain(made.host)
+            assert await client.ask("V", struct.pack(">H", 1)) == b"\x00"
+            assert await client.ask("V", struct.pack(">H", 2)) == b"\x01"
+            assert struct.unpack(">4I", await client.ask("v"))[:2] == (5, 22)
+            assert await client.ask("S") == b"\x00"
+            asked = struct.pack(">d", 500.0) + b"timestamp,actual_q,no_such_thing,output_int_register_47"
+            assert await client.ask("O", asked) == b"\x00DOUBLE,VECTOR6D,NOT_FOUND,INT32"
+            asked = struct.pack(">d", 125.0) + b"timestamp,actual_q,"
+            assert await client.ask("O", asked) == b"\x01DOUBLE,VECTOR6D"
+            assert await client.ask("I", b"input_int_register_48") == b"\x00NOT_FOUND"
+            assert await client.ask("I", b"input_int_register_5,input_double_register_5,") == b"\x01INT32,DOUBLE"
+            assert await client.ask("S") == b"\x01"
+            stamps = []
+            for _ in range(20):
+                recipe, timestamp, *joints = struct.unpack(">B7d", await client.hear("U"))
+                assert recipe == 1
+                assert tuple(joints) == made.controller.joints_rad
+                stamps.append(timestamp)
+            assert all(0 < b - a for a, b in zip(stamps, stamps[1:], strict=False))
+            assert (stamps[-1] - stamps[0]) / 19 == pytest.approx(0.008, rel=0.2)
+            other = await plain(made.host)
+            assert await other.ask("I", b"input_int_register_5") == b"\x00IN_USE"
+            client.send("U", struct.pack(">Bid", 1, 42, 2.5))
+            assert await client.ask("P") == b"\x01"
+            assert made.controller.registers.input_int(5) == 42
+            assert made.controller.registers.input_doubles(5, 1) == (2.5,)
+            client.close()
+            while (await other.ask("I", b"input_int_register_5"))[:1] == b"\x00":
+                await asyncio.sleep(0.01)
+            other.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("rubbish", [b"\x00\x00\x00", b"\x00\x05U\x09\x00", b"\x00\x04V\x00", b"\x00\x06I\xff\xfe\xfd"])
+def test_rubbish_costs_its_sender_the_connection_and_nobody_else(bench, rubbish):
+    async def run():
+        async with bench() as made:
+            other = await plain(made.host)
+            reader, writer = await asyncio.open_connection(made.host, 30004)
+            writer.write(rubbish)
+            with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+                await asyncio.wait_for(reader.readexactly(1), 5)
+            writer.transport.abort()
+            assert await other.ask("V", struct.pack(">H", 2)) == b"\x01"
+            other.close()
+
+    asyncio.run(run())
+
+
+def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):
+    async def run():
+        async with bench() as made:
+            sock = socket.socket()
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            sock.setblocking(False)  # noqa: FBT003
+            await asyncio.get_running_loop().sock_connect(sock, (made.host, 30004))
+            reader, writer = await asyncio.open_connection(sock=sock, limit=2048)
+            lazy = Rtde(reader, writer)
+            names = ",".join(f"output_double_register_{i}" for i in range(48)).encode()
+            await lazy.ask("O", struct.pack(">d", 500.0) + names)
+            await lazy.ask("S")
+            (connection,) = made.controller.connections
+            await until(lambda: connection.blocked)
+            assert connection in made.controller.connections
+            made.clock.skip(9.0)
+            await asyncio.sleep(0.05)
+            assert connection in made.controller.connections
+            made.clock.skip(1.5)
+            await until(lambda: not made.controller.connections)
+            lazy.close()
+
+    asyncio.run(run())
+
+
+def test_the_primary_stream_tells_version_and_robot_mode(bench):
+    async def run():
+        async with bench() as made:
+            reader, writer = await asyncio.open_connection(made.host, 30001)
+
+            async def message() -> bytes:
+                async with asyncio.timeout(5):
+                    (size,) = struct.unpack(">i", await reader.readexactly(4))
+                    return await reader.readexactly(size - 4)
+
+            version = await message()
+            kind, _, _, subtype, length = struct.unpack_from(">BQbbb", version)
+            assert (kind, subtype) == (20, 3)
+            assert struct.unpack_from(">BB", version, 12 + length) == (5, 22)
+            state = await message()
+            assert state[0] == 16
+            size, sub = struct.unpack_from(">iB", state, 1)
+            assert (size, sub) == (47, 0)
+            flags = struct.unpack_from(">7?B", state, 14)
+            assert flags == (True, True, True, False, False, False, False, 7)
+            made.faults.set("emergency_stop")
+            for _ in range(30):
+                flags = struct.unpack_from(">7?B", await message(), 14)
+                if flags[3]:
+                    break
+            assert flags == (True, True, False, True, False, False, False, 3)
+            writer.transport.abort()
+
+    asyncio.run(run())
+
+
+def test_the_dashboard_answers_line_by_line(bench):
+    async def run():
+        async with bench() as made:
+            reader, writer = await asyncio.open_connection(made.host, 29999)
+
+            async def ask(line: str) -> str:
+                writer.write(line.encode() + b"\n")
+                return (await asyncio.wait_for(reader.readline(), 5)).decode().strip()
+
+            assert (await reader.readline()).startswith(b"Connected: Universal Robots Dashboard Server")
+            assert await ask("robotmode") == "Robotmode: RUNNING"
+            assert await ask("ROBOTMODE ") == "Robotmode: RUNNING"
+            assert (await ask("dance")).startswith("could not understand")
+            made.faults.set("protective_stop")
+            while (await ask("safetystatus")) != "Safetystatus: PROTECTIVE_STOP":
+                await asyncio.sleep(0.01)
+            assert (await ask("unlock protective stop")).startswith("Cannot unlock")
+            made.clock.skip(5.0)
+            assert await ask("unlock protective stop") == "Protective stop releasing"
+            assert await ask("safetystatus") == "Safetystatus: NORMAL"
+            assert await ask("quit") != ""
+            assert await reader.read() == b""
+            writer.transport.abort()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("fault", "verdicts", "word"),
+    [
+        (None, ["ok", "ok", "ok"], "PolyScope 5.22"),
+        ("local_mode", ["fault", "ok", "ok"], "remote control"),
+        ("emergency_stop", ["fault", "ok", "ok"], "button"),
+        ("protective_stop", ["fault", "ok", "ok"], "confirm"),
+        ("registers_in_use", ["ok", "warning", "ok"], "EtherNet/IP"),
+        ("rtde_silent", ["ok", "fault", "ok"], "cable"),
+        ("link_cut", ["fault"], "cable"),
+        ("garbage", ["fault"], "cable"),
+    ],
+)
+def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdicts, word):
+    async def run():
+        async with bench() as made:
+            if fault is not None:
+                made.faults.set(fault)
+                await asyncio.sleep(0.1)
+            findings = await probe_arm(made.settings())
+            assert [finding.verdict for finding in findings] == verdicts
+            assert word in " ".join(finding.found + finding.remedy for finding in findings)
+            assert all(bool(finding.remedy) == (finding.verdict != "ok") for finding in findings)
+
+    asyncio.run(run())
+
+
+@pytest.mark.timeout(400)
+def test_two_hundred_connections_and_drops_leave_nothing_behind(bench, until):
+    def descriptors() -> int:
+        return len(os.listdir("/proc/self/fd"))
+
+    async def run():
+        async with bench() as made:
+            counts = []
+            for _ in range(200):
+                async with UrArm(made.settings()) as arm:
+                    await arm.ready(20.0)
+                    made.controller.cut_connections()
+
+                    async def dropped(arm=arm):
+                        return not (await arm.state()).ready
+
+                    await until(dropped)
+                counts.append(descriptors())
+            assert max(counts[20:]) <= counts[19]
+            assert not made.controller.connections
+
+    asyncio.run(run())

@@ -1,0 +1,78 @@
+"""When a move counts as done, on a wire that a test writes line by line."""
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+
+from station.devices.gripper.errors import GripperTimeoutError
+from station.devices.gripper.link import State, Status
+from station.devices.gripper.robotiq import RobotiqGripper
+from station.settings.gripper import GripperSettings
+
+START = Status(state=State.ACTIVE, go_to=True, object_=3, fault=0, echo=50, position=50, current_a=None)
+TARGET = 53
+"""A millimetre further than 50: the count nearest to a width of 34.3 mm."""
+WIDTH_MM = 34.3
+
+
+class ScriptedLink:
+    """Gives one status after another, the last one for ever."""
+
+    place = "a script"
+
+    def __init__(self, *statuses: Status) -> None:
+        self._statuses = [START, *statuses]
+        self.sent: list[str] = []
+
+    async def status(self) -> Status:
+        return self._statuses.pop(0) if len(self._statuses) > 1 else self._statuses[0]
+
+    async def reset(self) -> None:
+        self.sent.append("reset")
+
+    async def begin_activation(self) -> None:
+        self.sent.append("begin_activation")
+
+    async def go_to(self, position: int, speed: int, force: int) -> None:
+        self.sent.append(f"go_to {position}")
+
+    async def halt(self) -> None:
+        self.sent.append("halt")
+
+    async def close(self) -> None:
+        self.sent.append("close")
+
+
+def moved(link: ScriptedLink) -> int:
+    gripper = RobotiqGripper(link, GripperSettings(move_margin_s=0.1))
+    return asyncio.run(gripper.move_to_width(WIDTH_MM, 100.0, 20.0)).reading.position_count
+
+
+def test_an_object_state_from_before_the_move_is_not_taken_for_arrival():
+    stale = replace(START, echo=TARGET, position=51)
+    moving, there = replace(stale, object_=0, position=52), replace(stale, position=TARGET)
+    link = ScriptedLink(replace(START, echo=TARGET), stale, moving, there)
+    assert moved(link) == TARGET
+    assert link.sent == [f"go_to {TARGET}"]
+
+
+def test_contact_ends_the_move_once_the_fingers_stand():
+    touching = replace(START, echo=TARGET, object_=2, position=51)
+    assert moved(ScriptedLink(touching, replace(touching, position=52))) == 52
+
+
+@pytest.mark.parametrize(
+    "never",
+    [
+        replace(START, echo=TARGET, object_=0, position=TARGET),
+        replace(START, echo=TARGET - 1, position=TARGET),
+        replace(START, echo=TARGET, position=TARGET - 3),
+    ],
+    ids=["still moving", "another master's request", "somewhere else"],
+)
+def test_what_is_no_arrival_ends_in_a_time_out_and_a_halt(never: Status):
+    link = ScriptedLink(never)
+    with pytest.raises(GripperTimeoutError, match=f"count {TARGET}"):
+        moved(link)
+    assert link.sent == [f"go_to {TARGET}", "halt"]
