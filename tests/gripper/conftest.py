@@ -8,8 +8,7 @@ from typing import Any, Protocol
 
 import pytest
 
-from station.devices.gripper.robotiq import RobotiqGripper as Driver
-from station.devices.gripper.robotiq import make_gripper
+from station.devices.gripper.robotiq import Robotiq2F85, make_gripper
 from station.settings.gripper import GripperSettings, ModbusRtuSettings, UrcapSettings
 from station.twin.faults import FaultBoard
 from station.twin.robotiq.faults import gripper_faults
@@ -51,7 +50,7 @@ class Rig:
     clock: SkippingClock = field(default_factory=SkippingClock)
     faults: FaultBoard = field(default_factory=gripper_faults)
     twin: Twin = field(init=False)
-    driver: Driver = field(init=False)
+    driver: Robotiq2F85 = field(init=False)
 
     def __post_init__(self) -> None:
         self.twin = Twin(self.clock, self.faults)

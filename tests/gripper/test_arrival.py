@@ -7,7 +7,7 @@ import pytest
 
 from station.devices.gripper.errors import GripperTimeoutError
 from station.devices.gripper.link import State, Status
-from station.devices.gripper.robotiq import RobotiqGripper
+from station.devices.gripper.robotiq import Robotiq2F85
 from station.settings.gripper import GripperSettings
 
 START = Status(state=State.ACTIVE, go_to=True, object_=3, fault=0, echo=50, position=50, current_a=None)
@@ -45,7 +45,7 @@ class ScriptedLink:
 
 
 def moved(link: ScriptedLink) -> int:
-    gripper = RobotiqGripper(link, GripperSettings(move_margin_s=0.1))
+    gripper = Robotiq2F85(link, GripperSettings(move_margin_s=0.1))
     return asyncio.run(gripper.move_to_width(WIDTH_MM, 100.0, 20.0)).reading.position_count
 
 

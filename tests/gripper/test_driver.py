@@ -99,6 +99,18 @@ def test_stop_ends_the_move_and_the_fingers_stand(on_wire: OnWire):
     on_wire(scenario)
 
 
+def test_stop_also_ends_a_move_that_waits_for_its_turn(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        moves = [asyncio.create_task(rig.driver.move_to_width(width, 20.0, 20.0)) for width in (5.0, 10.0)]
+        await rig.until(lambda: rig.twin.status().go_to)
+        await rig.driver.stop()
+        ends = await asyncio.gather(*moves, return_exceptions=True)
+        assert [type(end) for end in ends] == [GripperStoppedError, GripperStoppedError]
+        assert not rig.twin.status().go_to
+
+    on_wire(scenario)
+
+
 def test_stop_does_not_activate_a_gripper_that_is_not(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         rig.twin.write(Command())

@@ -50,6 +50,8 @@ async def under_way(rig: Any) -> asyncio.Task[Any]:
 def test_each_fault_ends_a_move_by_its_name_and_the_fingers_stay(on_wire: OnWire, fault: str, code: int):
     async def scenario(rig: Any) -> None:
         moving = await under_way(rig)
+        rig.clock.skip(1.0)
+        rig.twin.status()
         rig.faults.set(fault)
         with pytest.raises(GripperFaultError) as caught:
             await moving
@@ -57,7 +59,7 @@ def test_each_fault_ends_a_move_by_its_name_and_the_fingers_stay(on_wire: OnWire
         assert caught.value.code == FAULTS[code].name
         assert caught.value.remedy in str(caught.value)
         assert not rig.twin.status().go_to
-        assert (await rig.driver.read()).fault_code in {code, 0xF if fault == "automatic_release" else code}
+        assert (await rig.driver.read()).fault_code == code
         rig.faults.clear()
         rig.clock.skip(20.0)
         before_mm = rig.twin.opening_mm(rig.clock.now_s())
@@ -101,6 +103,17 @@ def test_a_passing_report_of_no_communication_is_forgiven_and_a_lasting_one_is_n
         rig.faults.set("no_communication")
         with pytest.raises(GripperFaultError, match="terminator"):
             await moving
+
+    on_wire(scenario)
+
+
+@pytest.mark.parametrize("fault", ["no_communication", "over_temperature"])
+def test_a_passing_fault_is_no_reason_to_travel_for_an_activation(on_wire: OnWire, fault: str):
+    async def scenario(rig: Any) -> None:
+        rig.faults.set(fault)
+        before = rig.twin.command
+        assert (await rig.driver.activate()).fault_code
+        assert rig.twin.command == before
 
     on_wire(scenario)
 

@@ -102,6 +102,9 @@ FAULTS: dict[int, FaultText] = {
 }
 """gFLT. Source: Robotiq 2F-85 & 2F-140 instruction manual, fault status register."""
 
+NEEDS_ACTIVATION = range(0xA, 0x10)
+"""Codes that only a reset and an activation clear; the others pass by themselves."""
+
 
 class GripperFaultError(GripperError):
     """The gripper reports a fault."""

@@ -72,7 +72,7 @@ class Gripper(Protocol):
         ...
 
     async def activate(self) -> GripperReading:
-        """Make the gripper ready. Idempotent: one that is active and without fault does not move.
+        """Make the gripper ready. Idempotent: one that is active does not move.
 
         Otherwise **the fingers travel their whole way**: nothing may be between them.
         """
@@ -93,7 +93,7 @@ class Gripper(Protocol):
         ...
 
     async def stop(self) -> GripperReading:
-        """Stop where the fingers are; a move under way ends with `GripperStoppedError`. Idempotent."""
+        """Stop where the fingers are; moves under way or waiting end with `GripperStoppedError`. Idempotent."""
         ...
 
     async def read(self) -> GripperReading:

@@ -13,6 +13,7 @@ from station.devices.gripper.calibration import (
     width_of_count,
 )
 from station.devices.gripper.errors import (
+    NEEDS_ACTIVATION,
     GripperError,
     GripperFaultError,
     GripperNotActiveError,
@@ -33,6 +34,8 @@ _MUTE_GRACE_S = 0.5
 """Fault 9 says that the line was silent for a second, which being asked again cures; only one that stays is real."""
 _AT_POSITION_COUNTS = 2
 """How far from the request the gripper may stand and still be at position."""
+_HALT_ANSWERS = 4
+"""Time for a quiet line, a connection and the two exchanges of a halt, in answer time-outs."""
 _NO_COMMUNICATION = 0x9
 
 _OBJECT_STATES = {
@@ -43,11 +46,11 @@ _OBJECT_STATES = {
 }
 
 
-class RobotiqGripper:
+class Robotiq2F85:
     """A 2F-85 behind a wire. Verbs that move take turns; `read` and `stop` may be called at any time.
 
-    After a lost link the error comes at once and the next verb connects again. Nothing is ever repeated on its own:
-    where the fingers are then is for `read` to say.
+    After a lost link the error comes after one short try to stop, and the next verb connects again. Nothing is ever
+    repeated on its own: where the fingers are then is for `read` to say.
     """
 
     def __init__(self, link: Link, settings: GripperSettings) -> None:
@@ -65,7 +68,7 @@ class RobotiqGripper:
         return max_width_mm(self._calibration)
 
     async def activate(self) -> GripperReading:
-        """Make the gripper ready. Idempotent: one that is active and without fault does not move.
+        """Make the gripper ready. Idempotent: one that is active does not move, even if it reports a passing fault.
 
         Otherwise **the fingers travel their whole way**, also when the wait for them is cancelled, and `stop` does not
         end it: nothing may be between them.
@@ -77,7 +80,7 @@ class RobotiqGripper:
         """
         async with self._turn:
             status, at_s = await self._look()
-            if status.state == State.ACTIVE and not status.fault:
+            if self._is_active(status):
                 return self._reading(status, at_s)
             self._held_request = None
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
@@ -90,10 +93,10 @@ class RobotiqGripper:
             began_s = time.monotonic()
             while True:
                 status, at_s = await self._look()
+                if self._is_active(status):
+                    return self._reading(status, at_s)
                 if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
                     raise GripperFaultError(status.fault)
-                if status.state == State.ACTIVE and not status.fault:
-                    return self._reading(status, at_s)
                 await self._wait_until(deadline_s, "its activation", status)
 
     async def open(self) -> MoveResult:
@@ -120,9 +123,10 @@ class RobotiqGripper:
         """
         count = count_for_width(width_mm, self._calibration)
         speed, force = speed_setting(speed_mm_s), force_setting(force_N)
+        stops = self._stops
         async with self._turn:
-            stops = self._stops
             before, _ = await self._ready()
+            self._go_on_unless_stopped(stops)
             travel_s = abs(before.position - count) * self._calibration.mm_per_count / speed_mm_s
             deadline_s = time.monotonic() + travel_s + self._settings.move_margin_s
             self._held_request = None
@@ -130,8 +134,7 @@ class RobotiqGripper:
                 await self.link.go_to(count, speed, force)
                 status, at_s = await self._arrival(count, deadline_s, stops)
             except (GripperError, asyncio.CancelledError):
-                with suppress(GripperError):
-                    await self.link.halt()
+                await self._halt_if_possible()
                 raise
             reading = self._reading(status, at_s)
             if reading.object_state == ObjectState.CONTACT_CLOSING:
@@ -139,7 +142,7 @@ class RobotiqGripper:
             return MoveResult(width_mm, count, reading)
 
     async def stop(self) -> GripperReading:
-        """Stop where the fingers are; a move under way ends with `GripperStoppedError`. Idempotent.
+        """Stop where the fingers are; moves under way or waiting end with `GripperStoppedError`. Idempotent.
 
         Raises:
             GripperError: the wire.
@@ -183,12 +186,25 @@ class RobotiqGripper:
         position = None
         while True:
             status, at_s = await self._ready()
-            if self._stops != stops:
-                raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+            self._go_on_unless_stopped(stops)
             if status.echo == count and self._at_rest(status, count) and status.position == position:
                 return status, at_s
             position = status.position
             await self._wait_until(deadline_s, f"the move to count {count}", status)
+
+    def _go_on_unless_stopped(self, stops: int) -> None:
+        if self._stops != stops:
+            raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+
+    async def _halt_if_possible(self) -> None:
+        """One try, which does not hold up the error for longer than a few answers."""
+        with suppress(GripperError, TimeoutError):
+            async with asyncio.timeout(_HALT_ANSWERS * self._settings.answer_timeout_s):
+                await self.link.halt()
+
+    @staticmethod
+    def _is_active(status: Status) -> bool:
+        return status.state == State.ACTIVE and status.fault not in NEEDS_ACTIVATION
 
     @staticmethod
     def _at_rest(status: Status, count: int) -> bool:
@@ -231,12 +247,12 @@ class RobotiqGripper:
         )
 
 
-def make_gripper(settings: GripperSettings) -> RobotiqGripper:
+def make_gripper(settings: GripperSettings) -> Robotiq2F85:
     """The gripper that the settings name; nothing is sent yet.
 
     Args:
         settings: driver, wire, finger set and times.
     """
     if settings.driver == "urcap":
-        return RobotiqGripper(UrcapLink(settings.urcap, settings.answer_timeout_s), settings)
-    return RobotiqGripper(ModbusRtuLink(settings.modbus_rtu, settings.answer_timeout_s), settings)
+        return Robotiq2F85(UrcapLink(settings.urcap, settings.answer_timeout_s), settings)
+    return Robotiq2F85(ModbusRtuLink(settings.modbus_rtu, settings.answer_timeout_s), settings)
