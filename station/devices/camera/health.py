@@ -16,7 +16,7 @@ _SEAM_SHARE = 25
 _SEAM_LEVELS = 6.0
 """Rendered frames of all fruit on many units stay below 3.6, torn and shifted ones above 8.8."""
 _BASELINE_SHAPE = (40, 30)
-_FITS_BETTER = 0.6
+_FITS_BETTER = 0.85
 
 
 class FrameHealth:

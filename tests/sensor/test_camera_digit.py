@@ -1,0 +1,121 @@
+import asyncio
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from station.devices.camera.digit import DigitCamera, DigitDevice, find_digits, packed_leds, set_mode, to_portrait
+from station.devices.camera.interface import CameraError, Leds, NoCameraError
+from station.settings.camera import CameraSettings, DigitSettings
+
+
+def plug(root, node, usb_id, serial, index="0"):
+    """Lay out sysfs as the kernel does: class entries are links into the device tree."""
+    usb = root / "devices" / f"usb-{serial}"
+    video = usb / f"{usb.name}:1.0" / "video4linux" / node
+    video.mkdir(parents=True)
+    vendor, product = usb_id.split(":")
+    for name, text in (("idVendor", vendor), ("idProduct", product), ("serial", serial)):
+        (usb / name).write_text(f"{text}\n", encoding="ascii")
+    (video / "index").write_text(f"{index}\n", encoding="ascii")
+    (video / "device").symlink_to(video.parent.parent)
+    listing = root / "class" / "video4linux"
+    listing.mkdir(parents=True, exist_ok=True)
+    (listing / node).symlink_to(video)
+    return listing
+
+
+def test_sensors_are_found_by_vendor_product_and_serial(tmp_path):
+    plug(tmp_path, "video0", "046d:0825", "WEBCAM")
+    plug(tmp_path, "video10", "2833:0209", "D20003")
+    plug(tmp_path, "video2", "2833:0209", "D20966")
+    listing = plug(tmp_path, "video3", "2833:0209", "D20966", index="1")
+    assert find_digits(listing) == [DigitDevice("D20966", "/dev/video2"), DigitDevice("D20003", "/dev/video10")]
+    assert find_digits(tmp_path / "nowhere") == []
+
+
+@pytest.mark.parametrize(("leds", "value"), [(Leds(15, 15, 15), 0xFFF), (Leds(1, 2, 3), 0x123), (Leds(0, 0, 0), 0)])
+def test_lights_are_packed_four_bits_each(leds, value):
+    assert packed_leds(leds) == value
+
+
+@pytest.mark.parametrize("leds", [Leds(16, 0, 0), Leds(0, -1, 0)])
+def test_a_light_out_of_range_is_refused(leds):
+    with pytest.raises(ValueError, match="expected 0 to 15"):
+        packed_leds(leds)
+
+
+def test_landscape_becomes_portrait_by_a_quarter_turn():
+    landscape = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
+    portrait = to_portrait(landscape)
+    assert portrait.shape == (640, 480, 3)
+    assert np.array_equal(portrait, np.rot90(landscape))
+
+
+class FakeCapture:
+    """A V4L2 device that gives noise, stops after some frames, and remembers what was set."""
+
+    def __init__(self, frames=10**9, width=640.0):
+        self.left, self.properties, self.width, self.released = frames, {}, width, False
+
+    def isOpened(self):  # noqa: N802
+        return True
+
+    def set(self, prop, value):
+        self.properties[prop] = value
+        return True
+
+    def get(self, prop):
+        return self.width if prop == cv2.CAP_PROP_FRAME_WIDTH else self.properties[prop]
+
+    def read(self):
+        time.sleep(0.005)
+        self.left -= 1
+        image = np.random.default_rng(self.left % 1000).integers(60, 90, (480, 640, 3), dtype=np.uint8)
+        return self.left >= 0, image
+
+    def release(self):
+        self.released = True
+
+
+def test_a_mode_other_than_asked_for_is_an_error():
+    with pytest.raises(CameraError, match="asked for 640x480 at 30 frames/s, the driver gave 320x480 at 30"):
+        set_mode(FakeCapture(width=320.0), "D20966")
+
+
+def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_path):
+    listing = plug(tmp_path, "video4", "2833:0209", "D20966")
+    opened = []
+
+    def opener(node):
+        opened.append((node, FakeCapture(frames=10)))
+        return opened[-1][1]
+
+    async def play():
+        settings = CameraSettings(driver="digit", digit=DigitSettings(serial="D20966", green=9))
+        camera = DigitCamera(settings, listing, opener)
+        await camera.open()
+        while len(opened) < 2:
+            assert (await camera.frame(time.monotonic(), 5.0)).image.shape == (640, 480, 3)
+        await camera.set_leds(Leds(1, 2, 3))
+        await camera.frame(time.monotonic(), 5.0)
+        await camera.close()
+        await camera.close()
+
+    asyncio.run(play())
+    assert {node for node, _ in opened} == {"/dev/video4"}
+    assert all(capture.released for _, capture in opened)
+    assert opened[0][1].properties[cv2.CAP_PROP_ZOOM] == 0xF9F
+    assert opened[-1][1].properties[cv2.CAP_PROP_ZOOM] == 0x123
+
+
+def test_no_such_sensor_is_said_with_those_that_are_there(tmp_path):
+    listing = plug(tmp_path, "video4", "2833:0209", "D20003")
+
+    async def play():
+        camera = DigitCamera(CameraSettings(driver="digit", open_deadline_s=0.2), listing)
+        with pytest.raises(NoCameraError, match=r"no DIGIT D20966 is plugged in \(found: D20003\)"):
+            await camera.open()
+
+    asyncio.run(play())

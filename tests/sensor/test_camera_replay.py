@@ -1,0 +1,114 @@
+import asyncio
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from station.devices.camera.interface import CameraError, NoCameraError, NoFrameError
+from station.devices.camera.open import camera_from
+from station.devices.camera.replay import ReplayCamera, read_widths
+from station.settings.camera import CameraSettings, ReplaySettings
+
+
+def settings(source, **more):
+    return CameraSettings(driver="replay", replay=ReplaySettings(source=str(source), **more))
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A folder of twelve images, each of one grey level, and their widths."""
+    rows = ["image,width_mm"]
+    for number in range(12):
+        noise = np.random.default_rng(number).integers(0, 9, (64, 48, 3))
+        cv2.imwrite(str(tmp_path / f"frame_{number}.png"), (noise + 20 * number + 20).clip(0, 240).astype(np.uint8))
+        rows.append(f"frame_{number}.png,{40 - number}")
+    widths = tmp_path / "widths.csv"
+    widths.write_text("\n".join(rows), encoding="utf-8")
+    return tmp_path, widths
+
+
+def levels(frames):
+    return [round((float(frame.image.mean()) - 24) / 20) for frame in frames]
+
+
+def test_as_fast_as_asked_each_image_comes_once_in_natural_order_with_its_width(recording):
+    folder, widths = recording
+
+    async def play():
+        camera = camera_from(settings(folder, widths=str(widths), frames_per_s=None))
+        assert isinstance(camera, ReplayCamera)
+        for _ in range(2):
+            await camera.open()
+            frames = [await camera.frame(time.monotonic(), 1.0) for _ in range(12)]
+            assert levels(frames)[:11] == list(range(11))
+            assert [frame.width_mm for frame in frames] == [40 - number for number in range(12)]
+            assert camera.description.height_px == 64
+            with pytest.raises(NoFrameError, match="the recording has ended"):
+                await camera.frame(time.monotonic(), 1.0)
+            await camera.close()
+
+    asyncio.run(play())
+
+
+def test_in_real_time_the_rate_is_kept_and_frames_pass_unseen(recording):
+    folder, _ = recording
+
+    async def play():
+        camera = ReplayCamera(settings(folder, frames_per_s=20.0))
+        await camera.open()
+        began_s = time.monotonic()
+        seen = [await camera.frame(began_s, 2.0)]
+        while seen[-1].sequence < 12:
+            seen.append(await camera.frame(seen[-1].captured_s, 2.0))
+        # Eleven further frames at 20 a second.
+        assert time.monotonic() - began_s >= 0.5
+        with pytest.raises(NoFrameError):
+            await camera.frame(time.monotonic(), 0.1)
+        await camera.close()
+
+    asyncio.run(play())
+
+
+def test_a_video_is_a_recording(tmp_path):
+    path = tmp_path / "press.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, (48, 64))
+    for number in range(5):
+        writer.write(np.full((64, 48, 3), 40 * number + 20, np.uint8))
+    writer.release()
+
+    async def play():
+        camera = ReplayCamera(settings(path, frames_per_s=None))
+        await camera.open()
+        means = [(await camera.frame(0.0, 1.0)).image.mean() for _ in range(5)]
+        assert means == pytest.approx([20, 60, 100, 140, 180], abs=6)
+        await camera.close()
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize("content", [None, "folder", "notes.txt", "broken.png"])
+def test_what_is_no_recording_is_refused(tmp_path, content):
+    source = tmp_path / "recording"
+    if content:
+        source.mkdir()
+    if content in {"notes.txt", "broken.png"}:
+        (source / content).write_text("no image", encoding="utf-8")
+
+    async def play():
+        camera = ReplayCamera(settings(source))
+        with pytest.raises(NoCameraError, match=r"replay: .*(folder|remove it)"):
+            await camera.open()
+        with pytest.raises(CameraError, match="before it was opened"):
+            await camera.frame(0.0, 0.1)
+        await camera.close()
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize("text", ["image\na.png\n", "image,width_mm\na.png,wide\n", "image,width_mm\na.png,nan\n"])
+def test_bad_widths_are_refused(tmp_path, text):
+    path = tmp_path / "widths.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CameraError, match=r"widths\.csv"):
+        read_widths(path)

@@ -1,0 +1,245 @@
+import asyncio
+import json
+import struct
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from station.devices.camera.interface import FrameFault, Leds, NoCameraError, NoFrameError
+from station.devices.camera.probe import probe_camera
+from station.devices.camera.twin import TwinCamera
+from station.twin.digit.server import GEL_FAULTS
+
+
+async def fresh(camera, deadline_s=3.0):
+    return await camera.frame(time.monotonic(), deadline_s)
+
+
+async def until(camera, good, deadline_s=10.0):
+    """The first frame that is as wanted."""
+    async with asyncio.timeout(deadline_s):
+        while not good(frame := await fresh(camera)):
+            pass
+    return frame
+
+
+async def truth(server, **fields):
+    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+    request = json.dumps({"kind": "truth", **fields}).encode()
+    writer.write(struct.pack(">I", len(request)) + request)
+    (length,) = struct.unpack(">I", await reader.readexactly(4))
+    header = json.loads(await reader.readexactly(length))
+    payload = await reader.readexactly(header["bytes"])
+    writer.close()
+    await writer.wait_closed()
+    return header, payload
+
+
+def test_frames_come_in_order_fresh_and_healthy(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            await one.camera.open()
+            asked_s = time.monotonic()
+            frames = [await fresh(one.camera) for _ in range(5)]
+            assert all(frame.captured_s > asked_s for frame in frames)
+            assert [frame.sequence for frame in frames] == sorted({frame.sequence for frame in frames})
+            assert len({frame.content_hash for frame in frames}) == 5
+            for frame in frames:
+                assert frame.faults == frozenset()
+                assert frame.image.shape == (640, 480, 3)
+            description = one.camera.description
+            assert (description.height_px, description.width_px, description.mm_per_px) == (640, 480, 0.0266)
+
+    asyncio.run(play())
+
+
+def test_a_press_shows_and_its_truth_is_told_to_tests(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            untouched = (await fresh(one.camera)).image.astype(float)
+            header, mask = await truth(one.server)
+            assert header["force_n"] == 0
+            assert not any(mask)
+            one.close_to(3.0)
+            touched = (await fresh(one.camera)).image.astype(float)
+            header, mask = await truth(one.server)
+            truth_mask = np.frombuffer(mask, np.uint8).reshape(header["height"], header["width"]) > 0
+            assert header["closing_mm"] == pytest.approx(3.0)
+            assert header["force_n"] > 1
+            change = cv2.GaussianBlur(np.abs(touched - untouched).max(axis=2), (0, 0), 5)
+            assert change[truth_mask].mean() > 2.5 * change[~truth_mask].mean()
+            older, _ = await truth(one.server, sequence=1)
+            assert older["sequence"] == 1
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize(
+    ("fault", "amount", "named"),
+    [
+        ("stuck", 1.0, FrameFault.REPEATED),
+        ("wrong", 1.0, FrameFault.WRONG_SIZE),
+        ("frame_torn", 1.0, FrameFault.TORN),
+        ("frame_shifted", 1.0, FrameFault.SHIFTED),
+        ("frame_black", 1.0, FrameFault.BLACK),
+        ("frame_saturated", 1.0, FrameFault.SATURATED),
+    ],
+)
+def test_a_fault_in_the_frames_is_named_and_passes_with_the_fault(bench, fault, amount, named):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            await fresh(one.camera)
+            one.server.faults.set(fault, amount)
+            await until(one.camera, lambda frame: named in frame.faults)
+            one.server.faults.clear()
+            await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize(("fault", "amount"), [("off", 1.0), ("garbage", 1.0), ("slow", 300.0)])
+def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(bench, fault, amount):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            one.server.faults.set(fault, amount)
+            await asyncio.sleep(0.3)
+            began_s = time.monotonic()
+            with pytest.raises(NoFrameError, match=r"camera twin at 127\.0\.0\.1:\d+: no frame newer") as caught:
+                await fresh(one.camera, 0.5)
+            assert time.monotonic() - began_s < 5
+            if fault == "garbage":
+                assert "header" in str(caught.value)
+            one.server.faults.clear()
+            if fault != "slow":
+                await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+
+
+def test_a_delayed_frame_is_not_fresh(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            one.server.faults.set("delayed", 0.8)
+            await until(one.camera, lambda frame: FrameFault.STALE in frame.faults)
+            asked_s = time.monotonic()
+            frame = await one.camera.frame(asked_s, 5.0)
+            assert time.monotonic() - asked_s >= 0.8
+            assert frame.captured_s > asked_s
+
+    asyncio.run(play())
+
+
+def test_an_intermittent_camera_is_found_again_each_time(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            one.server.faults.set("intermittent", 0.3)
+            frames = [await fresh(one.camera) for _ in range(20)]
+            assert [frame.sequence for frame in frames] == sorted({frame.sequence for frame in frames})
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize("fault", GEL_FAULTS)
+def test_an_ill_gel_lens_or_led_shows(bench, fault):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            sound = (await fresh(one.camera)).image.astype(float)
+            one.server.faults.set(fault)
+            await until(one.camera, lambda frame: np.abs(frame.image - sound).max() > 50)
+
+    asyncio.run(play())
+
+
+def test_the_light_is_set_and_a_bad_light_refused(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            before = (await fresh(one.camera)).image.mean(axis=(0, 1))
+            await one.camera.set_leds(Leds(15, 3, 15))
+            after = await until(one.camera, lambda frame: frame.image[..., 1].mean() < 0.5 * before[1])
+            assert after.image[..., 2].mean() == pytest.approx(before[2], rel=0.15)
+            with pytest.raises(Exception, match="expected a whole number from 0 to 15"):
+                await one.camera.set_leds(Leds(16, 0, 0))
+
+    asyncio.run(play())
+
+
+def test_nobody_there_is_said_with_a_remedy(twin_settings):
+    async def play():
+        camera = TwinCamera(twin_settings(1, open_deadline_s=0.3))
+        with pytest.raises(NoCameraError, match=r"station twin.*correct camera\.twin"):
+            await camera.open()
+        await camera.close()
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        (b"{", "no JSON"),
+        (b"[1]", "JSON object"),
+        (b'{"kind": "cake"}', "'cake' came"),
+        (b'{"kind": "frame", "height": 640, "width": 480, "sequence": 1, "age_s": -1}', "age_s is -1"),
+        (b'{"kind": "frame", "height": 640, "width": true, "sequence": 1, "age_s": 0}', "width is True"),
+        (b'{"kind": "frame", "height": 640, "width": 99999, "sequence": 1, "age_s": 0}', "99999x640"),
+        (b'{"kind": "frame", "height": 2, "width": 2, "sequence": 1, "age_s": 0, "bytes": 11}', "11 bytes"),
+    ],
+)
+def test_a_peer_gone_mad_is_described(twin_settings, header, said):
+    async def answer(reader, writer):
+        writer.write(struct.pack(">I", len(header)) + header)
+        await writer.drain()
+        writer.close()
+
+    async def play():
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server:
+            camera = TwinCamera(twin_settings(server.sockets[0].getsockname()[1], open_deadline_s=0.5))
+            with pytest.raises(NoCameraError, match=said):
+                await camera.open()
+
+    asyncio.run(play())
+
+
+def test_a_bad_request_is_refused_with_words(bench):
+    async def play():
+        async with bench() as one:
+            refused, _ = await truth(one.server, sequence=12345)
+            assert "12345 is not among the last" in refused["message"]
+            reader, writer = await asyncio.open_connection("127.0.0.1", one.server.port)
+            writer.write(struct.pack(">I", 2**31))
+            (length,) = struct.unpack(">I", await reader.readexactly(4))
+            assert "at most" in json.loads(await reader.readexactly(length))["message"]
+            writer.close()
+            await writer.wait_closed()
+
+    asyncio.run(play())
+
+
+def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings):
+    async def play():
+        async with bench() as one:
+            settings = twin_settings(one.server.port)
+            [good] = await probe_camera(settings)
+            assert (good.device, good.verdict, good.remedy) == ("camera", "ok", "")
+            assert "480x640" in good.found
+            one.server.faults.set("frame_black")
+            [sick] = await probe_camera(settings)
+            assert sick.verdict == "fault"
+            assert "black" in sick.found
+            assert "LED" in sick.remedy
+        [gone] = await probe_camera(twin_settings(1, open_deadline_s=0.3))
+        assert gone.verdict == "fault"
+        assert "station twin" in gone.remedy
+
+    asyncio.run(play())
