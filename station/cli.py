@@ -20,6 +20,8 @@ class Entry(NamedTuple):
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "demo": Entry("station.commands.demo:demo", "Measure a simulated press and say where the report lies."),
+    "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
+    "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }

@@ -5,9 +5,11 @@ import gc
 import os
 import shutil
 import socket
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -98,3 +100,14 @@ def real_images() -> Path:
     if not (folder / "digit_presses").is_dir():
         pytest.skip("the folder of real DIGIT images is not beside this checkout")
     return folder
+
+
+@pytest.fixture
+def analyze() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `station analyze` as a user does."""
+
+    def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "station", "analyze", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # type: ignore[call-overload]
+
+    return run

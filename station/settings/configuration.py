@@ -10,7 +10,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, model_validator
 
+from station.settings.arm import ArmSettings
+from station.settings.camera import CameraSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
+from station.settings.gripper import GripperSettings
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
@@ -123,6 +126,10 @@ class Configuration(Settings):
     metrics: MetricsSettings = setting(
         MetricsSettings(), title="Metrics", description="Where Prometheus and supervisors reach the station."
     )
+
+    arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
+    gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
+    camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:

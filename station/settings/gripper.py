@@ -56,9 +56,9 @@ class UrcapSettings(Settings):
     """The gripper on a UR's wrist, reached through Robotiq's URCap."""
 
     host: str = setting(
-        "192.168.56.101",
+        "127.0.0.2",
         title="Robot's address",
-        description="Name or address of the UR controller on which the URCap runs.",
+        description="Name or address of the UR controller on which the URCap runs. The default is the twin.",
         min_length=1,
         max_length=253,
     )
@@ -95,9 +95,9 @@ class ModbusRtuSettings(Settings):
         le=115_200,
     )
     host: str = setting(
-        "192.168.56.101",
+        "127.0.0.2",
         title="Gateway's address",
-        description="Name or address of what carries RTU frames over TCP.",
+        description="Name or address of what carries RTU frames over TCP. The default is the twin.",
         min_length=1,
         max_length=253,
     )

@@ -4,6 +4,7 @@ import asyncio
 import csv
 from io import StringIO
 from pathlib import Path
+from typing import Literal
 
 import click
 import cv2
@@ -11,39 +12,61 @@ import numpy as np
 import numpy.typing as npt
 
 from station.errors import BadInputError
+from station.settings.configuration import load_configuration
 from station.twin.console import ask
 from station.twin.digit.press import render_press
 from station.twin.fruit import Kind
-from station.twin.process import CONSOLE_PORT, TwinOptions, run
-from station.twin.robotiq.modbus import PORT as RTU_PORT
-from station.twin.robotiq.urcap import PORT as URCAP_PORT
+from station.twin.process import CONSOLE_PORT, LOOPBACK, Twin, TwinOptions, run
 
-_LOOPBACK = "127.0.0.1"
 FRUIT = click.Choice([kind.value for kind in Kind])
 _OPEN_STEPS = 2
 
 
 SEED = click.IntRange(0, 2**31 - 1)
+PORT = click.IntRange(0, 65535)
 
 
 @click.group("twin", invoke_without_command=True)
 @click.option("--fruit", type=FRUIT, default=Kind.STRAWBERRY.value, show_default=True, help="What lies in the nest.")
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit, and the sensor's noise.")
 @click.option("--bench", is_flag=True, help="No arm: the fruit is always between the fingers.")
+@click.option("--polyscope", type=click.Choice(["5.22", "5.25"]), default="5.22", show_default=True, help="Version.")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="Listen where this station.yaml looks.")
+@click.option("--console", "console_port", type=PORT, default=CONSOLE_PORT, show_default=True, help="Console's port.")
 @click.pass_context
-def twin(context: click.Context, fruit: str, seed: int, bench: bool) -> None:  # noqa: FBT001 (click's way)
+def twin(
+    context: click.Context,
+    fruit: str,
+    seed: int,
+    bench: bool,  # noqa: FBT001 (click passes arguments by name)
+    polyscope: Literal["5.22", "5.25"],
+    config: Path | None,
+    console_port: int,
+) -> None:
     """Run the simulated arm, gripper, sensor and fruit until Ctrl-C, or talk to the one that runs."""
-    if context.invoked_subcommand is None:
-        asyncio.run(run(TwinOptions(fruit=Kind(fruit), seed=seed, bench=bench), _announce))
+    if context.invoked_subcommand is not None:
+        return
+    site = load_configuration(config)
+    options = TwinOptions(
+        fruit=Kind(fruit),
+        seed=seed,
+        bench=bench,
+        arm=site.arm,
+        gripper=site.gripper,
+        camera=site.camera.twin,
+        console_port=console_port,
+        polyscope=polyscope,
+    )
+    asyncio.run(run(options, lambda running: _announce(options, running)))
 
 
-def _announce(options: TwinOptions) -> None:
-    gripper = f"{options.arm_host}:{URCAP_PORT} (URCap), {options.arm_host}:{RTU_PORT} (Modbus RTU over TCP)"
+def _announce(options: TwinOptions, running: Twin) -> None:
+    urcap, rtu = options.gripper.urcap, options.gripper.modbus_rtu
     if not options.bench:
-        click.echo(f"arm      {options.arm_host}, on a UR controller's own ports")
-    click.echo(f"gripper  {gripper}")
-    click.echo(f"camera   {options.camera_host}:{options.camera_port}")
-    click.echo(f"console  {options.console_host}:{options.console_port}: station twin fault, station twin lay")
+        click.echo(f"arm      {options.arm.host}, on a UR controller's own ports")
+    click.echo(f"gripper  {urcap.host}:{urcap.port} (URCap), {rtu.host}:{rtu.port} (Modbus RTU over TCP)")
+    click.echo(f"camera   {options.camera.host}:{running.camera.port}")
+    click.echo(f"console  {LOOPBACK}:{running.console.address[1]}: station twin fault, station twin lay")
     click.echo("running; Ctrl-C ends it")
 
 
@@ -61,14 +84,15 @@ CONSOLE = click.option(
 def fault_command(device: str | None, fault: str | None, amount: float, clear: bool, console: int) -> None:  # noqa: FBT001
     """Switch a fault of a device on or off; without a DEVICE, list what is on, without a FAULT, what there is."""
     if device is None:
-        state = ask(_LOOPBACK, console, {"do": "list"})
+        state = ask(LOOPBACK, console, {"do": "list"})
         for name, active in state.items():
             click.echo(f"{name}: {', '.join(f'{fault} {amount:g}' for fault, amount in active.items()) or 'sound'}")
         return
-    request = {"do": "clear" if clear else "set", "device": device, "amount": amount}
-    if fault is not None or not clear:
-        request["fault"] = fault or ""
-    active = ask(_LOOPBACK, console, request)
+    if fault is None and not clear:
+        click.echo("\n".join(ask(LOOPBACK, console, {"do": "known", "device": device})))
+        return
+    request = {"do": "clear" if clear else "set", "device": device, "fault": fault, "amount": amount}
+    active = ask(LOOPBACK, console, request)
     click.echo(f"{device}: {', '.join(f'{name} {value:g}' for name, value in active.items()) or 'sound'}")
 
 
@@ -79,7 +103,7 @@ def fault_command(device: str | None, fault: str | None, amount: float, clear: b
 @CONSOLE
 def lay(fruit: str, seed: int, bruised: bool, console: int) -> None:  # noqa: FBT001
     """Lay another fruit into the running twin's nest."""
-    click.echo(ask(_LOOPBACK, console, {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised}))
+    click.echo(ask(LOOPBACK, console, {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised}))
 
 
 @twin.command("press")

@@ -30,6 +30,7 @@ class ConsoleServer:
         self._boards = boards
         self._actions: dict[str, Action] = {
             "list": self._list,
+            "known": self._known,
             "set": self._set,
             "clear": self._clear,
             **actions,
@@ -93,6 +94,9 @@ class ConsoleServer:
 
     def _list(self, _request: Mapping[str, Any]) -> dict[str, dict[str, float]]:
         return {device: board.snapshot() for device, board in self._boards.items()}
+
+    def _known(self, request: Mapping[str, Any]) -> list[str]:
+        return list(self._board(request).known)
 
     def _set(self, request: Mapping[str, Any]) -> dict[str, float]:
         amount = request.get("amount", 1.0)

@@ -3,14 +3,15 @@
 import asyncio
 import signal
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from station.errors import BadInputError
-from station.settings.arm import ArmPoses
+from station.settings.arm import ArmPoses, ArmSettings
 from station.settings.camera import TwinCameraSettings
+from station.settings.gripper import GripperSettings
 from station.twin.clock import Clock, SteadyClock
 from station.twin.console import ConsoleServer
 from station.twin.digit.sensor import DigitSensor
@@ -25,9 +26,9 @@ from station.twin.ur.controller import UrController, arm_faults
 from station.twin.ur.kinematics import forward
 from station.twin.world import World
 
+LOOPBACK = "127.0.0.1"
 CONSOLE_PORT = 49211
 _AT_NEST_MM = 10.0
-_CAMERA = TwinCameraSettings()
 
 
 class _Server(Protocol):
@@ -38,21 +39,20 @@ class _Server(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TwinOptions:
-    """What the twin is, and where it listens; the UR controller's ports are those of a real one."""
+    """What the twin is, and where it listens: where the station's settings look for the devices."""
 
     fruit: Kind = Kind.STRAWBERRY
     seed: int = 1
     """Of the fruit, and of the sensor's noise and drift."""
     bench: bool = False
     """No arm: the fingers are always where the fruit lies."""
-    arm_host: str = "127.0.0.2"
-    """The arm's address, and the gripper's, which is reached through the arm."""
-    camera_host: str = _CAMERA.host
-    camera_port: int = _CAMERA.port
-    console_host: str = "127.0.0.1"
+    arm: ArmSettings = field(default_factory=ArmSettings)
+    """Where the station looks for the arm, and the nest's pose."""
+    gripper: GripperSettings = field(default_factory=GripperSettings)
+    camera: TwinCameraSettings = field(default_factory=TwinCameraSettings)
     console_port: int = CONSOLE_PORT
+    """On the loopback; 0 for any that is free."""
     polyscope: Literal["5.22", "5.25"] = "5.22"
-    poses: ArmPoses = ArmPoses()
 
 
 class Twin:
@@ -75,23 +75,23 @@ class Twin:
             DigitSensor(options.seed),
             clock,
             self.boards["camera"],
-            host=options.camera_host,
-            port=options.camera_port,
+            host=options.camera.host,
+            port=options.camera.port,
         )
         self._servers: list[_Server] = [
             self.camera,
-            UrcapServer(self.gripper, options.arm_host),
-            RtuOverTcpServer(self.gripper, options.arm_host),
+            UrcapServer(self.gripper, options.gripper.urcap.host, options.gripper.urcap.port),
+            RtuOverTcpServer(self.gripper, options.gripper.modbus_rtu.host, options.gripper.modbus_rtu.port),
         ]
         if not options.bench:
             self.boards["arm"] = arm_faults()
-            arm = UrController(options.arm_host, clock, self.boards["arm"], polyscope=options.polyscope)
-            self.world.arm_at_nest = _near_nest(arm, options.poses)
+            arm = UrController(options.arm.host, clock, self.boards["arm"], polyscope=options.polyscope)
+            self.world.arm_at_nest = _near_nest(arm, options.arm.poses)
             self._servers.append(arm)
         self.console = ConsoleServer(
             self.boards,
             {"fruit": self._lay, "remove": self._remove, "state": self._state},
-            options.console_host,
+            LOOPBACK,
             options.console_port,
         )
         self._servers.append(self.console)
@@ -128,7 +128,7 @@ class Twin:
             raise ValueError(f"seed: expected a whole number from 0 to {2**31 - 1}, found {seed!r}")
         bruised = request.get("bruised", False)
         if not isinstance(bruised, bool):
-            raise ValueError(f"bruised: expected true or false, found {bruised!r}")
+            raise ValueError(f"bruised: expected true or false, found {bruised!r}")  # noqa: TRY004 (one error for all)
         fruit = draw_fruit(Kind(kind), seed, bruised=bruised)
         self.world.place(fruit)
         return f"{kind} {seed}, {fruit.width_mm:.1f} mm wide"
@@ -151,7 +151,7 @@ def _near_nest(arm: UrController, poses: ArmPoses) -> Callable[[], bool]:
     return lambda: bool(np.linalg.norm(1000 * (forward(arm.joints_rad)[:3, 3] - nest_m)) < _AT_NEST_MM)
 
 
-async def run(options: TwinOptions, on_started: Callable[[TwinOptions], None]) -> None:
+async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
     """Run the twin until the process is told to end by SIGINT or SIGTERM.
 
     Args:
@@ -168,7 +168,7 @@ async def run(options: TwinOptions, on_started: Callable[[TwinOptions], None]) -
     twin = Twin(options)
     await twin.start()
     try:
-        on_started(options)
+        on_started(twin)
         await ended.wait()
     finally:
         await twin.stop()

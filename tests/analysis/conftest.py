@@ -1,8 +1,5 @@
 """Tactile images made by code: a coloured gel and a ball pressed into it deeper and deeper."""
 
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,14 +52,3 @@ def press(tmp_path: Path) -> Press:
     widths = tmp_path / "widths.csv"
     widths.write_text("\n".join(rows) + "\n")
     return Press(folder, reference, widths, areas_px)
-
-
-@pytest.fixture
-def analyze() -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run `station analyze` as a user does."""
-
-    def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "station", "analyze", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # type: ignore[call-overload]
-
-    return run

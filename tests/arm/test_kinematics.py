@@ -82,7 +82,9 @@ def test_a_trapezoid_arrives_keeps_its_limits_and_never_goes_back(distance, spee
     assert speeds.max() <= speed * (1 + 1e-9)
     step_s = times[1] - times[0]
     assert np.abs(np.diff(speeds)).max() <= acceleration * step_s * (1 + 1e-6) + 1e-9
-    assert np.diff(travels) == pytest.approx((speeds[1:] + speeds[:-1]) / 2 * step_s, abs=acceleration * step_s**2 + 1e-9)
+    assert np.diff(travels) == pytest.approx(
+        (speeds[1:] + speeds[:-1]) / 2 * step_s, abs=acceleration * step_s**2 + 1e-9
+    )
 
 
 @given(positive, positive)

@@ -89,7 +89,7 @@ class Rig:
 
     async def until(self, condition: Callable[[], bool]) -> None:
         """Wait for a condition; the scenario's own limit is the deadline."""
-        while not condition():  # noqa: ASYNC110 (the twin has no events, as the real one has none)
+        while not condition():
             await asyncio.sleep(0.005)
 
 

@@ -31,6 +31,7 @@ def test_faults_are_set_listed_and_cleared():
         assert ask(host, port, {"do": "set", "device": "camera", "fault": "delayed", "amount": 0.5}) == {"delayed": 0.5}
         ask(host, port, {"do": "set", "device": "camera", "fault": "fogged"})
         assert board.amount("delayed") == 0.5
+        assert ask(host, port, {"do": "known", "device": "camera"}) == list(board.known)
         assert ask(host, port, {"do": "list"}) == {"camera": {"delayed": 0.5, "fogged": 1.0}}
         ask(host, port, {"do": "clear", "device": "camera", "fault": "delayed"})
         assert board.snapshot() == {"fogged": 1.0}
@@ -47,8 +48,8 @@ def test_faults_are_set_listed_and_cleared():
         ({"do": "set", "device": "camera", "fault": "hot"}, "camera has no fault 'hot'; it knows: off, stuck"),
         ({"do": "set", "device": "camera", "fault": "off", "amount": True}, "expected a finite number"),
         ({"do": "set", "device": "camera", "fault": "off", "amount": float("nan")}, "expected a finite number"),
-        ({"do": "brew"}, "one of list, set, clear, echo"),
-        ({"do": ["set"]}, "one of list, set, clear, echo"),
+        ({"do": "brew"}, "one of list, known, set, clear, echo"),
+        ({"do": ["set"]}, "one of list, known, set, clear, echo"),
         ({"do": "echo"}, "word"),
     ],
 )

@@ -41,8 +41,8 @@ class Capture(Protocol):
     """What is used of `cv2.VideoCapture`."""
 
     def isOpened(self) -> bool: ...  # noqa: N802, D102 (OpenCV's name)
-    def set(self, propId: int, value: float, /) -> bool: ...  # noqa: N803, D102
-    def get(self, propId: int, /) -> float: ...  # noqa: N803, D102
+    def set(self, propId: int, value: float, /) -> bool: ...  # noqa: D102
+    def get(self, propId: int, /) -> float: ...  # noqa: D102
     def read(self) -> tuple[bool, Image]: ...  # noqa: D102
     def release(self) -> None: ...  # noqa: D102
 

@@ -27,17 +27,20 @@ class FrameFeed:
         self.trouble = "it has sent nothing yet"
         """What the driver last had to struggle with; said where no frame comes."""
 
-    def publish(self, image: Image, captured_s: float, width_mm: float | None = None) -> None:
+    def publish(
+        self, image: Image, captured_s: float, width_mm: float | None = None, sequence: int | None = None
+    ) -> None:
         """Put a new frame; only from the event loop's thread.
 
         Args:
             image: shape (height, width, 3), dtype uint8; not changed from now on.
             captured_s: monotonic time of its capture.
             width_mm: the gripper's width recorded with it.
+            sequence: the device's own number of the frame; counted here where the device has none.
         """
         self._before, self._image = self._image, image
         self._captured_s, self._width_mm = captured_s, width_mm
-        self._sequence += 1
+        self._sequence = self._sequence + 1 if sequence is None else sequence
         self._changed.set()
 
     async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:

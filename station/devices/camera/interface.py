@@ -11,6 +11,7 @@ import numpy.typing as npt
 from station.errors import StationError
 
 Image = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.uint8]
 
 
 class CameraError(StationError):

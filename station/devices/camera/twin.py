@@ -23,6 +23,7 @@ from station.devices.camera.interface import (
     Frame,
     Image,
     Leds,
+    Mask,
     NoCameraError,
     NoFrameError,
 )
@@ -108,6 +109,35 @@ class TwinCamera:
         if answer.get("kind") != "leds":
             raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
 
+    async def true_mask(self, frame: Frame) -> Mask:
+        """What truly touched the gel in a frame, which only a twin can tell; never used for a measurement.
+
+        Args:
+            frame: one of the last frames that this camera gave.
+
+        Returns:
+            Shape (height, width), dtype uint8, 0 or 255.
+
+        Raises:
+            CameraError: the twin does not answer, or the frame is too old.
+        """
+        try:
+            async with asyncio.timeout(_SILENCE_S):
+                reader, writer = await self._ask({"kind": "truth", "sequence": frame.sequence})
+                try:
+                    answer = await _read_header(reader)
+                    if (
+                        answer.get("kind") != "truth"
+                        or answer.get("bytes") != frame.image.shape[0] * frame.image.shape[1]
+                    ):
+                        raise CameraError(f"camera twin at {self._where}: no truth: {answer.get('message')}")
+                    pixels = await reader.readexactly(answer["bytes"])
+                finally:
+                    await _close(writer)
+        except (OSError, EOFError, TimeoutError) as error:
+            raise CameraError(f"camera twin at {self._where}: the truth could not be read ({error!r})") from error
+        return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
+
     async def close(self) -> None:
         """Disconnect. Idempotent."""
         task, self._listening = self._listening, None
@@ -137,7 +167,7 @@ class TwinCamera:
                 if sequence <= last:
                     raise CameraProtocolError(f"frame {sequence} came after frame {last}; numbers must rise")
                 last = sequence
-                self._feed.publish(image, time.monotonic() - age_s)
+                self._feed.publish(image, time.monotonic() - age_s, sequence=sequence)
         finally:
             await _close(writer)
 

@@ -1,0 +1,138 @@
+"""`station grip`: one grip, its frames and widths kept for `station analyze`."""
+
+import asyncio
+import contextlib
+import csv
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+
+import click
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.devices.arm.ur import UrArm
+from station.devices.camera.interface import Image
+from station.devices.camera.open import camera_from
+from station.devices.camera.twin import TwinCamera
+from station.devices.gripper.robotiq import make_gripper
+from station.errors import BadInputError
+from station.service.bare_grip import BareGrip, Cell, GripStep
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.recipe import Recipe, find_recipe
+from station.vision.methods import make_method
+
+_ARM_DEADLINE_S = 15.0
+_COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_a", "captured_s")
+
+
+@click.command("grip")
+@click.option("--recipe", "recipe_name", required=True, metavar="NAME", help="Recipe, by name or file.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the frames; must not exist.")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@click.option("--bench", is_flag=True, help="No arm: the fruit is already between the fingers.")
+def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click's way)
+    """Grip one fruit by a recipe's width steps, without a judgement. The arm and the gripper move.
+
+    Writes reference/, frames/ and widths.csv with the measured widths, and truth/ where the camera is the twin's.
+    """
+    configuration = load_configuration(config)
+    recipe = find_recipe(recipe_name, configuration.recipes_folder)
+    recording = _Recording(out)
+    asyncio.run(_grip(configuration, recipe, recording, bench=bench))
+    click.echo(
+        f"{recording.count} images in {out}; measure them with:\n"
+        f"station analyze --recipe {recipe_name} --reference {out / 'reference'} --widths {out / 'widths.csv'} "
+        f"--out {out / 'report'} {out / 'frames'}"
+    )
+
+
+async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
+    camera = camera_from(configuration.camera)
+    async with contextlib.AsyncExitStack() as stack:
+        stack.push_async_callback(camera.close)
+        await camera.open()
+        gripper = make_gripper(configuration.gripper)
+        stack.push_async_callback(gripper.close)
+        arm = None
+        if not bench:
+            arm = await stack.enter_async_context(UrArm(configuration.arm))
+            await arm.ready(_ARM_DEADLINE_S)
+
+        async def keep(step: GripStep) -> None:
+            mask = await camera.true_mask(step.last_frame) if isinstance(camera, TwinCamera) else None
+            recording.add(step, mask)
+            touched = "approach" if step.number < 0 else f"step {step.number}"
+            click.echo(f"{touched:9} width {step.move.width_mm:6.2f} mm  {step.move.reading.object_state}")
+
+        def method(references: Sequence[Image]):  # noqa: ANN202 (the room's own protocol)
+            return make_method(references, recipe.segmentation)
+
+        await BareGrip(Cell(camera, gripper, arm), recipe, method, recording.add_references, keep).run()
+
+
+class _Recording:
+    """The folder of one grip; what was reached stays, whatever comes after."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._rows: list[tuple[object, ...]] = []
+        try:
+            for name in ("reference", "frames"):
+                (folder / name).mkdir(parents=True)
+        except OSError as error:
+            raise BadInputError(f"{folder}: cannot be made: {error.strerror}; name a new folder with --out") from error
+
+    @property
+    def count(self) -> int:
+        """How many steps are kept."""
+        return len(self._rows)
+
+    def add_references(self, references: Sequence[Image]) -> None:
+        """Keep the reference frames.
+
+        Args:
+            references: images with nothing touching the gel.
+        """
+        for number, image in enumerate(references):
+            self._write(f"reference/reference_{number}.png", image)
+
+    def add(self, step: GripStep, mask: npt.NDArray[np.uint8] | None) -> None:
+        """Keep a step: picture, true mask where it is known, and a row of the table.
+
+        Args:
+            step: as reached.
+            mask: shape (height, width), 0 or 255.
+        """
+        name = f"step_{len(self._rows):02d}.png"
+        self._write(f"frames/{name}", step.image)
+        if mask is not None:
+            self._write(f"truth/{name}", mask)
+        reading = step.move.reading
+        self._rows.append(
+            (
+                name,
+                f"{reading.width_mm:.3f}",
+                f"{step.move.requested_width_mm:.3f}",
+                reading.object_state.value,
+                "" if reading.current_a is None else f"{reading.current_a:.2f}",
+                f"{step.last_frame.captured_s:.4f}",
+            )
+        )
+        text = StringIO(newline="")
+        csv.writer(text).writerows([_COLUMNS, *self._rows])
+        self._write_bytes("widths.csv", text.getvalue().encode())
+
+    def _write(self, name: str, picture: npt.NDArray[np.uint8]) -> None:
+        self._write_bytes(name, cv2.imencode(".png", picture)[1].tobytes())
+
+    def _write_bytes(self, name: str, data: bytes) -> None:
+        path = self._folder / name
+        try:
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(data)
+        except OSError as error:
+            raise BadInputError(
+                f"{path}: cannot be written: {error.strerror}; free space or name another --out"
+            ) from error

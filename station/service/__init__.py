@@ -1,0 +1,1 @@
+"""What the station does with its devices."""

@@ -1,0 +1,74 @@
+"""A whole simulated cell in a process of its own, and the station's command line against it."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from station.twin.console import ask
+
+_NUMBERS = itertools.count(1)
+
+
+def own_host() -> str:
+    """A loopback address that no other test uses at the same time: a UR controller's ports are fixed."""
+    return f"127.77.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
+
+
+@dataclass
+class Cell:
+    """A running twin and the configuration that leads to it."""
+
+    configuration: Path
+    console: int
+    process: subprocess.Popen[str]
+
+    def ask(self, **request: Any) -> Any:
+        return ask("127.0.0.1", self.console, request)
+
+    def station(self, *arguments: object, timeout_s: float = 90) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "station", *map(str, arguments), "--config", str(self.configuration)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
+
+    def begin(self, *arguments: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "station", *map(str, arguments), "--config", str(self.configuration)]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
+
+
+@pytest.fixture
+def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]:
+    """Start a twin with the arguments given; it is ended after the test."""
+    cells: list[Cell] = []
+
+    def make(*arguments: object) -> Cell:
+        host = own_host()
+        configuration = tmp_path / f"station_{len(cells)}.yaml"
+        configuration.write_text(
+            f"arm: {{host: {host}}}\n"
+            f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}}}\n"
+            f"camera: {{twin: {{port: {unused_port}}}}}\n"
+        )
+        command = [sys.executable, "-m", "station", "twin", "--console", "0", "--config", str(configuration)]
+        process = subprocess.Popen([*command, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        console = 0
+        for line in process.stdout:
+            if line.startswith("console"):
+                console = int(line.split(":")[1])
+            if line.startswith("running"):
+                break
+        cells.append(Cell(configuration, console, process))
+        return cells[-1]
+
+    yield make
+    for cell in cells:
+        cell.process.send_signal(signal.SIGINT)
+        cell.process.communicate(timeout=20)
+        assert cell.process.returncode == 0

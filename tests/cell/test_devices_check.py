@@ -1,0 +1,55 @@
+"""`station devices check` against a twin with one thing wrong at a time."""
+
+import pytest
+
+DEVICES = ("arm controller", "arm RTDE", "arm programs", "gripper", "camera")
+
+
+def verdicts(output: str) -> dict[str, str]:
+    lines = [line for line in output.splitlines() if line and not line.startswith(" ")]
+    return {device: line.split()[0] for line in lines for device in DEVICES if line[8:].startswith(device)}
+
+
+def test_a_sound_cell_names_every_device_with_what_it_is(make_cell):
+    done = make_cell().station("devices", "check")
+    assert done.returncode == 0, done.stderr
+    assert verdicts(done.stdout) == dict.fromkeys(DEVICES, "ok") | {"gripper": "warning"}
+    assert "not activated" in done.stdout
+    assert "PolyScope 5.22" in done.stdout
+    assert "480x640" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("device", "fault", "words"),
+    [
+        ("arm", "off", "not usable: arm"),
+        ("arm", "protective_stop", "not usable: arm controller"),
+        ("arm", "local_mode", "not usable: arm controller"),
+        ("gripper", "off", "not usable: gripper"),
+        ("gripper", "over_temperature", "not usable: gripper"),
+        ("camera", "off", "not usable: camera"),
+        ("camera", "stuck", "not usable: camera"),
+        ("camera", "garbage", "not usable: camera"),
+        ("camera", "frame_black", "not usable: camera"),
+    ],
+)
+def test_a_fault_is_told_with_its_remedy_and_exit_code_1(make_cell, device, fault, words):
+    cell = make_cell()
+    cell.ask(do="set", device=device, fault=fault)
+    done = cell.station("devices", "check")
+    assert done.returncode == 1
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    lines = done.stdout.splitlines()
+    for number, line in enumerate(lines):
+        if line.startswith("fault"):
+            assert lines[number + 1].strip(), "a fault without a remedy"
+
+
+def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
+    cell = make_cell("--bench")
+    cell.ask(do="set", device="gripper", fault="off")
+    cell.ask(do="set", device="camera", fault="off")
+    done = cell.station("devices", "check")
+    assert done.returncode == 1
+    assert "not usable: arm, camera, gripper" in done.stderr

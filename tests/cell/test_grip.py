@@ -1,0 +1,123 @@
+"""`station grip` against the twin, read by `station analyze`; and what comes of a grip when something fails."""
+
+import csv
+import signal
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+
+OPEN_MM = 53.0
+
+
+def table(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_path):
+    cell = make_cell("--fruit", "raspberry", "--seed", 3)
+    out = tmp_path / "grip"
+    done = cell.station("grip", "--recipe", "raspberry", "--out", out)
+    assert done.returncode == 0, done.stderr
+    rows = table(out / "widths.csv")
+    widths = [float(row["width_mm"]) for row in rows]
+    assert len(rows) == 18
+    assert widths == sorted(widths, reverse=True)
+    assert all(abs(float(row["width_mm"]) - float(row["commanded_width_mm"])) <= 0.4 for row in rows)
+    truth = [np.count_nonzero(cv2.imread(str(out / "truth" / row["image"]), 0)) for row in rows]
+    assert truth[0] == 0
+    assert all(before < after for before, after in pairwise(truth))
+    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+
+    report = tmp_path / "report"
+    read = analyze(
+        "--recipe", "raspberry", "--reference", out / "reference", "--widths", out / "widths.csv",
+        "--out", report, out / "frames",
+    )  # fmt: skip
+    assert read.returncode == 0, read.stderr
+    contacts = [row["contact"] for row in table(report / "results.csv")]
+    assert contacts[0] == "0"
+    assert contacts[1] == "1"
+
+
+def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
+    cell = make_cell("--bench", "--fruit", "rubber_ball")
+    done = cell.station("grip", "--bench", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
+    assert done.returncode == 0, done.stderr
+    rows = table(tmp_path / "grip" / "widths.csv")
+    assert float(rows[0]["width_mm"]) == pytest.approx(46, abs=0.4)
+    assert float(rows[-1]["width_mm"]) == pytest.approx(33, abs=0.4)
+    assert len(rows) == 14
+
+
+def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):
+    cell = make_cell("--bench")
+    cell.ask(do="remove")
+    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    assert done.returncode == 1
+    assert "nothing was touched from 53 down to 22 mm" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("device", "fault", "words"),
+    [
+        ("camera", "stuck", "bad frames in a row (repeated)"),
+        ("camera", "off", "no frame newer than asked for"),
+        ("camera", "frame_torn", "torn"),
+    ],
+)
+def test_a_camera_that_fails_in_mid_grip_ends_it_and_lets_go(make_cell, tmp_path, device, fault, words):
+    cell = make_cell("--bench", "--fruit", "strawberry")
+    grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    assert grip.stdout is not None
+    assert grip.stdout.readline()
+    cell.ask(do="set", device=device, fault=fault)
+    _, errors = grip.communicate(timeout=60)
+    assert grip.returncode == 1
+    assert words in errors
+    assert "Traceback" not in errors
+    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+    assert (tmp_path / "grip" / "widths.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("device", "fault", "words"),
+    [("arm", "protective_stop", "protective stop"), ("arm", "emergency_stop", "mergency")],
+)
+def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, tmp_path, device, fault, words):
+    cell = make_cell("--fruit", "blueberry")
+    grip = cell.begin("grip", "--recipe", "blueberry", "--out", tmp_path / "grip")
+    assert grip.stdout is not None
+    assert grip.stdout.readline()
+    cell.ask(do="set", device=device, fault=fault)
+    _, errors = grip.communicate(timeout=60)
+    assert grip.returncode == 1
+    assert words in errors
+    assert "Traceback" not in errors
+
+
+def test_ctrl_c_in_mid_grip_lets_go(make_cell, tmp_path):
+    cell = make_cell("--bench", "--fruit", "strawberry")
+    grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    assert grip.stdout is not None
+    for _ in range(3):
+        assert grip.stdout.readline()
+    grip.send_signal(signal.SIGINT)
+    _, errors = grip.communicate(timeout=60)
+    assert grip.returncode == 130
+    assert "Traceback" not in errors
+    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+
+
+def test_an_existing_folder_is_not_mixed_into(make_cell, tmp_path):
+    cell = make_cell("--bench")
+    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path)
+    assert done.returncode in {0, 2}
+    (tmp_path / "again" / "reference").mkdir(parents=True)
+    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "again")
+    assert done.returncode == 2
+    assert "name a new folder" in done.stderr

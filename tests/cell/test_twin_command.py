@@ -1,0 +1,45 @@
+"""`station twin` as a person uses it."""
+
+import subprocess
+import sys
+
+import pytest
+
+
+def station(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "station", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_faults_and_fruit_from_the_command_line(make_cell):
+    console = ("--console", make_cell("--bench").console)
+    assert "camera: sound" in station("twin", "fault", *console).stdout
+    assert "lens_fogged" in station("twin", "fault", "camera", *console).stdout
+    assert station("twin", "fault", "camera", "dirt", "--amount", 3, *console).stdout == "camera: dirt 3\n"
+    assert "camera: dirt 3" in station("twin", "fault", *console).stdout
+    assert station("twin", "fault", "camera", "dirt", "--clear", *console).stdout == "camera: sound\n"
+    assert "raspberry 4" in station("twin", "lay", "raspberry", "--seed", 4, *console).stdout
+    refused = station("twin", "fault", "camera", "cold", *console)
+    assert refused.returncode == 1
+    assert "it knows: off, stuck" in refused.stderr
+
+
+def test_a_second_twin_on_the_same_addresses_is_refused(make_cell):
+    cell = make_cell()
+    second = cell.station("twin", "--console", 0)
+    assert second.returncode == 2
+    assert "is another twin running?" in second.stderr
+    assert "Traceback" not in second.stderr
+    assert cell.station("devices", "check").returncode == 0
+
+
+@pytest.mark.parametrize("fruit", ["strawberry", "raspberry", "blueberry", "rubber_ball"])
+def test_a_drawn_press_is_the_same_each_time_and_grows(fruit, tmp_path):
+    folders = [tmp_path / "first", tmp_path / "second"]
+    for folder in folders:
+        done = station("twin", "press", "--fruit", fruit, "--steps", 3, "--out", folder)
+        assert done.returncode == 0, done.stderr
+    files = sorted(path.relative_to(folders[0]) for path in folders[0].rglob("*") if path.is_file())
+    assert len(files) == 5 + 5 + 5 + 1
+    assert all((folders[0] / file).read_bytes() == (folders[1] / file).read_bytes() for file in files)
+    assert station("twin", "press", "--out", folders[0]).returncode == 2
