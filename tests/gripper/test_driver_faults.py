@@ -327,16 +327,18 @@ def test_an_answer_to_another_question_is_refused():
     asyncio.run(scenario())
 
 
-def test_a_number_beyond_a_byte_is_refused(on: OnWire):
+@pytest.mark.parametrize("lie", ["STA 4", "GTO 2", "OBJ 7", "POS 300", "PRE -1", "FLT x"])
+def test_a_value_that_a_variable_cannot_have_is_refused(lie: str):
     async def scenario() -> None:
         async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             while line := await reader.readline():
-                writer.write(line.replace(b"GET ", b"").strip() + b" 300\n")
+                name = line.decode().split()[1]
+                writer.write(f"{lie if lie.startswith(name) else f'{name} 0'}\n".encode())
             writer.close()
 
         server = await asyncio.start_server(mad, "127.0.0.1", 0)
         link = UrcapLink(UrcapSettings(host="127.0.0.1", port=server.sockets[0].getsockname()[1]), 0.2)
-        with pytest.raises(GripperProtocolError, match="300"):
+        with pytest.raises(GripperProtocolError, match=lie):
             await link.status()
         server.close()
         await asyncio.sleep(0.01)

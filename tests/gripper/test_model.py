@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
@@ -136,6 +136,7 @@ def test_current_is_drawn_while_moving_and_more_under_load():
 
 
 @given(st.lists(st.floats(0.001, 0.5), max_size=12), st.floats(5.0, 80.0), st.floats(0.5, 50.0))
+@example([0.29651618690593334, 0.29651618690593334, 0.5], 40.0, 0.5)
 def test_where_the_fingers_stop_does_not_depend_on_how_often_one_looks(
     looks_s: list[float], free_mm: float, stiffness: float
 ):

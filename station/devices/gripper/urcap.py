@@ -42,10 +42,10 @@ class UrcapLink:
         """Read the registers, the position after the object state: at rest the two belong together."""
         async with self._exchange:
             return Status(
-                state=await self._get("STA"),
-                go_to=await self._get("GTO") == 1,
+                state=await self._get("STA", largest=3),
+                go_to=await self._get("GTO", largest=1) == 1,
                 echo=await self._get("PRE"),
-                object_=await self._get("OBJ"),
+                object_=await self._get("OBJ", largest=3),
                 position=await self._get("POS"),
                 fault=await self._get("FLT"),
                 current_a=None,
@@ -83,12 +83,12 @@ class UrcapLink:
             if answer != _ACKNOWLEDGED:
                 await self._refuse(assignments, answer)
 
-    async def _get(self, name: str) -> int:
+    async def _get(self, name: str, largest: int = 255) -> int:
         answer = await self._ask(f"GET {name}\n".encode())
         words = answer.decode("ascii", errors="replace").split()
         if words == [name, "?"]:
             raise GripperEmergencyStopError
-        if len(words) != 2 or words[0] != name or not words[1].isdecimal() or int(words[1]) > 255:
+        if len(words) != 2 or words[0] != name or not words[1].isdecimal() or int(words[1]) > largest:
             await self._refuse(f"GET {name}", answer)
         return int(words[1])
 

@@ -212,11 +212,11 @@ class RobotiqGripper:
         leg = _Leg(self._fingers.opening_mm(command.position), speed_mm_s(command.speed), grip_force_n(command.force))
         if self._object != _Object.MOVING and self._resistance_n(leg, self._opening_mm) <= 0:
             self._object = _Object.AT_POSITION
+        closing = leg.target_mm < self._opening_mm
         arrived = self._travel(leg, duration_s) > 0
         if arrived and self._opening_mm == leg.target_mm:
             self._object = _Object.AT_POSITION
         elif arrived:
-            closing = leg.target_mm < self._opening_mm
             self._object = _Object.CONTACT_CLOSING if closing else _Object.CONTACT_OPENING
 
     def _travel(self, leg: _Leg, duration_s: float) -> float:
@@ -245,7 +245,7 @@ class RobotiqGripper:
         steps = int(abs(goal_mm - free_mm) / _PROBE_MM) + 1
         start_mm = free_mm
         for step in range(1, steps + 1):
-            held_mm = start_mm + (goal_mm - start_mm) * step / steps
+            held_mm = goal_mm + (start_mm - goal_mm) * (steps - step) / steps
             if self._holds(leg, held_mm):
                 while abs(held_mm - free_mm) > _CONTACT_MM:
                     middle_mm = (held_mm + free_mm) / 2
