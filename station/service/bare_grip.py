@@ -82,11 +82,12 @@ class BareGrip:
         async with _kept_healthy(self._cell.arm):
             try:
                 await self._grip()
-            except StationError as error:
+            except (StationError, asyncio.CancelledError) as error:
                 try:
                     await self._let_go()
                 except StationError as second:
-                    raise GripError(f"{error}. After that the fruit could not be let go: {second}") from error
+                    what = str(error) or "the grip was called off"
+                    raise GripError(f"{what}. After that the fruit could not be let go: {second}") from error
                 raise
             await self._let_go()
 

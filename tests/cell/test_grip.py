@@ -66,7 +66,7 @@ def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):
     ("device", "fault", "words"),
     [
         ("camera", "stuck", "bad frames in a row (repeated)"),
-        ("camera", "off", "no frame newer than asked for"),
+        ("camera", "off", "camera twin at"),
         ("camera", "frame_torn", "torn"),
     ],
 )
