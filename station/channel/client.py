@@ -84,7 +84,9 @@ class ChannelClient:
         try:
             return reply.model_validate_json(body)
         except ValidationError as error:
-            raise ChannelError(f"{self._peer} answered {name} with something else than {reply.__name__}: {error}") from error
+            raise ChannelError(
+                f"{self._peer} answered {name} with something else than {reply.__name__}: {error}"
+            ) from error
 
     async def close(self) -> None:
         """Give up every request that is under way and let the socket go; closing twice does nothing."""

@@ -200,5 +200,10 @@ class ArmSettings(Settings):
         le=100,
     )
     restart_window_s: float = setting(
-        60.0, title="Restart window", description="The time over which restarts are counted.", unit="s", ge=1.0, le=3600.0
+        60.0,
+        title="Restart window",
+        description="The time over which restarts are counted.",
+        unit="s",
+        ge=1.0,
+        le=3600.0,
     )

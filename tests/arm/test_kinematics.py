@@ -82,7 +82,9 @@ def test_a_trapezoid_arrives_keeps_its_limits_and_never_goes_back(distance, spee
     assert speeds.max() <= speed * (1 + 1e-9)
     step_s = times[1] - times[0]
     assert np.abs(np.diff(speeds)).max() <= acceleration * step_s * (1 + 1e-6) + 1e-9
-    assert np.diff(travels) == pytest.approx((speeds[1:] + speeds[:-1]) / 2 * step_s, abs=acceleration * step_s**2 + 1e-9)
+    assert np.diff(travels) == pytest.approx(
+        (speeds[1:] + speeds[:-1]) / 2 * step_s, abs=acceleration * step_s**2 + 1e-9
+    )
 
 
 @given(positive, positive)
@@ -126,7 +128,8 @@ def test_a_straight_tool_motion_is_straight_continuous_and_in_time():
     body = Body(HOME, 0.0)
     body.tcp_offset = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
     start = body.tool_pose()
-    target = (*(np.array(start[:3]) + [0.1, -0.2, 0.15]), *start[3:])
+    x, y, z, rx, ry, rz = start
+    target = (x + 0.1, y - 0.2, z + 0.15, rx, ry, rz)
     body.move_tool(target, 0.25, 1.0)
     positions, speeds = simulate(body, 2.0)
     assert not body.moving

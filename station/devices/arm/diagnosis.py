@@ -22,7 +22,7 @@ STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
 
 
 def from_state(snapshot: Snapshot) -> ArmFault | None:
-    """What the state alone tells; None where it shows nothing that keeps the arm from moving, but perhaps no program."""
+    """What the state alone tells; None where power and safety let the arm move."""
     for bits, cause, words in SAFETY_CAUSES:
         if snapshot.safety_bits & bits:
             return ArmFault(cause, words)
@@ -58,7 +58,9 @@ def from_words(words: str) -> ArmFault | None:
     if "remote control" in lowered:
         return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
     if "already in use" in lowered:
-        return ArmFault(ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers")
+        return ArmFault(
+            ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers"
+        )
     if "could not connect" in lowered or "timeout connecting" in lowered:
         return ArmFault(ArmCause.LINK_LOST, f"ur-rtde could not connect: {words}")
     return None

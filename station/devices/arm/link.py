@@ -1,4 +1,4 @@
-"""The link to the controller: it brings up the process that ur-rtde lives in, watches it, and puts another in its place.
+"""The link to the controller: the process that ur-rtde lives in, brought up, watched, and put back when it is gone.
 
 The link comes back by itself after a drop. What a person has to look at stays as a fault until that person's verb:
 a stop of any kind, a program that no longer plays, a budget of restarts that is used up.
@@ -44,6 +44,8 @@ class ArmLink:
         self._lock = asyncio.Lock()
         self._keeping: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
+        self.fault_since_s = 0.0
+        """When the fault was seen, on the machine's monotonic clock."""
         self.attachment = 0
         """Counts the programs that were brought to play: what was learnt from an earlier one may not hold any more."""
 
@@ -98,7 +100,7 @@ class ArmLink:
             raise self.fault
 
     async def snapshot(self) -> Snapshot:
-        """The controller's state, asked for now.
+        """The controller's state, asked for now; the time of asking is added to its age.
 
         Raises:
             ArmFault: there is none.
@@ -106,12 +108,16 @@ class ArmLink:
         process = self._process
         if process is None:
             raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+        limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
-            return await process.ask(self._beat_message(), Snapshot, deadline_s=self._settings.stale_after_s)
+            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=limit_s)
         except ArmFault as fault:
-            if process.ended and self.fault is None:
+            if fault.cause is ArmCause.DEADLINE:
+                raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
+            if self.fault is None:
                 self._set(fault)
             raise
+        return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
 
     async def order(self, request: Move | Reachable | Halt) -> Outcome:
         """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
@@ -185,8 +191,9 @@ class ArmLink:
                     await self._step()
                 except ArmFault as fault:
                     await self._lose(fault)
-                except OSError as error:
-                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}"))
+                except Exception as error:  # the link outlives whatever else goes wrong with it
+                    log.exception("the arm's link")
+                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
             pause_s = min(FIRST_PAUSE_S * 2**self._failures, LONGEST_PAUSE_S) if self._failures else BEAT_S
             await asyncio.sleep(pause_s)
 
@@ -232,7 +239,9 @@ class ArmLink:
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
         outcome = await self._process.ask(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
-            raise from_words(outcome.words) or ArmFault(ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}")
+            raise from_words(outcome.words) or ArmFault(
+                ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}"
+            )
         return self._process
 
     async def _command(self, process: ArmProcess) -> None:
@@ -288,12 +297,13 @@ class ArmLink:
         self._set(fault)
 
     async def _drop(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            await process.end()
+        if self._process is not None:
+            await self._process.end()
+            self._process = None
 
     def _set(self, fault: ArmFault | None) -> None:
         before = str(self.fault)
+        self.fault_since_s = time.monotonic()
         if fault is not None and fault.cause in SELF_HEALING:
             self._lost = fault
         else:
