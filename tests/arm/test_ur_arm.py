@@ -201,6 +201,39 @@ def test_a_program_stopped_on_the_pendant_stays_stopped_until_a_person_uploads_i
     asyncio.run(run())
 
 
+def test_what_waits_for_a_person_outlives_the_process(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("pendant_stop")
+            await until(lambda: has_cause(arm, ArmCause.PROGRAM_STOPPED))
+            first = arm.process_id
+            os.kill(first, signal.SIGKILL)
+
+            async def back():
+                return arm.process_id not in {first, None} and (await arm.state()).joints_rad is not None
+
+            await until(back)
+            await asyncio.sleep(0.5)
+            assert await has_cause(arm, ArmCause.PROGRAM_STOPPED)
+            assert bench.controller.script.runtime_state is RuntimeState.STOPPED
+            await arm.upload_again()
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_a_slow_arm_goes_on_at_a_fraction_of_its_speed(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", 4.0)
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: max(map(abs, bench.controller.body.speeds_rad_s)) == pytest.approx(0.4, rel=1e-3))
+            bench.faults.clear("slow")
+            await move
+
+    asyncio.run(run())
+
+
 def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm, until):
     async def run():
         async with healthy_arm() as (bench, arm):
@@ -328,6 +361,19 @@ def test_a_controller_that_falls_silent_in_the_constructor_is_killed(bench, heal
                 await asyncio.gather(ticking, return_exceptions=True)
                 made.faults.clear("rtde_silent")
                 await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+def test_a_link_that_comes_and_goes_is_put_back(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            first = arm.process_id
+            bench.faults.set("intermittent", 3.0)
+            await until(lambda: arm.process_id not in {first, None})
+            bench.faults.clear("intermittent")
+            await arm.ready(15.0)
+            await arm.move_to("accept")
 
     asyncio.run(run())
 

@@ -36,14 +36,16 @@ class ArmProcess:
             frequency_hz: how often the controller shall send its state.
 
         Raises:
-            OSError: no process can be started.
+            ArmFault: no process can be started.
         """
-        folder = tempfile.TemporaryDirectory(prefix="fruit-station-arm-")
+        folder = tempfile.TemporaryDirectory(prefix="fruit-station-arm-", ignore_cleanup_errors=True)
         endpoint = f"ipc://{folder.name}/channel"
         try:
             process = await cls._start(endpoint, host, frequency_hz)
-        except BaseException:
+        except BaseException as error:
             folder.cleanup()
+            if isinstance(error, OSError):
+                raise ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}") from error
             raise
         return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
 

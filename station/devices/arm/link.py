@@ -114,7 +114,7 @@ class ArmLink:
         except ArmFault as fault:
             if fault.cause is ArmCause.DEADLINE:
                 raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
-            if self.fault is None:
+            if self.fault is None and process is self._process:
                 self._set(fault)
             raise
         return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
@@ -194,8 +194,12 @@ class ArmLink:
                 except Exception as error:  # the link outlives whatever else goes wrong with it
                     log.exception("the arm's link")
                     await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
-            pause_s = min(FIRST_PAUSE_S * 2**self._failures, LONGEST_PAUSE_S) if self._failures else BEAT_S
-            await asyncio.sleep(pause_s)
+            await asyncio.sleep(self._pause_s())
+
+    def _pause_s(self) -> float:
+        if self._failures == 0:
+            return BEAT_S
+        return min(FIRST_PAUSE_S * 2.0 ** min(self._failures, 16), LONGEST_PAUSE_S)
 
     async def _step(self) -> None:
         if self._process is not None:
@@ -221,8 +225,12 @@ class ArmLink:
         if seen is not None:
             if seen.cause is not latched:
                 self._set(seen)
-        elif snapshot.runtime_state != PLAYING and (latched is None or latched in STATE_CAUSES):
-            self._set(await self._explain(""))
+        elif latched is not None and latched not in STATE_CAUSES:
+            return
+        elif snapshot.runtime_state != PLAYING:
+            self._face(await self._explain(""))
+        elif self._lost is not None:
+            self._set(None)
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):
@@ -253,10 +261,10 @@ class ArmLink:
             watchdog_hz=settings.watchdog_hz,
         )
         outcome = await process.ask(request, Outcome, deadline_s=settings.constructor_limit_s)
-        if outcome.done:
-            self._up()
+        if not outcome.done:
+            self._face(await self._explain(outcome.words))
         else:
-            self._set(await self._explain(outcome.words))
+            self._up()
 
     async def _explain(self, words: str) -> ArmFault:
         fault = from_words(words)
@@ -276,11 +284,17 @@ class ArmLink:
         async with self._lock:
             try:
                 fault = await self._explain(words)
+                self._face(fault)
             except ArmFault as lost:
                 fault = lost
                 await self._lose(lost)
-            self._set(fault)
             return fault
+
+    def _face(self, fault: ArmFault) -> None:
+        """Keep what waits for a person; raise what a new process may mend."""
+        if fault.cause in SELF_HEALING:
+            raise fault
+        self._set(fault)
 
     def _beat_message(self) -> Beat:
         return Beat(healthy_for_s=max(0.0, self._healthy_until_s - time.monotonic()))
