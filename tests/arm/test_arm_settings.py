@@ -30,6 +30,7 @@ def test_poses_come_as_lists_from_a_file():
         {"poses": {"home": ["0"] * 6}},
         {"poses": {"lunch": [0.0] * 6}},
         {"watchdog_hz": 0.0},
+        {"stop_deceleration_rad_s2": 2.0},
         {"speed": 1.0},
     ],
 )

@@ -158,6 +158,17 @@ def test_a_stop_on_the_way_stays_on_it_and_brakes_as_asked():
     assert shares[0] == pytest.approx(shares[1])
 
 
+def test_a_straight_stop_brakes_the_tool_as_asked():
+    body = Body(HOME, 0.0)
+    body.move_joints((1.5, *HOME[1:]), 1.0, 4.0)
+    simulate(body, 0.6)
+    tool_m_s = math.hypot(*body.tool_speed()[:3])
+    begun = body.joints_rad[0]
+    body.brake_tool(2.0)
+    positions, _ = simulate(body, 2.0, start_s=0.6)
+    assert positions[-1][0] - begun == pytest.approx(0.5 * 1.0 * tool_m_s / 2.0, rel=1e-3)
+
+
 def test_slowed_down_it_goes_the_same_way_for_longer():
     body = Body(HOME, 0.0)
     body.move_joints((1.0, *HOME[1:]), 1.0, 4.0)

@@ -378,6 +378,20 @@ def test_a_link_that_comes_and_goes_is_put_back(healthy_arm, until):
     asyncio.run(run())
 
 
+def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
+    """ur-rtde says that it is connected all the while."""
+
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            first = arm.process_id
+            bench.faults.set("stuck")
+            await until(lambda: arm.process_id not in {first, None})
+            bench.faults.clear("stuck")
+            await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
 @pytest.mark.parametrize("fault", ["stuck", "delayed"])
 def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault):
     async def run():

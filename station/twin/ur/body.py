@@ -1,5 +1,6 @@
 """The arm itself: joints that move in real time along a path."""
 
+import math
 from collections.abc import Sequence
 
 from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints, forward, inverse, nearest
@@ -9,6 +10,7 @@ from station.twin.ur.profile import Braking, Profile, Trapezoid
 
 RESTING: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NO_OFFSET: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SHORTEST_BRAKING_S = 1e-3
 REST_S = 0.05
 """How long the arm stands before it counts as steady."""
 
@@ -89,10 +91,14 @@ class Body:
         if self._path is None or self._speed == 0.0:
             self._rest()
             return
-        leading = max(abs(slope) for slope in self._path.at(self._travel)[1])
-        deceleration = deceleration_rad_s2 / leading if leading else deceleration_rad_s2
-        self._profile = Braking(self._travel, self._speed, deceleration)
-        self._elapsed_s = 0.0
+        self._come_to_rest(max(map(abs, self.speeds_rad_s)) / deceleration_rad_s2)
+
+    def brake_tool(self, deceleration_m_s2: float) -> None:
+        """Come to rest on the path, the tool at a deceleration; nothing happens to an arm at rest."""
+        if self._path is None or self._speed == 0.0:
+            self._rest()
+            return
+        self._come_to_rest(math.hypot(*self.tool_speed()[:3]) / deceleration_m_s2)
 
     def tool_pose(self) -> Pose:
         """The tool centre point in the base's frame."""
@@ -124,6 +130,10 @@ class Body:
     def within_range(self, joints_rad: Joints) -> bool:
         """Whether each joint is a number and within its range either way."""
         return all(abs(q) <= self._joint_range_rad for q in joints_rad)
+
+    def _come_to_rest(self, duration_s: float) -> None:
+        self._profile = Braking(self._travel, self._speed, self._speed / max(duration_s, SHORTEST_BRAKING_S))
+        self._elapsed_s = 0.0
 
     def _begin(self, path: Path, profile: Profile) -> None:
         self._path, self._profile = path, profile

@@ -47,6 +47,7 @@ class ControlScript:
         self._busy: Callable[[], bool] | None = None
         self._executing = False
         self._async_running = False
+        self._stops_straight = False
         self._watchdog_s: float | None = None
         self._watched_since_s = 0.0
         self._now_s = 0.0
@@ -121,13 +122,13 @@ class ControlScript:
             self._serve(now_s)
         except ScriptEndError as stop:
             self.end(str(stop))
-        except (UnreachableError, ValueError) as error:
+        except (UnreachableError, ValueError, ZeroDivisionError) as error:
             self.end(f"the script failed: {error}")
 
     def _start(self, now_s: float) -> None:
         self._starts_at_s = None
         self.runtime_state = RuntimeState.PLAYING
-        self._executing = self._async_running = False
+        self._executing = self._async_running = self._stops_straight = False
         self._busy = None
         self._watched_since_s = now_s
         self._report(-1)
@@ -206,11 +207,16 @@ class ControlScript:
             self._safety.stop_protectively(self._now_s)
 
     def _stop_motion(self) -> Callable[[], bool] | None:
-        # A synchronous stopL really runs stopj: the script's `stop_type` is set for asynchronous stops alone.
+        # The script sets its `stop_type` in asynchronous stops alone, and always to stopl; until then it is stopj.
         if self._async_running:
             self._report(-1)
-        self._body.brake(self._registers.input_doubles(0, 1)[0])
         self._async_running = self._registers.input_int(1) == 1
+        self._stops_straight |= self._async_running
+        (deceleration,) = self._registers.input_doubles(0, 1)
+        if self._stops_straight:
+            self._body.brake_tool(deceleration)
+        else:
+            self._body.brake(deceleration)
         if self._async_running:
             self._report(0)
             return None
