@@ -89,13 +89,14 @@ class ChannelClient:
             ) from error
 
     async def close(self) -> None:
-        """Give up every request that is under way and let the socket go; closing twice does nothing."""
+        """Let the socket go; requests that are under way end with a ChannelError. Closing twice does nothing."""
         self._receiving.cancel()
         await asyncio.gather(self._receiving, return_exceptions=True)
         self._socket.close(linger=0)
         self._context.term()
         for answer in self._waiting.values():
-            answer.cancel()
+            if not answer.done():
+                answer.set_exception(ChannelError(f"the channel to {self._peer} was closed"))
 
     async def _receive(self) -> None:
         while True:

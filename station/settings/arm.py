@@ -1,14 +1,17 @@
 """The robot arm: where it is, where it goes, how fast, and how long anything may take."""
 
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from station.settings.model import Settings, setting
 
 PoseName = Literal["home", "above_nest", "nest", "accept", "reject"]
 """The places that the arm goes to."""
+
+BRAKING_SHARE = 0.8
+"""The share of the watchdog's period that braking may take."""
 
 Angle = Annotated[float, Field(ge=-2 * pi, le=2 * pi)]
 JointVector = Annotated[tuple[Angle, Angle, Angle, Angle, Angle, Angle], Field(strict=False)]
@@ -104,7 +107,8 @@ class ArmSettings(Settings):
     stop_deceleration_rad_s2: float = setting(
         4.0,
         title="Stop deceleration",
-        description="How hard the leading joint brakes when the station stops a motion.",
+        description="How hard the leading joint brakes when the station stops a motion. It has to be at rest well "
+        "before the watchdog's period is over, because the controller hears nothing else while it brakes.",
         unit="rad/s²",
         gt=0.0,
         le=40.0,
@@ -207,3 +211,15 @@ class ArmSettings(Settings):
         ge=1.0,
         le=3600.0,
     )
+
+    @model_validator(mode="after")
+    def _stops_before_the_watchdog(self) -> Self:
+        braking_s = self.joint_speed_rad_s / self.stop_deceleration_rad_s2
+        allowed_s = BRAKING_SHARE / self.watchdog_hz
+        if braking_s > allowed_s:
+            raise ValueError(
+                f"braking from {self.joint_speed_rad_s:g} rad/s at {self.stop_deceleration_rad_s2:g} rad/s² takes "
+                f"{braking_s:.2f} s, and the watchdog at {self.watchdog_hz:g} Hz leaves {allowed_s:.2f} s: "
+                "lower joint_speed_rad_s, or raise stop_deceleration_rad_s2"
+            )
+        return self

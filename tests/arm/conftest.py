@@ -46,6 +46,7 @@ class Bench:
             "joint_speed_rad_s": 2.0,
             "joint_acceleration_rad_s2": 8.0,
             "watchdog_hz": 1.0,
+            "stale_after_s": 0.3,
         }
         return ArmSettings.model_validate(base | changes)
 

@@ -1,11 +1,12 @@
 """The emulated controller met by other clients than the driver: ur-rtde's receive and I/O, and plain sockets."""
 
 import asyncio
-import os
+import itertools
 import socket
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -15,10 +16,20 @@ from station.devices.arm.ur import UrArm
 HEADER = struct.Struct(">HB")
 
 
+UNTIL = """
+import time
+def until(condition):
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+"""
+
+
 async def run_client(source: str, *arguments: str) -> list[str]:
     """Run a client in a process of its own, because ur-rtde holds the interpreter's lock while it connects."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", source, *arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        sys.executable, "-c", UNTIL + source, *arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )
     async with asyncio.timeout(60):
         output, _ = await process.communicate()
@@ -29,39 +40,36 @@ async def run_client(source: str, *arguments: str) -> list[str]:
 @pytest.mark.parametrize("polyscope", ["5.22", "5.25"])
 def test_bare_ur_rtde_connects_moves_and_asks(bench, polyscope):
     client = """
-import math, sys, time
+import math, sys
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 control, receive = RTDEControlInterface(sys.argv[1]), RTDEReceiveInterface(sys.argv[1])
 near = lambda a, b: max(abs(x - y) for x, y in zip(a, b)) < 1e-6
 there = [0.3, -1.3, 1.5, -1.5, -1.5, 0.2]
 assert control.moveJ(there, 2.0, 8.0)
-time.sleep(0.02)
-assert near(receive.getActualQ(), there)
+until(lambda: near(receive.getActualQ(), there))
 pose = receive.getActualTCPPose()
 pose[2] += 0.05
 assert control.moveL(pose, 0.5, 2.0)
-time.sleep(0.02)
-assert near(receive.getActualTCPPose(), pose)
+until(lambda: near(receive.getActualTCPPose(), pose))
 assert near(control.getInverseKinematics(pose), receive.getActualQ())
 assert control.getInverseKinematicsHasSolution(pose, there)
 assert not control.getInverseKinematicsHasSolution([9, 0, 0, 0, 0, 0])
 assert control.isPoseWithinSafetyLimits(pose)
 assert not control.isJointsWithinSafetyLimits([9, 0, 0, 0, 0, 0])
 assert control.setTcp([0, 0, 0.1, 0, 0, 0]) and near(control.getTCPOffset(), [0, 0, 0.1, 0, 0, 0])
-assert near(control.getForwardKinematics(), receive.getActualTCPPose())
+until(lambda: near(control.getForwardKinematics(), receive.getActualTCPPose()))
 assert near(control.poseTrans([1, 2, 3, 0, 0, math.pi / 2], [1, 0, 0, 0, 0, 0]), [1, 3, 3, 0, 0, math.pi / 2])
 assert control.setPayload(1.5, [0, 0, 0.1])
-time.sleep(0.02)
-assert receive.getPayload() == 1.5
+until(lambda: receive.getPayload() == 1.5)
 before = control.getAsyncOperationProgressEx()
 assert control.moveJ_IK(pose, 0.5, 2.0, True)
-during = control.getAsyncOperationProgressEx()
-assert during.isAsyncOperationRunning() and during.operationId() != before.operationId()
+until(lambda: control.getAsyncOperationProgressEx().isAsyncOperationRunning())
+assert control.getAsyncOperationProgressEx().operationId() != before.operationId()
 control.stopJ(8.0)
-time.sleep(0.2)
-assert not control.getAsyncOperationProgressEx().isAsyncOperationRunning()
-assert control.isSteady() and not any(receive.getActualQd())
+until(lambda: not control.getAsyncOperationProgressEx().isAsyncOperationRunning())
+until(control.isSteady)
+until(lambda: not any(receive.getActualQd()))
 control.stopScript()
 control.disconnect()
 receive.disconnect()
@@ -78,13 +86,13 @@ print("done")
 
 def test_io_client_next_to_the_driver(bench, healthy):
     client = """
-import sys, time
+import sys
 from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 io, receive = RTDEIOInterface(sys.argv[1]), RTDEReceiveInterface(sys.argv[1])
 assert io.setSpeedSlider(0.5) and io.setStandardDigitalOut(3, True)
-time.sleep(0.05)
-assert receive.getSpeedScaling() == 0.5 and receive.getDigitalOutState(3) and not receive.getDigitalOutState(2)
+until(lambda: receive.getSpeedScaling() == 0.5 and receive.getDigitalOutState(3))
+assert not receive.getDigitalOutState(2)
 io.disconnect()
 receive.disconnect()
 print("done")
@@ -128,7 +136,7 @@ async def plain(host: str) -> Rtde:
     return Rtde(*await asyncio.open_connection(host, 30004))
 
 
-def test_the_protocol_to_the_byte(bench):
+def test_the_protocol_to_the_byte(bench, until):
     async def run():
         async with bench() as made:
             client = await plain(made.host)
@@ -149,7 +157,7 @@ def test_the_protocol_to_the_byte(bench):
                 assert recipe == 1
                 assert tuple(joints) == made.controller.joints_rad
                 stamps.append(timestamp)
-            assert all(b - a > 0 for a, b in zip(stamps, stamps[1:], strict=False))
+            assert all(b - a > 0 for a, b in itertools.pairwise(stamps))
             assert (stamps[-1] - stamps[0]) / 19 == pytest.approx(0.008, rel=0.2)
             other = await plain(made.host)
             assert await other.ask("I", b"input_int_register_5") == b"\x00IN_USE"
@@ -158,8 +166,11 @@ def test_the_protocol_to_the_byte(bench):
             assert made.controller.registers.input_int(5) == 42
             assert made.controller.registers.input_doubles(5, 1) == (2.5,)
             client.close()
-            while (await other.ask("I", b"input_int_register_5"))[:1] == b"\x00":
-                await asyncio.sleep(0.01)
+
+            async def released() -> bool:
+                return await other.ask("I", b"input_int_register_5") == b"\x01INT32"
+
+            await until(released)
             other.close()
 
     asyncio.run(run())
@@ -193,14 +204,14 @@ def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):
             names = ",".join(f"output_double_register_{i}" for i in range(48)).encode()
             await lazy.ask("O", struct.pack(">d", 500.0) + names)
             await lazy.ask("S")
-            (connection,) = made.controller.connections
+            (connection,) = made.controller.network.connections
             await until(lambda: connection.blocked)
-            assert connection in made.controller.connections
+            assert connection in made.controller.network.connections
             made.clock.skip(9.0)
             await asyncio.sleep(0.05)
-            assert connection in made.controller.connections
+            assert connection in made.controller.network.connections
             made.clock.skip(1.5)
-            await until(lambda: not made.controller.connections)
+            await until(lambda: not made.controller.network.connections)
             lazy.close()
 
     asyncio.run(run())
@@ -237,7 +248,7 @@ def test_the_primary_stream_tells_version_and_robot_mode(bench):
     asyncio.run(run())
 
 
-def test_the_dashboard_answers_line_by_line(bench):
+def test_the_dashboard_answers_line_by_line(bench, until):
     async def run():
         async with bench() as made:
             reader, writer = await asyncio.open_connection(made.host, 29999)
@@ -251,8 +262,11 @@ def test_the_dashboard_answers_line_by_line(bench):
             assert await ask("ROBOTMODE ") == "Robotmode: RUNNING"
             assert (await ask("dance")).startswith("could not understand")
             made.faults.set("protective_stop")
-            while (await ask("safetystatus")) != "Safetystatus: PROTECTIVE_STOP":
-                await asyncio.sleep(0.01)
+
+            async def stopped() -> bool:
+                return await ask("safetystatus") == "Safetystatus: PROTECTIVE_STOP"
+
+            await until(stopped)
             assert (await ask("unlock protective stop")).startswith("Cannot unlock")
             made.clock.skip(5.0)
             assert await ask("unlock protective stop") == "Protective stop releasing"
@@ -294,7 +308,7 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
 @pytest.mark.timeout(400)
 def test_two_hundred_connections_and_drops_leave_nothing_behind(bench, until):
     def descriptors() -> int:
-        return len(os.listdir("/proc/self/fd"))
+        return len(list(Path("/proc/self/fd").iterdir()))
 
     async def run():
         async with bench() as made:
@@ -302,7 +316,7 @@ def test_two_hundred_connections_and_drops_leave_nothing_behind(bench, until):
             for _ in range(200):
                 async with UrArm(made.settings()) as arm:
                     await arm.ready(20.0)
-                    made.controller.cut_connections()
+                    made.controller.network.cut()
 
                     async def dropped(arm=arm):
                         return not (await arm.state()).ready
@@ -310,6 +324,6 @@ def test_two_hundred_connections_and_drops_leave_nothing_behind(bench, until):
                     await until(dropped)
                 counts.append(descriptors())
             assert max(counts[20:]) <= counts[19]
-            assert not made.controller.connections
+            assert not made.controller.network.connections
 
     asyncio.run(run())

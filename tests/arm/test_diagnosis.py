@@ -7,7 +7,7 @@ from station.devices.arm.diagnosis import from_state, from_words, why_not_done
 from station.devices.arm.faults import REMEDIES, ArmCause
 from station.devices.arm.messages import Snapshot
 
-SIX = (0.0,) * 6
+SIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def snapshot(safety_bits=1, robot_mode=7, runtime_state=1) -> Snapshot:

@@ -128,7 +128,8 @@ def test_a_straight_tool_motion_is_straight_continuous_and_in_time():
     body = Body(HOME, 0.0)
     body.tcp_offset = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
     start = body.tool_pose()
-    target = (*(np.array(start[:3]) + [0.1, -0.2, 0.15]), *start[3:])
+    x, y, z, rx, ry, rz = start
+    target = (x + 0.1, y - 0.2, z + 0.15, rx, ry, rz)
     body.move_tool(target, 0.25, 1.0)
     positions, speeds = simulate(body, 2.0)
     assert not body.moving
@@ -155,6 +156,17 @@ def test_a_stop_on_the_way_stays_on_it_and_brakes_as_asked():
     assert np.abs(np.diff(speeds[1:, 0])).max() <= 2.0 * 0.002 * 1.01
     shares = (positions[-1] - HOME)[:2] / np.array([1.5, 0.3708])
     assert shares[0] == pytest.approx(shares[1])
+
+
+def test_a_straight_stop_brakes_the_tool_as_asked():
+    body = Body(HOME, 0.0)
+    body.move_joints((1.5, *HOME[1:]), 1.0, 4.0)
+    simulate(body, 0.6)
+    tool_m_s = math.hypot(*body.tool_speed()[:3])
+    begun = body.joints_rad[0]
+    body.brake_tool(2.0)
+    positions, _ = simulate(body, 2.0, start_s=0.6)
+    assert positions[-1][0] - begun == pytest.approx(0.5 * 1.0 * tool_m_s / 2.0, rel=1e-3)
 
 
 def test_slowed_down_it_goes_the_same_way_for_longer():

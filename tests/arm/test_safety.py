@@ -13,7 +13,7 @@ class SafetyMachine(RuleBasedStateMachine):
         self.safety = Safety(running=True)
         self.now_s = 0.0
         self.pressed = False
-        self.stopped_at_s = None
+        self.stopped_at_s = 0.0
 
     @rule(duration_s=st.floats(0.0, 4.0))
     def wait(self, duration_s):

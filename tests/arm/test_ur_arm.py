@@ -12,7 +12,7 @@ import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
-from station.settings.arm import ArmPoses
+from station.settings.arm import ArmPoses, ArmSettings
 from station.twin.ur.script import RuntimeState
 
 AWAY = ArmPoses(home=(2.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0))
@@ -133,12 +133,12 @@ def test_a_protective_stop_in_mid_move_waits_for_a_person_and_for_its_five_secon
             await until(lambda: not bench.controller.body.moving)
             assert await cause_of(arm.move_to("home")) is ArmCause.PROTECTIVE_STOP
             assert await cause_of(arm.upload_again()) is ArmCause.PROTECTIVE_STOP
+            stopped_at_s = bench.clock.now_s()
             confirming = asyncio.create_task(arm.confirm_protective_stop())
             await asyncio.sleep(1.0)
-            assert not confirming.done()
             assert bench.controller.safety.bits & 1 << 2
-            bench.clock.skip(4.5)
             await confirming
+            assert bench.clock.now_s() - stopped_at_s > 4.0
             await arm.move_to("home")
             assert (await arm.state()).at == "home"
 
@@ -197,6 +197,39 @@ def test_a_program_stopped_on_the_pendant_stays_stopped_until_a_person_uploads_i
             await arm.upload_again()
             await arm.upload_again()
             await arm.move_to("home")
+
+    asyncio.run(run())
+
+
+def test_what_waits_for_a_person_outlives_the_process(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            bench.faults.set("pendant_stop")
+            await until(lambda: has_cause(arm, ArmCause.PROGRAM_STOPPED))
+            first = arm.process_id
+            os.kill(first, signal.SIGKILL)
+
+            async def back():
+                return arm.process_id not in {first, None} and (await arm.state()).joints_rad is not None
+
+            await until(back)
+            await asyncio.sleep(0.5)
+            assert await has_cause(arm, ArmCause.PROGRAM_STOPPED)
+            assert bench.controller.script.runtime_state is RuntimeState.STOPPED
+            await arm.upload_again()
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_a_slow_arm_goes_on_at_a_fraction_of_its_speed(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", 4.0)
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: max(map(abs, bench.controller.body.speeds_rad_s)) == pytest.approx(0.4, rel=1e-3))
+            bench.faults.clear("slow")
+            await move
 
     asyncio.run(run())
 
@@ -332,6 +365,33 @@ def test_a_controller_that_falls_silent_in_the_constructor_is_killed(bench, heal
     asyncio.run(run())
 
 
+def test_a_link_that_comes_and_goes_is_put_back(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            first = arm.process_id
+            bench.faults.set("intermittent", 3.0)
+            await until(lambda: arm.process_id not in {first, None})
+            bench.faults.clear("intermittent")
+            await arm.ready(15.0)
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
+    """ur-rtde says that it is connected all the while."""
+
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            first = arm.process_id
+            bench.faults.set("stuck")
+            await until(lambda: arm.process_id not in {first, None})
+            bench.faults.clear("stuck")
+            await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
 @pytest.mark.parametrize("fault", ["stuck", "delayed"])
 def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault):
     async def run():
@@ -457,6 +517,7 @@ asyncio.run(main())
             process = await asyncio.create_subprocess_exec(
                 sys.executable, "-c", caller, made.host, stdout=subprocess.PIPE
             )
+            assert process.stdout is not None
             line = await asyncio.wait_for(process.stdout.readline(), 30)
             child = psutil.Process(int(line))
             process.kill()
@@ -468,8 +529,6 @@ asyncio.run(main())
 
 def test_an_arm_that_nobody_answers_for_is_a_fault_and_not_an_exception(host):
     async def run():
-        from station.settings.arm import ArmSettings
-
         async with UrArm(ArmSettings(host=host)) as arm:
             assert await cause_of(arm.ready(1.0)) is ArmCause.LINK_LOST
             state = await arm.state()

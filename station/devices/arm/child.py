@@ -20,7 +20,9 @@ LONGEST_LINE = 65536
 class ArmProcess:
     """One start of the process; whatever goes wrong with it ends it, and a new one is made."""
 
-    def __init__(self, process: asyncio.subprocess.Process, channel: ChannelClient, folder: str) -> None:
+    def __init__(
+        self, process: asyncio.subprocess.Process, channel: ChannelClient, folder: tempfile.TemporaryDirectory[str]
+    ) -> None:
         self._process, self._channel, self._folder = process, channel, folder
         self._words: deque[str] = deque(maxlen=LAST_WORDS)
         self._listening = asyncio.create_task(self._listen(), name="words of the arm's process")
@@ -34,11 +36,22 @@ class ArmProcess:
             frequency_hz: how often the controller shall send its state.
 
         Raises:
-            OSError: no process can be started.
+            ArmFault: no process can be started.
         """
-        folder = tempfile.mkdtemp(prefix="fruit-station-arm-")
-        endpoint = f"ipc://{folder}/channel"
-        process = await asyncio.create_subprocess_exec(
+        folder = tempfile.TemporaryDirectory(prefix="fruit-station-arm-", ignore_cleanup_errors=True)
+        endpoint = f"ipc://{folder.name}/channel"
+        try:
+            process = await cls._start(endpoint, host, frequency_hz)
+        except BaseException as error:
+            folder.cleanup()
+            if isinstance(error, OSError):
+                raise ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}") from error
+            raise
+        return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
+
+    @staticmethod
+    async def _start(endpoint: str, host: str, frequency_hz: float) -> asyncio.subprocess.Process:
+        return await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
             "station.devices.arm.process",
@@ -51,7 +64,6 @@ class ArmProcess:
             stderr=asyncio.subprocess.PIPE,
             limit=LONGEST_LINE,
         )
-        return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
 
     @property
     def pid(self) -> int:
@@ -94,12 +106,9 @@ class ArmProcess:
             if not self.ended:
                 self._process.kill()
         await self._process.wait()
-        await self._listening
+        await asyncio.gather(self._listening, return_exceptions=True)
         await self._channel.close()
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(f"{self._folder}/channel")
-        with contextlib.suppress(FileNotFoundError):
-            os.rmdir(self._folder)
+        self._folder.cleanup()
 
     async def _listen(self) -> None:
         stderr = self._process.stderr

@@ -28,7 +28,7 @@ class DashboardFacts:
 
 
 class DashboardConversation:
-    """Lines to and fro on one connection."""
+    """Lines and answers on one connection."""
 
     def __init__(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._host, self._reader, self._writer = host, reader, writer

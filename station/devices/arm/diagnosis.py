@@ -22,7 +22,7 @@ STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
 
 
 def from_state(snapshot: Snapshot) -> ArmFault | None:
-    """What the state alone tells; None where it shows nothing that keeps the arm from moving, but perhaps no program."""
+    """What the state alone tells; None where power and safety let the arm move."""
     for bits, cause, words in SAFETY_CAUSES:
         if snapshot.safety_bits & bits:
             return ArmFault(cause, words)

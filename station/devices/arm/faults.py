@@ -44,7 +44,7 @@ REMEDIES: dict[ArmCause, str] = {
     ArmCause.REGISTERS_IN_USE: "Close the other RTDE client, or disable EtherNet/IP, PROFINET and MODBUS on the "
     "controller: they claim registers 0 to 23; then upload the program again.",
     ArmCause.UNREACHABLE: "Teach the pose anew, or widen the controller's safety limits.",
-    ArmCause.NOT_REACHED: "Look at the arm: it stopped elsewhere than it was sent; its encoders or its load may be wrong.",
+    ArmCause.NOT_REACHED: "Look at the arm: something held it, or its encoders or its payload setting are wrong.",
     ArmCause.STOPPED: "Nothing: the station stopped the motion itself.",
     ArmCause.BUSY: "Wait for the motion that is under way, or stop it.",
     ArmCause.UNHEALTHY: "Mend what keeps the station from being healthy.",

@@ -1,4 +1,4 @@
-"""The link to the controller: it brings up the process that ur-rtde lives in, watches it, and puts another in its place.
+"""The link to the controller: the process that ur-rtde lives in, brought up, watched, and put back when it is gone.
 
 The link comes back by itself after a drop. What a person has to look at stays as a fault until that person's verb:
 a stop of any kind, a program that no longer plays, a budget of restarts that is used up.
@@ -44,6 +44,8 @@ class ArmLink:
         self._lock = asyncio.Lock()
         self._keeping: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
+        self.fault_since_s = 0.0
+        """When the fault was seen, on the machine's monotonic clock."""
         self.attachment = 0
         """Counts the programs that were brought to play: what was learnt from an earlier one may not hold any more."""
 
@@ -98,7 +100,7 @@ class ArmLink:
             raise self.fault
 
     async def snapshot(self) -> Snapshot:
-        """The controller's state, asked for now.
+        """The controller's state, asked for now; the time of asking is added to its age.
 
         Raises:
             ArmFault: there is none.
@@ -106,12 +108,16 @@ class ArmLink:
         process = self._process
         if process is None:
             raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+        limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
-            return await process.ask(self._beat_message(), Snapshot, deadline_s=self._settings.stale_after_s)
+            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=limit_s)
         except ArmFault as fault:
-            if process.ended and self.fault is None:
+            if fault.cause is ArmCause.DEADLINE:
+                raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
+            if self.fault is None and process is self._process:
                 self._set(fault)
             raise
+        return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
 
     async def order(self, request: Move | Reachable | Halt) -> Outcome:
         """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
@@ -185,10 +191,15 @@ class ArmLink:
                     await self._step()
                 except ArmFault as fault:
                     await self._lose(fault)
-                except OSError as error:
-                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}"))
-            pause_s = min(FIRST_PAUSE_S * 2**self._failures, LONGEST_PAUSE_S) if self._failures else BEAT_S
-            await asyncio.sleep(pause_s)
+                except Exception as error:  # the link outlives whatever else goes wrong with it
+                    log.exception("the arm's link")
+                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
+            await asyncio.sleep(self._pause_s())
+
+    def _pause_s(self) -> float:
+        if self._failures == 0:
+            return BEAT_S
+        return min(FIRST_PAUSE_S * 2.0 ** min(self._failures, 16), LONGEST_PAUSE_S)
 
     async def _step(self) -> None:
         if self._process is not None:
@@ -214,8 +225,12 @@ class ArmLink:
         if seen is not None:
             if seen.cause is not latched:
                 self._set(seen)
-        elif snapshot.runtime_state != PLAYING and (latched is None or latched in STATE_CAUSES):
-            self._set(await self._explain(""))
+        elif latched is not None and latched not in STATE_CAUSES:
+            return
+        elif snapshot.runtime_state != PLAYING:
+            self._face(await self._explain(""))
+        elif self._lost is not None:
+            self._set(None)
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):
@@ -246,10 +261,10 @@ class ArmLink:
             watchdog_hz=settings.watchdog_hz,
         )
         outcome = await process.ask(request, Outcome, deadline_s=settings.constructor_limit_s)
-        if outcome.done:
-            self._up()
+        if not outcome.done:
+            self._face(await self._explain(outcome.words))
         else:
-            self._set(await self._explain(outcome.words))
+            self._up()
 
     async def _explain(self, words: str) -> ArmFault:
         fault = from_words(words)
@@ -269,11 +284,17 @@ class ArmLink:
         async with self._lock:
             try:
                 fault = await self._explain(words)
+                self._face(fault)
             except ArmFault as lost:
                 fault = lost
                 await self._lose(lost)
-            self._set(fault)
             return fault
+
+    def _face(self, fault: ArmFault) -> None:
+        """Keep what waits for a person; raise what a new process may mend."""
+        if fault.cause in SELF_HEALING:
+            raise fault
+        self._set(fault)
 
     def _beat_message(self) -> Beat:
         return Beat(healthy_for_s=max(0.0, self._healthy_until_s - time.monotonic()))
@@ -290,12 +311,13 @@ class ArmLink:
         self._set(fault)
 
     async def _drop(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            await process.end()
+        if self._process is not None:
+            await self._process.end()
+            self._process = None
 
     def _set(self, fault: ArmFault | None) -> None:
         before = str(self.fault)
+        self.fault_since_s = time.monotonic()
         if fault is not None and fault.cause in SELF_HEALING:
             self._lost = fault
         else:

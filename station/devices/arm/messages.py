@@ -46,7 +46,7 @@ class Reachable(Message):
 
 
 class Halt(Message):
-    """Begin to brake."""
+    """Brake to rest."""
 
     deceleration_rad_s2: float
 

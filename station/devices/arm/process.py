@@ -19,6 +19,7 @@ from rtde_receive import RTDEReceiveInterface
 
 from station.channel.server import ChannelServer
 from station.devices.arm.age import TimestampAge
+from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.errors import StationError
 
@@ -31,7 +32,6 @@ VARIABLES = [
     "safety_status_bits",
     "runtime_state",
 ]
-PLAYING = 2
 UPLOAD_S = 2.0
 POLL_S = 0.01
 KICKS_PER_LIMIT = 4
@@ -120,10 +120,10 @@ class UrRtdeProcess:
         return await self._on_arm(ask)
 
     async def halt(self, request: Halt) -> Outcome:
-        """Begin to brake."""
+        """Brake to rest. Not asynchronously: then ur-rtde's program runs stopl, with the number taken as m/s²."""
 
         def brake() -> bool:
-            self._commanding().stopJ(request.deceleration_rad_s2, True)  # noqa: FBT003
+            self._commanding().stopJ(request.deceleration_rad_s2)
             return True
 
         return await self._on_arm(brake)

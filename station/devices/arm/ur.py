@@ -1,11 +1,14 @@
 """The driver of a Universal Robots arm. Unverified on hardware."""
 
 import asyncio
+import contextlib
 import time
+from collections.abc import AsyncIterator
 from typing import Self
 
 from station.devices.arm.arm import ArmState
 from station.devices.arm.dashboard import DashboardConversation, dashboard
+from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.link import ArmLink
 from station.devices.arm.messages import Halt, Move, Reachable, Six, Snapshot
@@ -14,10 +17,11 @@ from station.settings.arm import ArmSettings, PoseName
 POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
 POLL_S = 0.02
 RECOVERY_POLL_S = 0.25
+UNLOCK_AFTER_S = 5.1
+"""A controller refuses to leave a protective stop in its first 5 s."""
 AT_REST_RAD_S = 1e-3
 SHORT_AFTER_S = 0.3
 """How long a motion that has ended elsewhere may look so before it counts."""
-START_TRIES = 3
 
 
 class UrArm:
@@ -98,7 +102,8 @@ class UrArm:
                 await self._begin(pose, straight=straight)
                 await self._arrive(pose)
             except asyncio.CancelledError:
-                await asyncio.shield(self._brake())
+                with contextlib.suppress(ArmFault):
+                    await asyncio.shield(self._brake())
                 raise
 
     async def stop(self) -> None:
@@ -123,9 +128,9 @@ class UrArm:
         async with self._recovering("the protective stop"), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
             while "PROTECTIVE_STOP" in await conversation.say("safetystatus"):
+                await asyncio.sleep(max(RECOVERY_POLL_S, self._link.fault_since_s + UNLOCK_AFTER_S - time.monotonic()))
                 await conversation.say("close safety popup")
                 await conversation.say("unlock protective stop")
-                await asyncio.sleep(RECOVERY_POLL_S)
             await self._link.upload()
 
     async def power_on_and_release_brakes(self) -> None:
@@ -148,8 +153,14 @@ class UrArm:
         async with self._recovering("the upload"):
             await self._link.upload()
 
-    def _recovering(self, what: str) -> "_Recovery":
-        return _Recovery(what, self._settings.recovery_deadline_s)
+    @contextlib.asynccontextmanager
+    async def _recovering(self, what: str) -> AsyncIterator[None]:
+        limit_s = self._settings.recovery_deadline_s
+        try:
+            async with asyncio.timeout(limit_s):
+                yield
+        except TimeoutError as error:
+            raise ArmFault(ArmCause.DEADLINE, f"{what} did not come to its end within {limit_s:g} s") from error
 
     async def _require_ready(self) -> Snapshot:
         if self._link.fault is not None:
@@ -166,7 +177,7 @@ class UrArm:
         if known in self._reachable:
             return
         outcome = await self._link.order(Reachable(joints_rad=self._settings.poses.joints_rad(pose)))
-        if outcome.words or (await self._link.snapshot()).runtime_state != 2:
+        if outcome.words or (await self._link.snapshot()).runtime_state != PLAYING:
             raise await self._link.explain(outcome.words)
         if not outcome.done:
             raise ArmFault(
@@ -223,24 +234,6 @@ class UrArm:
     def _place(self, joints_rad: Six) -> PoseName | None:
         poses, tolerance = self._settings.poses, self._settings.reached_tolerance_rad
         return next((name for name in POSES if _near(joints_rad, poses.joints_rad(name), tolerance)), None)
-
-
-class _Recovery:
-    """A person's verb under the recovery deadline: running out of time is a fault like another."""
-
-    def __init__(self, what: str, deadline_s: float) -> None:
-        self._what, self._deadline_s = what, deadline_s
-        self._timeout = asyncio.timeout(deadline_s)
-
-    async def __aenter__(self) -> None:
-        await self._timeout.__aenter__()
-
-    async def __aexit__(self, *details: object) -> None:
-        try:
-            await self._timeout.__aexit__(*details)  # pyright: ignore[reportArgumentType]
-        except TimeoutError as error:
-            words = f"{self._what} did not come to its end within {self._deadline_s:g} s"
-            raise ArmFault(ArmCause.DEADLINE, words) from error
 
 
 async def _require_remote(conversation: DashboardConversation) -> None:

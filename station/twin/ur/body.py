@@ -1,12 +1,16 @@
 """The arm itself: joints that move in real time along a path."""
 
+import math
+from collections.abc import Sequence
+
 from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints, forward, inverse, nearest
 from station.twin.ur.paths import JointPath, Path, ToolPath, UnreachableError
 from station.twin.ur.poses import Pose, inverse_transform, pose_from_transform, transform_from_pose
 from station.twin.ur.profile import Braking, Profile, Trapezoid
 
-RESTING: Joints = (0.0,) * 6
-NO_OFFSET: Pose = (0.0,) * 6
+RESTING: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_OFFSET: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SHORTEST_BRAKING_S = 1e-3
 REST_S = 0.05
 """How long the arm stands before it counts as steady."""
 
@@ -51,9 +55,9 @@ class Body:
         self._elapsed_s += passed_s * scaling
         self._travel, self._speed = self._profile.at(self._elapsed_s)
         self._travel = min(self._travel, self._path.length)
-        self.joints_rad, slope = self._path.at(self._travel)
+        self.joints_rad, (s1, s2, s3, s4, s5, s6) = self._path.at(self._travel)
         pace = self._speed * scaling
-        self.speeds_rad_s = tuple(pace * s for s in slope)  # pyright: ignore[reportAttributeAccessIssue]
+        self.speeds_rad_s = pace * s1, pace * s2, pace * s3, pace * s4, pace * s5, pace * s6
         if self._elapsed_s >= self._profile.duration_s:
             self._rest()
 
@@ -87,10 +91,14 @@ class Body:
         if self._path is None or self._speed == 0.0:
             self._rest()
             return
-        leading = max(abs(slope) for slope in self._path.at(self._travel)[1])
-        deceleration = deceleration_rad_s2 / leading if leading else deceleration_rad_s2
-        self._profile = Braking(self._travel, self._speed, deceleration)
-        self._elapsed_s = 0.0
+        self._come_to_rest(max(map(abs, self.speeds_rad_s)) / deceleration_rad_s2)
+
+    def brake_tool(self, deceleration_m_s2: float) -> None:
+        """Come to rest on the path, the tool at a deceleration; nothing happens to an arm at rest."""
+        if self._path is None or self._speed == 0.0:
+            self._rest()
+            return
+        self._come_to_rest(math.hypot(*self.tool_speed()[:3]) / deceleration_m_s2)
 
     def tool_pose(self) -> Pose:
         """The tool centre point in the base's frame."""
@@ -104,15 +112,13 @@ class Body:
         if self.speeds_rad_s == RESTING:
             return NO_OFFSET
         step_s = 1e-4
-        ahead: Joints = tuple(  # pyright: ignore[reportAssignmentType]
-            q + v * step_s for q, v in zip(self.joints_rad, self.speeds_rad_s, strict=True)
-        )
+        ahead = [q + v * step_s for q, v in zip(self.joints_rad, self.speeds_rad_s, strict=True)]
         pairs = zip(self.tool_pose(), self.forward(ahead, self.tcp_offset), strict=True)
         x, y, z, rx, ry, rz = ((b - a) / step_s for a, b in pairs)
         return x, y, z, rx, ry, rz
 
     @staticmethod
-    def forward(joints_rad: Joints, offset: Pose) -> Pose:
+    def forward(joints_rad: Sequence[float], offset: Pose) -> Pose:
         """The tool's pose at joint positions."""
         return pose_from_transform(forward(joints_rad) @ transform_from_pose(offset))
 
@@ -124,6 +130,10 @@ class Body:
     def within_range(self, joints_rad: Joints) -> bool:
         """Whether each joint is a number and within its range either way."""
         return all(abs(q) <= self._joint_range_rad for q in joints_rad)
+
+    def _come_to_rest(self, duration_s: float) -> None:
+        self._profile = Braking(self._travel, self._speed, self._speed / max(duration_s, SHORTEST_BRAKING_S))
+        self._elapsed_s = 0.0
 
     def _begin(self, path: Path, profile: Profile) -> None:
         self._path, self._profile = path, profile

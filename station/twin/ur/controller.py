@@ -6,23 +6,18 @@ from typing import Any, Literal
 
 from station.twin.clock import Clock
 from station.twin.faults import CommonFault, FaultBoard
-from station.twin.ur import primary
 from station.twin.ur.body import Body
-from station.twin.ur.dashboard import BANNER, LONGEST_LINE, Dashboard
-from station.twin.ur.dashboard import PORT as DASHBOARD_PORT
+from station.twin.ur.dashboard import Dashboard
 from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints
+from station.twin.ur.network import Network
 from station.twin.ur.outputs import output_table
 from station.twin.ur.registers import Registers
-from station.twin.ur.rtde import FREQUENCY_HZ, RtdeConnection
-from station.twin.ur.rtde import PORT as RTDE_PORT
+from station.twin.ur.rtde import FREQUENCY_HZ
 from station.twin.ur.safety import Safety
 from station.twin.ur.script import ControlScript
 
-SCRIPT_PORT = 30003
 CYCLE_S = 1.0 / FREQUENCY_HZ
 LATE_CYCLES = 10
-LONGEST_SCRIPT = 1_000_000
-GARBAGE_LINE = b"\xff\x00\x13 garbage\n"
 START_POSE_RAD: Joints = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
 OWN_FAULTS = (
@@ -94,15 +89,12 @@ class UrController:
         self.serial_number = "20245500001"
         self.speed_slider = 1.0
         self.digital_outputs = 0
-        self.connections: set[RtdeConnection] = set()
-        self._streams: set[asyncio.StreamWriter] = set()
-        self._servers: list[asyncio.Server] = []
+        self.network = Network(self)
         self._tick = 0
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0
         self._known_faults: dict[str, float] = {}
         self._cut_at_s = 0.0
-        self._script_drops: set[asyncio.StreamWriter] = set()
         self._switching: asyncio.Task[None] | None = None
         self._joint_range_rad = joint_range_rad
         self._boot(joints_rad, running=running)
@@ -114,7 +106,7 @@ class UrController:
         self.safety = Safety(running=running)
         self.script = ControlScript(self.body, self.registers, self.safety)
         self.outputs = output_table(self)
-        self._dashboard = Dashboard(self)
+        self.dashboard = Dashboard(self)
 
     @property
     def joints_rad(self) -> Joints:
@@ -165,11 +157,7 @@ class UrController:
         Raises:
             OSError: one of the ports is taken.
         """
-        try:
-            await self._open()
-        except OSError:
-            await self._close()
-            raise
+        await self.network.open()
         loop = asyncio.get_running_loop()
         self._due_s = loop.time()
         self._timer = loop.call_soon(self._cycle)  # pyright: ignore[reportAttributeAccessIssue]
@@ -181,34 +169,7 @@ class UrController:
             self._timer = None
         if self._switching is not None:
             await self._switching
-        await self._close()
-
-    async def _open(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._servers.append(await loop.create_server(lambda: RtdeConnection(self), self.host, RTDE_PORT))
-        for port, serve in (
-            (DASHBOARD_PORT, self._serve_dashboard),
-            (SCRIPT_PORT, self._serve_script),
-            (primary.PORT, self._serve_primary),
-        ):
-            self._servers.append(await asyncio.start_server(serve, self.host, port, limit=LONGEST_LINE * 64))
-
-    async def _close(self) -> None:
-        servers, self._servers = self._servers, []
-        for server in servers:
-            server.close()
-        self.cut_connections()
-        while self.connections or self._streams:
-            await asyncio.sleep(0)
-        for server in servers:
-            await server.wait_closed()
-
-    def cut_connections(self) -> None:
-        """Cut every connection, as a pulled cable does; new ones are taken."""
-        for connection in list(self.connections):
-            connection.cut()
-        for writer in list(self._streams):
-            writer.transport.abort()
+        await self.network.close()
 
     def _cycle(self) -> None:
         loop = asyncio.get_running_loop()
@@ -223,14 +184,14 @@ class UrController:
             self.body.advance(now_s, self.speed_scaling)
             self.script.step(now_s)
         self._tick += 1
-        for connection in list(self.connections):
+        for connection in list(self.network.connections):
             connection.publish(self._tick, now_s)
 
     def _apply_faults(self, now_s: float) -> None:
         period_s = self.faults.amount(CommonFault.INTERMITTENT)
         if period_s and now_s - self._cut_at_s > period_s:
             self._cut_at_s = now_s
-            self.cut_connections()
+            self.network.cut()
         if self._switching is not None and self._switching.done():
             self._switching = None
         faults = self.faults.snapshot()
@@ -243,8 +204,7 @@ class UrController:
             self.safety.release_emergency_stop()
         if "local_mode" in begun | ended:
             self.safety.remote = "local_mode" not in begun
-            for writer in list(self._script_drops):
-                writer.transport.abort()
+            self.network.cut_programmers()
         reachable = {CommonFault.OFF, "link_cut"}
         if (begun | ended) & reachable:
             self._switching = asyncio.create_task(self._switch_network(on=not faults.keys() & reachable))
@@ -264,67 +224,7 @@ class UrController:
             self.safety.power_off()
 
     async def _switch_network(self, *, on: bool) -> None:
-        await self._close()
+        await self.network.close()
         if on:
             with contextlib.suppress(OSError):
-                await self._open()
-
-    async def _serve_dashboard(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        async with self._stream(writer):
-            await self._say(writer, BANNER.encode() + b"\n")
-            while line := await reader.readline():
-                text = line.decode("ascii", "replace")
-                await self._say(writer, self._dashboard.answer(text).encode() + b"\n", garbage=GARBAGE_LINE)
-                if text.strip().lower() in {"quit", "shutdown"}:
-                    return
-
-    async def _serve_script(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._script_drops.add(writer)
-        async with self._stream(writer):
-            await self._take_scripts(reader)
-
-    async def _serve_primary(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._script_drops.add(writer)
-        async with self._stream(writer):
-            await self._say(writer, primary.version_message(self))
-            taking = asyncio.create_task(self._take_scripts(reader))
-            try:
-                while not taking.done():
-                    await self._say(writer, primary.robot_mode_message(self))
-                    await asyncio.wait({taking}, timeout=primary.PERIOD_S)
-            finally:
-                taking.cancel()
-                with contextlib.suppress(asyncio.CancelledError, OSError):
-                    await taking
-
-    async def _take_scripts(self, reader: asyncio.StreamReader) -> None:
-        """Wait for programs; ur-rtde's control script is recognised by the names that it uses, at its last line."""
-        text = bytearray()
-        while part := await reader.read(65536):
-            text += part
-            if text.endswith(b"\nend\n"):
-                if b"process_cmd(" in text and b"read_input_integer_reg" in text:
-                    self.script.upload(self.clock.now_s())
-                text.clear()
-            if len(text) > LONGEST_SCRIPT:
-                return
-
-    @contextlib.asynccontextmanager
-    async def _stream(self, writer: asyncio.StreamWriter):  # noqa: ANN202
-        self._streams.add(writer)
-        try:
-            with contextlib.suppress(OSError, ValueError, asyncio.LimitOverrunError, asyncio.IncompleteReadError):
-                yield
-        finally:
-            self._streams.discard(writer)
-            self._script_drops.discard(writer)
-            writer.transport.abort()
-
-    async def _say(self, writer: asyncio.StreamWriter, data: bytes, *, garbage: bytes | None = None) -> None:
-        if self.faults.active("silent"):
-            return
-        if garbage is not None and self.faults.active(CommonFault.GARBAGE):
-            data = garbage
-        await asyncio.sleep(self.faults.amount(CommonFault.DELAYED))
-        writer.write(data)
-        await writer.drain()
+                await self.network.open()

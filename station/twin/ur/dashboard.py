@@ -1,7 +1,7 @@
 """The dashboard server, port 29999: one line in, one line out.
 
-Source of commands and answers: Universal Robots, "Dashboard Server e-Series". The refusal in local control and the exact
-words about the first 5 s of a protective stop are unverified on hardware.
+Source of commands and answers: Universal Robots, "Dashboard Server e-Series". The refusal in local control and the
+exact words about the first 5 s of a protective stop are unverified on hardware.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 PORT = 29999
 BANNER = "Connected: Universal Robots Dashboard Server"
-LONGEST_LINE = 512
 NOT_NOW = "Command is not allowed due to safety reasons"
 TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"

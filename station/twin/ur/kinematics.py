@@ -29,10 +29,8 @@ LINKS: tuple[tuple[float, float, float], ...] = (
 
 JOINT_RANGE_RAD = 2 * math.pi
 ROUNDING = 1e-9
-JOINT_SPEED_LIMITS_RAD_S: Joints = (
-    *(math.radians(120.0),) * 2,
-    *(math.radians(180.0),) * 4,
-)
+_SLOW, _FAST = math.radians(120.0), math.radians(180.0)
+JOINT_SPEED_LIMITS_RAD_S: Joints = (_SLOW, _SLOW, _FAST, _FAST, _FAST, _FAST)
 
 
 def link_transform(joint: int, angle_rad: npt.NDArray[np.float64] | float) -> Transform:

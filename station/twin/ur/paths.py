@@ -21,7 +21,10 @@ class UnreachableError(Exception):
 class Path(Protocol):
     """A way of a length, in rad of the leading joint or in m of the tool."""
 
-    length: float
+    @property
+    def length(self) -> float:
+        """How long it is."""
+        ...
 
     def at(self, travel: float) -> tuple[Joints, Joints]:
         """Joint positions in rad and their slopes (rad per unit of length) after a travel."""
@@ -64,7 +67,7 @@ class JointPath:
 
 
 class ToolPath:
-    """Straight for the flange, with its rotation turned evenly; solved for the joints beforehand, millimetre by millimetre.
+    """Straight for the flange, with an even turn; solved for the joints beforehand, millimetre by millimetre.
 
     The length is the flange's way in m, or its turn in rad where that is the larger number.
     """

@@ -1,6 +1,6 @@
 """The primary stream, port 30001: the version message once, then the robot mode ten times a second.
 
-Source: Universal Robots, "Client interfaces", version message (type 20, 3) and robot mode data (type 16, sub-package 0).
+Source: Universal Robots, "Client interfaces": version message (type 20, 3), robot mode data (type 16, sub-package 0).
 """
 
 import struct
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 PORT = 30001
 PERIOD_S = 0.1
+CONNECTED_AND_ENABLED = (True, True)
 PROJECT = b"URControl"
 BUILT = b"01-11-2025, 00:00:00"
 VERSION = struct.Struct(f">iBQbbb{len(PROJECT)}sBBii{len(BUILT)}s")
@@ -37,8 +38,7 @@ def robot_mode_message(controller: "UrController") -> bytes:
         ROBOT_MODE.size - 5,
         0,
         controller.timestamp_us,
-        True,
-        True,
+        *CONNECTED_AND_ENABLED,
         safety.powered,
         safety.safety_mode is SafetyMode.ROBOT_EMERGENCY_STOP,
         safety.safety_mode is SafetyMode.PROTECTIVE_STOP,

@@ -3,6 +3,7 @@
 Names and types: RTDE guide, tables "Robot controller inputs" and "Robot controller outputs".
 """
 
+import math
 import re
 from typing import Any
 
@@ -89,8 +90,15 @@ class Registers:
         return self.inputs.get(f"input_int_register_{number}", 0)
 
     def input_doubles(self, first: int, count: int) -> tuple[float, ...]:
-        """Neighbouring double input registers; 0.0 where nobody wrote them."""
-        return tuple(self.inputs.get(f"input_double_register_{first + i}", 0.0) for i in range(count))
+        """Neighbouring double input registers; 0.0 where nobody wrote them.
+
+        Raises:
+            ValueError: one of them is not a finite number.
+        """
+        values = tuple(self.inputs.get(f"input_double_register_{first + i}", 0.0) for i in range(count))
+        if not all(map(math.isfinite, values)):
+            raise ValueError(f"double input registers {first} to {first + count - 1} hold {values}")
+        return values
 
 
 def _held_by_fieldbus(name: str) -> bool:

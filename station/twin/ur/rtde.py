@@ -7,7 +7,7 @@ import asyncio
 import random
 import socket
 import struct
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from station.twin.faults import CommonFault
 from station.twin.ur.outputs import Getter, output
@@ -52,7 +52,9 @@ class InputRecipe:
         self._struct = struct.Struct(">" + "".join(TYPE_CODES[kind] for kind in kinds))
 
     def unpack(self, payload: bytes) -> list[tuple[str, Any]]:
-        """Names and values of one package; ur-rtde's forward kinematics sends more than its recipe has, which is let go.
+        """Names and values of one package.
+
+        ur-rtde's forward kinematics sends more than its recipe has; what is too much is let go.
 
         Raises:
             struct.error: the package is shorter than the recipe.
@@ -72,6 +74,7 @@ class RtdeConnection(asyncio.Protocol):
         self._output: OutputRecipe | None = None
         self._started = False
         self._blocked_since_s: float | None = None
+        self.lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._last = b""
         self._noise = random.Random(0)  # noqa: S311 (garbage on purpose)
         self._handlers = {
@@ -86,16 +89,16 @@ class RtdeConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take a client in."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = transport = cast("asyncio.Transport", transport)
         transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         transport.set_write_buffer_limits(high=SEND_BUFFER_BYTES)
-        self._controller.connections.add(self)
+        self._controller.network.connections.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a client and what it claimed."""
-        self._controller.connections.discard(self)
+        self._controller.network.connections.discard(self)
         self._controller.registers.release(self)
+        self.lost.set_result(None)
 
     def pause_writing(self) -> None:
         """The client does not read."""

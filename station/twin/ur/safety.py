@@ -1,8 +1,9 @@
 """The controller's power, safety and operational mode, as its safety system and its pendant have them.
 
 Robot modes, safety modes and the bits of the safety status are those of the RTDE guide (Universal Robots, "Real-Time
-Data Exchange (RTDE) Guide") and of the dashboard server's guide. The times for power-on and brake release are shortened.
-That a protective stop cannot be unlocked in its first 5 s is documented; the exact words of a refusal are unverified.
+Data Exchange (RTDE) Guide") and of the dashboard server's guide. The times for power-on and brake release are
+shortened. That a protective stop cannot be unlocked in its first 5 s is documented; the exact words of a refusal are
+unverified on hardware.
 """
 
 from enum import IntEnum

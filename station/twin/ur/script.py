@@ -8,7 +8,7 @@ ur-rtde 1.6.5 (`scripts/rtde_control.script`, `include/ur_rtde/rtde.h`). `output
 from collections.abc import Callable
 from enum import IntEnum
 
-from station.twin.ur.body import Body
+from station.twin.ur.body import NO_OFFSET, Body
 from station.twin.ur.kinematics import Joints
 from station.twin.ur.paths import UnreachableError
 from station.twin.ur.poses import Pose, pose_from_transform, transform_from_pose
@@ -30,7 +30,7 @@ class RuntimeState(IntEnum):
     PAUSED = 4
 
 
-class Stop(Exception):
+class ScriptEndError(Exception):
     """The script ends by its own doing or by an error in it."""
 
 
@@ -47,8 +47,10 @@ class ControlScript:
         self._busy: Callable[[], bool] | None = None
         self._executing = False
         self._async_running = False
+        self._stops_straight = False
         self._watchdog_s: float | None = None
         self._watched_since_s = 0.0
+        self._now_s = 0.0
         self._operation = 0
         self._writes = 0
         self._commands: dict[int, Callable[[], Callable[[], bool] | None]] = {
@@ -77,7 +79,7 @@ class ControlScript:
             44: lambda: self._answer(*self._body.forward(self._joints(), self._pose(6))),
             46: lambda: self._inverse(None),
             47: lambda: self._say(self._body.steady),
-            58: lambda: self._answer(*self._body.forward(self._body.joints_rad, (0.0,) * 6)),
+            58: lambda: self._answer(*self._body.forward(self._body.joints_rad, NO_OFFSET)),
             60: lambda: self._say(self._body.solve(self._pose()) is not None),
             61: lambda: self._say(self._body.solve(self._pose(), self._joints(6)) is not None),
         }
@@ -102,6 +104,7 @@ class ControlScript:
 
     def step(self, now_s: float) -> None:
         """One cycle of the controller."""
+        self._now_s = now_s
         self._follow_safety()
         if self._starts_at_s is not None and now_s >= self._starts_at_s:
             self._start(now_s)
@@ -117,15 +120,15 @@ class ControlScript:
                 return
         try:
             self._serve(now_s)
-        except Stop as stop:
+        except ScriptEndError as stop:
             self.end(str(stop))
-        except (UnreachableError, ValueError) as error:
+        except (UnreachableError, ValueError, ZeroDivisionError) as error:
             self.end(f"the script failed: {error}")
 
     def _start(self, now_s: float) -> None:
         self._starts_at_s = None
         self.runtime_state = RuntimeState.PLAYING
-        self._executing = self._async_running = False
+        self._executing = self._async_running = self._stops_straight = False
         self._busy = None
         self._watched_since_s = now_s
         self._report(-1)
@@ -161,9 +164,9 @@ class ControlScript:
 
     def _begin(self, command: int) -> None:
         if command == 255:
-            raise Stop("the client stopped the script")
+            raise ScriptEndError("the client stopped the script")
         if command not in self._commands:
-            raise Stop(f"the emulated controller does not know the script's command {command}")
+            raise ScriptEndError(f"the emulated controller does not know the script's command {command}")
         self._busy = self._commands[command]()
         if self._busy is None:
             self._registers.output_int[0] = DONE
@@ -187,7 +190,7 @@ class ControlScript:
         speed, acceleration = self._registers.input_doubles(6, 2)
         joints = self._body.solve(self._pose())
         if joints is None:
-            raise Stop("the script failed: get_inverse_kin found no solution")
+            raise ScriptEndError("the script failed: get_inverse_kin found no solution")
         self._body.move_joints(joints, speed, acceleration)
 
     def _start_tool_move(self) -> None:
@@ -201,21 +204,26 @@ class ControlScript:
         try:
             self._body.move_tool(pose, speed, acceleration)
         except UnreachableError:
-            self._safety.stop_protectively(self._watched_since_s)
+            self._safety.stop_protectively(self._now_s)
 
     def _stop_motion(self) -> Callable[[], bool] | None:
-        # A synchronous stopL really runs stopj: the script's `stop_type` is set for asynchronous stops alone.
+        # The script sets its `stop_type` in asynchronous stops alone, and always to stopl; until then it is stopj.
         if self._async_running:
             self._report(-1)
-        self._body.brake(self._registers.input_doubles(0, 1)[0])
         self._async_running = self._registers.input_int(1) == 1
+        self._stops_straight |= self._async_running
+        (deceleration,) = self._registers.input_doubles(0, 1)
+        if self._stops_straight:
+            self._body.brake_tool(deceleration)
+        else:
+            self._body.brake(deceleration)
         if self._async_running:
             self._report(0)
             return None
         return lambda: not self._body.moving
 
     def _protective_stop(self) -> Callable[[], bool]:
-        self._safety.stop_protectively(self._watched_since_s)
+        self._safety.stop_protectively(self._now_s)
         return lambda: False
 
     def _set_watchdog(self) -> None:
@@ -232,7 +240,7 @@ class ControlScript:
     def _inverse(self, near: Joints | None) -> None:
         joints = self._body.solve(self._pose(), near)
         if joints is None:
-            raise Stop("the script failed: get_inverse_kin found no solution")
+            raise ScriptEndError("the script failed: get_inverse_kin found no solution")
         self._answer(*joints)
 
     def _say(self, yes: bool) -> None:  # noqa: FBT001 (the answer itself)
