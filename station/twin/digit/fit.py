@@ -41,7 +41,7 @@ _FIT_REACH = 2.2
 _FREE_REACH = 2.2
 _MODES = 8
 _CALIBRATIONS = 3
-_CALIBRATION_FRAMES = 150
+_CALIBRATION_FRAMES = 400
 PRESS_GAP_S = 10.0
 """Time from one real press to the next: not recorded, so taken."""
 
