@@ -50,7 +50,7 @@ from station.vision.paper import PaperMethod
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 BOX_MARGINS_PX = {"contact's edge": 0, "+ 40 px": 40}
-NOISE_FRAMES = 240
+NOISE_FRAMES = 400
 HEALTH_UNITS = 12
 CLOSINGS_MM = {
     Kind.STRAWBERRY: (1.0, 2.0, 4.0, 8.0),
