@@ -41,7 +41,10 @@ _FIT_REACH = 2.2
 _FREE_REACH = 2.2
 _MODES = 8
 _CALIBRATIONS = 3
-_CALIBRATION_FRAMES = 150
+_CALIBRATION_FRAMES = 200
+_OFFSET_STEPS = 3000
+_OFFSET = 3
+"""The offset's place among the levels."""
 PRESS_GAP_S = 10.0
 """Time from one real press to the next: not recorded, so taken."""
 
@@ -186,11 +189,25 @@ def fit_noise(presses: Sequence[Press]) -> NoiseLevels:
     """
     wanted = _strengths(measure_noise([press.image for press in presses], [free_of_contact(one) for one in presses]))
     levels = wanted / np.sqrt(2.0)
+    free = np.ones(SENSOR_SHAPE, np.bool_)
     for _ in range(_CALIBRATIONS):
-        frames = noisy_frames(NoiseLevels(*levels.astype(np.float32)), _CALIBRATION_FRAMES)
-        free = np.ones(SENSOR_SHAPE, np.bool_)
-        levels = levels * wanted / _strengths(measure_noise(frames, [free] * len(frames)))
+        tried = NoiseLevels(*levels.astype(np.float32))
+        frames = noisy_frames(tried, _CALIBRATION_FRAMES)
+        found = _strengths(measure_noise(frames, [free] * len(frames)))
+        found[_OFFSET] = _offset_strength(tried)
+        levels = levels * wanted / found
     return NoiseLevels(*levels.astype(np.float32))
+
+
+def _offset_strength(levels: NoiseLevels) -> npt.NDArray[np.float64]:
+    """The offsets' strength over so many steps that the rare large ones count for what they are; shape (3,)."""
+    drift = Drift(levels, seed=1)
+    offsets = []
+    for index in range(_OFFSET_STEPS):
+        drift.advance(index * PRESS_GAP_S)
+        offsets.append(drift.field[::8, ::8].mean(axis=(0, 1)))
+    median, p95 = np.percentile(np.abs(np.diff(offsets, axis=0)), [50, 95], axis=0)
+    return np.sqrt(median * p95)
 
 
 def noisy_frames(levels: NoiseLevels, count: int, seed: int = 0) -> list[npt.NDArray[np.uint8]]:

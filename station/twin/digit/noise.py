@@ -19,11 +19,12 @@ _BLUR_ACROSS_PX, _BLUR_DOWN_PX = 1.25, 1.75
 _CHANNELS = np.array([[1.0, -0.29, 0.11], [-0.29, 1.0, -0.27], [0.11, -0.27, 1.0]])
 _LINE_BLUR_PX = 1.6
 _DRIFT_SHAPE = (80, 60)
-_DRIFT_COSINES = 5
+_DRIFT_DOWN, _DRIFT_ALONG = 6, 24
+"""Cosines of the drift; along the columns the real change falls off slowly, as bands beside each other."""
 _BURSTS = 0.75
 """Spread of the logarithm of the drift's steps; gives the real offsets' ratio of 95th percentile to median."""
-DRIFT_TIME_S = 30.0
-"""The drift forgets itself in this time."""
+DRIFT_TIME_S = 10.0
+"""The drift forgets itself in this time: real frames change from the reference 1.3 times as much as from the last."""
 DRIFT_STEP_S = 0.2
 """The drift's field is drawn anew when this much time has passed."""
 
@@ -67,14 +68,13 @@ class Drift:
 
     def __init__(self, levels: NoiseLevels, seed: int) -> None:
         self._generator = np.random.default_rng([seed, 4])
-        falling = 1.0 / np.arange(1, _DRIFT_COSINES) ** 2
-        falling /= np.sqrt(np.square(falling).sum())
         # The first row of coefficients is what the columns' means see, the first column what the rows' see.
-        along, down = levels.drift_along[:, None] * falling, levels.drift_down[:, None] * falling
-        self._scale = np.zeros((3, _DRIFT_COSINES, _DRIFT_COSINES), np.float32)
+        along = levels.drift_along[:, None] * _falling(_DRIFT_ALONG, -0.5)
+        down = levels.drift_down[:, None] * _falling(_DRIFT_DOWN, -1.0)
+        self._scale = np.zeros((3, _DRIFT_DOWN, _DRIFT_ALONG), np.float32)
         self._scale[:, 0, 0] = levels.offset
         self._scale[:, 0, 1:], self._scale[:, 1:, 0] = along, down
-        self._scale[:, 1:, 1:] = np.sqrt(down[:, :, None] * along[:, None, :]) / 2.0
+        self._scale[:, 1:, 1:] = np.sqrt(down[:, :, None] * along[:, None, :]) * (_falling(_DRIFT_ALONG, -2.0) / 2.0)
         self._state = self._innovation()
         self._at_s: float | None = None
         self.field = self._draw()
@@ -105,3 +105,9 @@ class Drift:
         height, width = SENSOR_SHAPE
         coarse = cosine_field(self._state.astype(np.float32), _DRIFT_SHAPE)
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _falling(count: int, power: float) -> Array:
+    """Amplitudes of the cosines above the constant one, the sum of their squares 1."""
+    amplitudes = np.arange(1, count) ** power
+    return (amplitudes / np.sqrt(np.square(amplitudes).sum())).astype(np.float32)

@@ -19,6 +19,7 @@ Colour = Literal["blue", "green", "red"]
 _CHANNEL: dict[Colour, int] = {"blue": 0, "green": 1, "red": 2}
 _DEAD_LED_REST = 0.12
 _FOG_BLUR_PX = 12.0
+_FULL_LIGHT = (1.0, 1.0, 1.0)
 _GAIN_LIMITS = (0.5, 1.6)
 
 
@@ -33,7 +34,7 @@ class Condition:
     """0 clear to 1: the image blurs towards a grey veil."""
     dirt: int = 0
     """Crumbs stuck on the gel: they dent it all the time."""
-    light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    light: tuple[float, float, float] = _FULL_LIGHT
     """Brightness of the LEDs, blue, green and red, over that of the fit."""
 
 
@@ -59,7 +60,7 @@ class DigitSensor:
         self._dent: FloatArray | None = None
         self._condition = Condition()
         self._clean = self._draw(None, self._condition)
-        self._base = self._clean + self._drift.field * np.float32(self._drift_factor)
+        self._base = self._drifted()
 
     def frame(self, dent: FloatArray | None, now_s: float, condition: Condition | None = None) -> Image:
         """Draw one frame.
@@ -79,7 +80,7 @@ class DigitSensor:
             self._dent, self._condition = dent, condition
             self._clean = self._draw(dent, condition)
         if self._drift.advance(now_s) or redraw:
-            self._base = self._clean + self._drift.field * np.float32(self._drift_factor)
+            self._base = self._drifted()
         if not self._noise_factor:
             return np.asarray(cv2.convertScaleAbs(np.maximum(self._base, 0.0)), np.uint8)
         factor = np.float32(self._noise_factor)
@@ -88,6 +89,9 @@ class DigitSensor:
         pixels = self._noise.pixels()
         return np.asarray(cv2.addWeighted(pixels, float(factor), lined, 1.0, 0.0, dtype=cv2.CV_8U), np.uint8)
 
+    def _drifted(self) -> Array:
+        return np.asarray(cv2.scaleAdd(self._drift.field, self._drift_factor, self._clean), np.float32)
+
     def _draw(self, dent: FloatArray | None, condition: Condition) -> Array:
         generator = np.random.default_rng([self._seed, 5])
         if condition.dirt:
@@ -95,16 +99,17 @@ class DigitSensor:
             dent = crumbs if dent is None else np.maximum(dent, crumbs)
         image = self._background.copy()
         if dent is not None:
-            image += self._optics.change(dent) * self._gain
+            image += self._optics.change(dent, self._gain)
         if condition.torn:
             _tear(image, self._background, generator)
-        image *= np.asarray(condition.light, np.float32)
+        if condition.light != _FULL_LIGHT:
+            image *= np.asarray(condition.light, np.float32)
         if condition.dead_led:
             image[..., _CHANNEL[condition.dead_led]] *= _DEAD_LED_REST
         if condition.fog:
             blurred = cv2.GaussianBlur(image, (0, 0), _FOG_BLUR_PX * condition.fog)
             image = blurred * (1.0 - 0.7 * condition.fog) + blurred.mean() * 0.7 * condition.fog
-        return np.clip(image, 0.0, 255.0).astype(np.float32)
+        return image.astype(np.float32, copy=False)
 
 
 def _crumbs(count: int, generator: np.random.Generator) -> FloatArray:

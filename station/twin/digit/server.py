@@ -180,6 +180,8 @@ class DigitCameraServer:
             pass
         except* ValueError as errors:
             writer.write(packed("error", message=str(errors.exceptions[0])))
+        except* asyncio.CancelledError:
+            pass  # only `stop` cancels; asyncio would report the cancelled task of a connection as an error
         finally:
             self._clients.discard(task)
             writer.close()
