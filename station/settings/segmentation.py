@@ -90,19 +90,19 @@ class RobustParameters(Settings):
     """The station's own method; pixels are those of a 640x480 image and scale with the image."""
 
     contacts: Literal["one", "several"] = setting(
-        "several",
+        "one",
         title="Contacts",
-        description="`one` keeps the strongest contact only; `several` measures all, as a raspberry's drupelets make.",
+        description="`one` outlines one body, seeds, drupelets and all; `several` measures separate contacts each.",
     )
     gate_ratio: float = setting(
-        3.0,
+        2.8,
         title="Gate",
         description="Contact is looked for where the gel bends more than this many times the background's median.",
         ge=1.5,
         le=20.0,
     )
     least_bend: float = setting(
-        0.16,
+        0.14,
         title="Least bending",
         description="Bending below this is never contact, however quiet the image: light drifts by as much.",
         unit="grey level/px",

@@ -15,6 +15,7 @@ from station.vision.working import resized
 
 _SIGMA_PX = 5.0
 _WINDOW_SIGMA_PX = 7.5
+_CALM_RATIO = 2.2
 _NOISE_CAP = 0.35
 _LEAST_BACKGROUND = 0.02
 
@@ -43,17 +44,21 @@ def bending(change: FloatImage) -> FloatImage:
 
 
 def quiet(bend: FloatImage, least_bend: float) -> FloatImage:
-    """A first guess of the background: where it bends no more than the calmest twentieth of the frame, or least.
+    """A first guess of the background: what bends little more than the calmest twentieth of the frame.
+
+    What such places enclose, as a contact's ring does its flat centre, is no background either.
 
     Args:
         bend: of the difference with its drift, grey levels per pixel.
-        least_bend: what surely is not background, grey levels per pixel.
+        least_bend: the gate's lower limit, grey levels per pixel; half as much again surely is no background.
 
     Returns:
         Shape of `bend`, 0 to 1.
     """
-    limit = min(2.8 * float(np.quantile(bend, 0.05)), 1.5 * least_bend) + 0.4 * least_bend
-    return np.maximum(0, 1 - (bend / limit) ** 4) ** 2
+    limit = min(_CALM_RATIO * float(np.quantile(bend, 0.05)), 1.5 * least_bend) + 0.15 * least_bend
+    outlines, _ = cv2.findContours((bend > limit).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    enclosed = cv2.drawContours(np.zeros(bend.shape, np.uint8), outlines, -1, 1, cv2.FILLED)
+    return np.asarray(np.maximum(0, 1 - (bend / limit) ** 4) ** 2 * (enclosed == 0), np.float32)
 
 
 def noise_of(bend: FloatImage, background: FloatImage) -> float:

@@ -9,6 +9,8 @@ from station.vision.clusters import boundaries
 from station.vision.contact import FloatImage, Mask
 
 _FOOT_SHARE = 0.5
+_BODY_SHARE = 0.12
+_BRIDGE_SHARE = 0.05
 _OWN_SHARE = 0.35
 _LEAST_BEND = 0.01
 _NECKS = (0.4, 0.55, 0.7, 0.8)
@@ -33,31 +35,63 @@ def cluster_levels(bend: FloatImage) -> list[float]:
     return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend, _LEAST_BEND)))]
 
 
-def find_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
-    """The regions whose bending rises above the threshold, the heaviest first.
-
-    A region's foot is the highest cluster boundary between half the threshold and the threshold; of each region
-    counts what bends at least about a third as much as its own strongest place, which leaves tails behind.
+def body_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
+    """Where one body may touch: strong bending, bridged over the gaps between seeds and drupelets.
 
     Args:
         bend: shape (height, width), grey levels per pixel.
         levels: from `cluster_levels`.
         threshold: the gate's, grey levels per pixel.
+
+    Returns:
+        The heaviest first.
     """
-    foot = max([_FOOT_SHARE * threshold, *(level for level in levels if level <= threshold)])
-    candidates: list[Candidate] = []
-    for whole in _parts((bend > foot).astype(np.uint8)):
+    strong = (bend > max(_foot(levels, threshold), _BODY_SHARE * float(bend.max()))).astype(np.uint8)
+    side = 2 * round(_BRIDGE_SHARE * max(bend.shape) / 2) + 1
+    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    framed = cv2.copyMakeBorder(strong, side, side, side, side, cv2.BORDER_CONSTANT)
+    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[side:-side, side:-side]
+    return _by_weight(
+        bend, [part for part in _parts(np.asarray(bridged, np.uint8)) if bend[part > 0].max() > threshold]
+    )
+
+
+def separate_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
+    """Where several contacts may lie, each for itself.
+
+    Of each region counts what bends at least about a third as much as its own strongest place, so that a strong
+    neighbour does not hide a weak contact; what narrow necks join is parted.
+
+    Args:
+        bend: shape (height, width), grey levels per pixel.
+        levels: from `cluster_levels`.
+        threshold: the gate's, grey levels per pixel.
+
+    Returns:
+        The heaviest first.
+    """
+    pieces: list[Mask] = []
+    for whole in _parts((bend > _foot(levels, threshold)).astype(np.uint8)):
         peak = float(bend[whole > 0].max())
-        if peak <= threshold:
-            continue
-        for part in _parts(whole * (bend > _OWN_SHARE * peak)):
-            if bend[part > 0].max() > threshold:
-                candidates += [Candidate(piece, float((bend[piece > 0] ** 2).sum())) for piece in _split_at_necks(part)]
+        if peak > threshold:
+            for part in _parts(whole * (bend > _OWN_SHARE * peak)):
+                if bend[part > 0].max() > threshold:
+                    pieces += _split_at_necks(part)
+    return _by_weight(bend, pieces)
+
+
+def _foot(levels: list[float], threshold: float) -> float:
+    """The highest cluster boundary between half the threshold and the threshold, or that half."""
+    return max([_FOOT_SHARE * threshold, *(level for level in levels if level <= threshold)])
+
+
+def _by_weight(bend: FloatImage, regions: list[Mask]) -> list[Candidate]:
+    candidates = [Candidate(region, float((bend[region > 0] ** 2).sum())) for region in regions]
     return sorted(candidates, key=lambda candidate: -candidate.weight)
 
 
 def _parts(region: Mask) -> list[Mask]:
-    count, labels = cv2.connectedComponents(region)
+    count, labels = cv2.connectedComponents(np.ascontiguousarray(region))
     return [(labels == label).astype(np.uint8) for label in range(1, count)]
 
 
@@ -78,7 +112,7 @@ def _split_at_necks(region: Mask) -> list[Mask]:
         return [region]
     apart = [cv2.distanceTransform(1 - core, cv2.DIST_L2, cv2.DIST_MASK_5) for core in found]
     nearest = np.argmin(np.stack(apart), axis=0)
-    return [region * (nearest == index) for index in range(len(found))]
+    return [(region * (nearest == index)).astype(np.uint8) for index in range(len(found))]
 
 
 def _depth(region: Mask) -> FloatImage:

@@ -1,11 +1,28 @@
 """How far the image supports an area."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from station.vision.contact import FloatImage
+from station.vision.drift import weighted_median
 from station.vision.edge import Edge
 
 _RELIABLE_RATIO = 4.0
 _VISIBLE_RATIO = 2.0
+_LEAST_NOISE_LEVELS = 0.1
+_NORMAL_OF_MEDIAN = 1.4826
+
+
+def background_spread(signal: FloatImage, background: FloatImage) -> float:
+    """Standard deviation of the edge signal where nothing touches, from its median absolute deviation.
+
+    Args:
+        signal: shape (height, width), grey levels.
+        background: shape of `signal`, 0 to 1.
+    """
+    middle = weighted_median(signal, background)
+    return _NORMAL_OF_MEDIAN * weighted_median(np.abs(signal - middle), background)
 
 
 def edge_confidence(edge: Edge, noise_levels: float) -> float:
@@ -16,11 +33,30 @@ def edge_confidence(edge: Edge, noise_levels: float) -> float:
 
     Args:
         edge: with its drops in grey levels.
-        noise_levels: the change's length where nothing touches, median, grey levels.
+        noise_levels: from `background_spread`.
     """
     if not edge.seen.any():
         return 0.0
-    ratio = edge.drop_levels[edge.seen] / max(noise_levels, 0.1)
+    ratio = edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)
     signal = max(0.0, float(np.median(ratio)))
     support = float(np.mean(ratio >= _VISIBLE_RATIO))
     return support * signal**2 / (signal**2 + _RELIABLE_RATIO**2)
+
+
+def agreement(areas: Sequence[float]) -> float:
+    """How far several frames of one width step agree, 0 to 1: one over one plus ten times their relative spread.
+
+    Multiply an area's confidence by it. One frame agrees with itself.
+
+    Args:
+        areas: of the frames of one step, any unit.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if not areas:
+        raise ValueError("no areas to compare: at least one frame is needed")
+    middle = float(np.median(areas))
+    if middle <= 0:
+        return 1.0 if max(areas) <= 0 else 0.0
+    return 1.0 / (1.0 + 10.0 * float(np.median(np.abs(np.asarray(areas) - middle))) / middle)

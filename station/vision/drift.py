@@ -28,6 +28,8 @@ _CELL_NOISE_LEVELS = 2.0
 _LEAST_SPREAD_LEVELS = 0.5
 _ITERATIONS = 5
 _LEAST_BACKGROUND = 0.05
+_LATER_SHARE = 0.02
+"""What a place counts that the first guess took for contact, once the fit has reached it."""
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
@@ -96,6 +98,7 @@ class DriftModel:
         """
         samples = resized(difference, self._grid).reshape(-1, 3).astype(np.float64)
         weight = resized(background, self._grid).ravel().astype(np.float64)
+        trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
         spread = 0.0
         coefficients: list[_Floats] = []
         fitted = np.zeros_like(samples)
@@ -106,7 +109,7 @@ class DriftModel:
             spread = SPREAD_CAP_LEVELS / 2
             if weight.sum() >= _LEAST_BACKGROUND * weight.size:
                 spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
-            weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2
+            weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2 * trust
         smooth = [c[1:].astype(np.float32) @ f for c, f in zip(coefficients, self._fine, strict=True)]
         levels = resized(np.stack(smooth, axis=-1).reshape(self._half[1], self._half[0], 3), self._size)
         levels += self._light * np.array([c[0] for c in coefficients], np.float32)

@@ -13,23 +13,23 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.candidates import Candidate, cluster_levels, find_candidates
-from station.vision.confidence import edge_confidence
+from station.vision.candidates import Candidate, body_candidates, cluster_levels, separate_candidates
+from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, weighted_median, without_streaks
+from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_streaks
 from station.vision.edge import Edge, find_edge
+from station.vision.edge_signal import denoised, edge_signal
 from station.vision.working import SATURATED_LEVEL, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
 """The image for which parameters in pixels are given; they scale with the image."""
 
-_BLUR_SHARE = 0.045
-_BLUR_PX = (1.0, 3.5)
 _SUBPIXEL_BITS = 4
 _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.6
+_LEAST_SUPPORT = 0.05
 
 
 class RobustMethod:
@@ -82,15 +82,13 @@ class RobustMethod:
         change[self._blind] = 0
         change = without_streaks(change, drift.background)
         bend = bending(change)
-        size = (bend.shape[1], bend.shape[0])
-        noise = noise_of(bend, resized(drift.background, size))
+        noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         levels = cluster_levels(bend)
-        candidates = find_candidates(bend, levels, threshold)
-        found = self._edges(change, bend, candidates, drift.background)
+        search = body_candidates if self._parameters.contacts == "one" else separate_candidates
+        found = self._edges(change, bend, search(bend, levels, threshold), drift.background)
         mask = self._mask([edge for edge, _ in found])
         if on_stage:
-            edges = [edge for edge, _ in found]
             pictures.emit(
                 on_stage,
                 self.stages,
@@ -99,7 +97,7 @@ class RobustMethod:
                 bend=bend,
                 levels=levels,
                 threshold=threshold,
-                edges=edges,
+                edges=[edge for edge, _ in found],
                 mask=mask,
             )
         flags, confidence = self._judge(work, drift, mask, found)
@@ -118,21 +116,20 @@ class RobustMethod:
         found: list[tuple[Edge, float]] = []
         height, width = change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
-        for region, _ in candidates:
+        for small, _ in candidates:
             if found and self._parameters.contacts == "one":
                 break
-            middle = _middle(bend, region, (width, height))
-            full = cv2.resize(region, (width, height), interpolation=cv2.INTER_NEAREST)
-            radius = float(np.sqrt(full.sum() / np.pi))
-            sigma = float(np.clip(_BLUR_SHARE * radius, *_BLUR_PX))
-            denoised = np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
-            length = _length(denoised)
-            edge = find_edge(length, np.asarray(full, np.uint8), middle, self._parameters.edge_stiffness)
+            middle = _middle(bend, small, (width, height))
+            region = np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
+            radius_px = float(np.sqrt(np.count_nonzero(region) / np.pi))
+            smooth = denoised(change, radius_px)
+            signal = edge_signal(smooth, bend, region, radius_px)
+            edge = find_edge(signal, region, middle, self._parameters.edge_stiffness)
             inside = _filled(edge, (height, width), 1.0, 1.0) > 0
-            if np.count_nonzero(inside) < smallest_px or _one_sided(denoised[inside], edge):
+            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], edge):
                 continue
-            confidence = edge_confidence(edge, weighted_median(length, background))
-            if confidence > 0:
+            confidence = edge_confidence(edge, background_spread(signal, background))
+            if confidence >= _LEAST_SUPPORT:
                 found.append((edge, confidence))
         return found
 
@@ -172,11 +169,6 @@ def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[floa
         (moments["m10"] / moments["m00"] + 0.5) * x_scale - 0.5,
         (moments["m01"] / moments["m00"] + 0.5) * y_scale - 0.5,
     )
-
-
-def _length(change: FloatImage) -> FloatImage:
-    squares = cv2.transform(cv2.multiply(change, change), np.ones((1, 3), np.float32))
-    return np.asarray(cv2.sqrt(squares), np.float32)
 
 
 def _filled(edge: Edge, shape: tuple[int, int], x_scale: float, y_scale: float) -> Mask:
