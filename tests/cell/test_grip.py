@@ -26,7 +26,7 @@ def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_pa
     assert len(rows) == 18
     assert widths == sorted(widths, reverse=True)
     assert all(abs(float(row["width_mm"]) - float(row["commanded_width_mm"])) <= 0.4 for row in rows)
-    truth = [np.count_nonzero(cv2.imread(str(out / "truth" / row["image"]), 0)) for row in rows]
+    truth = [np.count_nonzero(np.asarray(cv2.imread(str(out / "truth" / row["image"]), 0))) for row in rows]
     assert truth[0] == 0
     assert all(before < after for before, after in pairwise(truth))
     assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
