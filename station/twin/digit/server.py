@@ -29,10 +29,10 @@ def digit_faults() -> FaultBoard:
     """The switches of the twin's DIGIT, with what their amounts mean.
 
     `off` cuts every connection at once; `stuck` sends the same pixels under new sequence numbers; `garbage` sends
-    random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where it
-    is 1 or less); `delayed` sends frames that many seconds late; `intermittent` cuts every connection each time that
-    many seconds have passed. `gel_torn`, `dirt` (amount: crumbs), `lens_fogged` (amount: 0 to 1) and `led_dead`
-    (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
+    random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where
+    it is 1 or less); `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
+    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs), `lens_fogged` (amount: 0 to 1) and
+    `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
     return FaultBoard("digit", (*GEL_FAULTS, *FRAME_FAULTS))
