@@ -23,6 +23,7 @@ _REMEMBERED = 90
 _BRIGHTEST = 15
 _DEAD: dict[int, Colour] = {1: "red", 2: "green", 3: "blue"}
 _SLOWEST = 10.0
+_REQUEST_DEADLINE_S = 5.0
 
 
 def digit_faults() -> FaultBoard:
@@ -176,7 +177,7 @@ class DigitCameraServer:
                 guard = group.create_task(self._cut())
                 await self._serve(reader, writer)
                 guard.cancel()
-        except* (ConnectionError, asyncio.IncompleteReadError):
+        except* (ConnectionError, TimeoutError, asyncio.IncompleteReadError):
             pass
         except* ValueError as errors:
             writer.write(packed("error", message=str(errors.exceptions[0])))
@@ -201,7 +202,8 @@ class DigitCameraServer:
             await asyncio.sleep(0.02)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        request = await read_request(reader)
+        async with asyncio.timeout(_REQUEST_DEADLINE_S):
+            request = await read_request(reader)
         match request.get("kind"):
             case "stream":
                 await self._stream(writer)
