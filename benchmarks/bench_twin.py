@@ -268,7 +268,7 @@ def picture_presses(path: Path) -> None:
         ]
         rows.append(np.hstack(shown_frames))
     sheet = np.vstack(rows)
-    cv2.imwrite(str(path), cv2.resize(sheet, None, fx=0.3, fy=0.3, interpolation=cv2.INTER_AREA))
+    cv2.imwrite(str(path), cv2.resize(sheet, None, fx=0.2, fy=0.2, interpolation=cv2.INTER_AREA))
 
 
 def outlined(change: npt.NDArray[np.floating], mask: npt.NDArray[np.uint8]) -> Image:
@@ -282,7 +282,7 @@ def outlined(change: npt.NDArray[np.floating], mask: npt.NDArray[np.uint8]) -> I
 def picture_units(path: Path) -> None:
     """Backgrounds of the fitted unit and of generated ones."""
     frames = [DigitSensor(0, unit).frame(None, 0.0) for unit in (None, *range(9))]
-    cv2.imwrite(str(path), cv2.resize(np.hstack(frames), None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA))
+    cv2.imwrite(str(path), cv2.resize(np.hstack(frames), None, fx=0.2, fy=0.2, interpolation=cv2.INTER_AREA))
 
 
 def picture_errors(path: Path, reference: Image, presses: list[Press]) -> None:

@@ -53,7 +53,7 @@ class TwinCameraSettings(Settings):
     """The simulated DIGIT."""
 
     host: str = setting("127.0.0.1", title="Address", description="Address of the twin's camera.", min_length=1)
-    port: int = setting(49210, title="Port", description="TCP port of the twin's camera.", ge=1, le=65535)
+    port: int = setting(5030, title="Port", description="TCP port of the twin's camera.", ge=1, le=65535)
 
 
 class CameraSettings(Settings):

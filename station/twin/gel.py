@@ -22,11 +22,12 @@ GRID_SHAPE = (SENSOR_SHAPE[0] // GRID_STEP, SENSOR_SHAPE[1] // GRID_STEP)
 GRID_MM = MM_PER_PX * GRID_STEP
 
 _STIFFENING = (0.0048, 0.386, 0.781, 0.884, 1.0)
+"""Dimitriadis' polynomial in contact radius over thickness, highest power first."""
 _SLENDEREST = 1.5
 _POLE = 0.98
-_OUTSET_MM = 0.093
-_OUTSET_STEEP_MM = 0.8
-_OUTSET_SLOPE = 0.3
+"""An ellipsoid's gap is its own up to here, in squared half axes; at 1 it would be vertical."""
+_OUTSET_MM, _OUTSET_STEEP_MM, _OUTSET_SLOPE = 0.093, 0.8, 0.3
+"""How far the visible edge lies outside Hertz's, how much more per slope, and from which slope on."""
 
 
 @dataclass(frozen=True, slots=True)

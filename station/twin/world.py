@@ -42,6 +42,7 @@ class World:
         self._gel = gel or Gel()
         self._sponge_mm = sponge_mm
         self._opening_mm = 85.0
+        self._pose = Pose()
         self._fruit: Fruit | None = None
         self._contact: FruitOnGel | None = None
         self._squeeze: Squeeze | None = None

@@ -30,6 +30,27 @@ def test_a_flat_gel_and_the_gentlest_slopes_change_nothing(optics):
     assert not optics.change(ramp(0.99 * SLOPE_KNOTS[0])).any()
 
 
+def test_between_two_dents_nothing_changes(optics):
+    dent = np.zeros(GRID_SHAPE, np.float32)
+    dent[40:60, 40:60] = dent[250:270, 180:200] = 0.3
+    change = optics.change(dent)
+    assert np.abs(change[90:110, 90:110]).max() > 5
+    assert not change[200:400, 150:300].any()
+
+
+def test_each_side_of_a_ball_takes_its_own_colour():
+    press = render_press("rubber_ball", 0, [-1.0, 2.0], CALM)
+    change = press.frames[1].astype(int) - press.frames[0]
+    above, below, left, right = (
+        change[y - 10 : y + 10, x - 10 : x + 10].mean(axis=(0, 1))
+        for y, x in ((250, 240), (390, 240), (320, 170), (320, 310))
+    )
+    # On the fitted unit blue comes from below, red from the right and green from the left, as on the real presses.
+    assert below[0] > above[0] + 15
+    assert right[2] > left[2] + 15
+    assert left[1] > right[1] + 5
+
+
 def test_the_change_grows_with_the_slope_without_a_step(optics):
     sizes = np.linspace(0.0, 0.5, 101)
     middle = np.array([optics.change(ramp(slope))[320, 240] for slope in sizes])

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 
@@ -33,6 +34,17 @@ def test_good_frames_have_no_fault(presses):
         for frame in (*press.references, *press.frames):
             assert health.judge(frame, before, 0.01) == frozenset()
             before = frame
+
+
+def test_real_frames_have_no_fault(real_images):
+    health, before = FrameHealth(0.2, SENSOR_SHAPE), None
+    for path in sorted((real_images / "digit_presses").glob("*.jpg")):
+        image = np.asarray(cv2.imread(str(path)), np.uint8)
+        assert health.judge(image, before, 0.0) == frozenset(), path.name
+        before = image
+    for path in sorted((real_images / "digit_backgrounds").glob("*.jpg")):
+        image = np.asarray(cv2.imread(str(path)), np.uint8)
+        assert FrameHealth(0.2, (320, 240)).judge(image, None, 0.0) == frozenset(), path.name
 
 
 @pytest.mark.parametrize("fault", list(SPOILT))

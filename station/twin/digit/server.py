@@ -23,16 +23,17 @@ _REMEMBERED = 90
 _BRIGHTEST = 15
 _DEAD: dict[int, Colour] = {1: "red", 2: "green", 3: "blue"}
 _SLOWEST = 10.0
+_REQUEST_DEADLINE_S = 5.0
 
 
 def digit_faults() -> FaultBoard:
     """The switches of the twin's DIGIT, with what their amounts mean.
 
     `off` cuts every connection at once; `stuck` sends the same pixels under new sequence numbers; `garbage` sends
-    random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where it
-    is 1 or less); `delayed` sends frames that many seconds late; `intermittent` cuts every connection each time that
-    many seconds have passed. `gel_torn`, `dirt` (amount: crumbs), `lens_fogged` (amount: 0 to 1) and `led_dead`
-    (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
+    random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where
+    it is 1 or less); `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
+    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs), `lens_fogged` (amount: 0 to 1) and
+    `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
     return FaultBoard("digit", (*GEL_FAULTS, *FRAME_FAULTS))
@@ -176,7 +177,7 @@ class DigitCameraServer:
                 guard = group.create_task(self._cut())
                 await self._serve(reader, writer)
                 guard.cancel()
-        except* (ConnectionError, asyncio.IncompleteReadError):
+        except* (ConnectionError, TimeoutError, asyncio.IncompleteReadError):
             pass
         except* ValueError as errors:
             writer.write(packed("error", message=str(errors.exceptions[0])))
@@ -201,7 +202,8 @@ class DigitCameraServer:
             await asyncio.sleep(0.02)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        request = await read_request(reader)
+        async with asyncio.timeout(_REQUEST_DEADLINE_S):
+            request = await read_request(reader)
         match request.get("kind"):
             case "stream":
                 await self._stream(writer)
