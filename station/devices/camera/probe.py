@@ -1,11 +1,10 @@
 """What `station devices check` says of the camera."""
 
 import time
-from dataclasses import dataclass
-from typing import Literal
 
 from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault
 from station.devices.camera.open import camera_from
+from station.devices.finding import Finding
 from station.settings.camera import CameraSettings
 
 _FRAMES = 15
@@ -21,18 +20,6 @@ REMEDIES = {
     FrameFault.SATURATED: "too much light: lower the LED settings, shade the gel",
     FrameFault.WRONG_SIZE: "another mode than asked for: close other programs that use the sensor",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One line of `station devices check`."""
-
-    device: str
-    found: str
-    """What answered, and how it does."""
-    verdict: Literal["ok", "warning", "fault"]
-    remedy: str
-    """What a person is to do; empty where the verdict is ok."""
 
 
 async def probe_camera(settings: CameraSettings) -> list[Finding]:

@@ -36,7 +36,7 @@ def digit_faults() -> FaultBoard:
     `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
-    return FaultBoard("digit", (*GEL_FAULTS, *FRAME_FAULTS))
+    return FaultBoard("camera", (*GEL_FAULTS, *FRAME_FAULTS))
 
 
 @dataclass(frozen=True, slots=True)
