@@ -130,7 +130,9 @@ def test_a_protective_stop_in_mid_move_waits_for_a_person_and_for_its_five_secon
             await until(lambda: moving(bench))
             bench.faults.set("protective_stop")
             assert await cause_of(move) is ArmCause.PROTECTIVE_STOP
-            await until(lambda: not bench.controller.body.moving)
+            await arm.stop()
+            assert not bench.controller.body.moving
+            assert (await arm.state()).moving is False
             assert await cause_of(arm.move_to("home")) is ArmCause.PROTECTIVE_STOP
             assert await cause_of(arm.upload_again()) is ArmCause.PROTECTIVE_STOP
             stopped_at_s = bench.clock.now_s()
@@ -302,6 +304,7 @@ def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_a
             state = await arm.state()
             assert state.joints_rad is None
             assert not state.ready
+            assert await cause_of(arm.stop()) is ArmCause.LINK_LOST
             await until(lambda: not bench.controller.body.moving)
             assert bench.controller.joints_rad[0] < 1.9
             bench.faults.clear("link_cut")

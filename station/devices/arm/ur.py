@@ -113,12 +113,14 @@ class UrArm:
             ArmFault: the controller does not confirm; its watchdog then stops the arm.
         """
         self._stopped.set()
-        if self._link.fault is not None:
-            return
-        await self._brake()
+        if self._link.fault is None:
+            await self._brake()
         deadline_s = time.monotonic() + self._settings.call_deadline_s
         while time.monotonic() < deadline_s:
-            if self._link.fault is not None or not _moves(await self._link.snapshot()):
+            if self._link.lost is not None:
+                raise self._link.lost
+            snapshot = await self._fresh_enough()
+            if snapshot is not None and not _moves(snapshot):
                 return
             await asyncio.sleep(POLL_S)
         raise ArmFault(ArmCause.DEADLINE, "the arm did not come to rest in time")
@@ -242,7 +244,9 @@ async def _require_remote(conversation: DashboardConversation) -> None:
 
 
 def _moves(snapshot: Snapshot) -> bool:
-    return snapshot.underway or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
+    # A program that was stopped leaves its report of a motion behind.
+    begun = snapshot.underway and snapshot.runtime_state == PLAYING
+    return begun or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
 
 
 def _near(joints_rad: Six, target_rad: Six, tolerance_rad: float) -> bool:
