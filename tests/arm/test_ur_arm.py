@@ -100,6 +100,21 @@ def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("turns", [0, 1, 3, 10, 30])
+def test_a_stop_at_the_very_beginning_of_a_move_stops_it_too(healthy_arm, until, turns):
+    async def run():
+        async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            await asyncio.gather(arm.stop(), return_exceptions=True)
+            assert await cause_of(move) is ArmCause.STOPPED
+            await until(lambda: not bench.controller.body.moving)
+            assert bench.controller.joints_rad[0] < 0.2
+
+    asyncio.run(run())
+
+
 def test_a_cancelled_move_is_stopped(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY) as (bench, arm):

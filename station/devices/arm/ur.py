@@ -16,7 +16,7 @@ from station.settings.arm import ArmSettings, PoseName
 
 POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
 POLL_S = 0.02
-RECOVERY_POLL_S = 0.25
+RECOVERY_POLL_S = 0.5
 UNLOCK_AFTER_S = 5.1
 """A controller refuses to leave a protective stop in its first 5 s."""
 AT_REST_RAD_S = 1e-3
@@ -146,7 +146,10 @@ class UrArm:
                 await conversation.say("restart safety")
             while "RUNNING" not in (mode := await conversation.say("robotmode")):
                 await conversation.say("close safety popup")
-                await conversation.say("brake release" if "IDLE" in mode else "power on")
+                if "POWER_OFF" in mode:
+                    await conversation.say("power on")
+                elif "IDLE" in mode:
+                    await conversation.say("brake release")
                 await asyncio.sleep(RECOVERY_POLL_S)
             await self._link.upload()
 
@@ -205,6 +208,7 @@ class UrArm:
         resting_since_s: float | None = None
         while time.monotonic() < deadline_s:
             if self._stopped.is_set():
+                await self._brake()  # once more: the stop may have come just before the motion began
                 raise ArmFault(ArmCause.STOPPED, f"the way to {pose} was stopped by the station")
             if self._link.fault is not None:
                 raise self._link.fault
