@@ -24,6 +24,9 @@ DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "arm.md"
 BEGIN, END = "<!-- bench_arm begins -->", "<!-- bench_arm ends -->"
 ROUND_TRIPS = 200
 
+Row = tuple[str, dict[str, float]]
+"""What was measured, and each process's CPU in per cent of a core."""
+
 
 def run_controller() -> None:
     """The emulated controller, alone in its process."""
@@ -73,8 +76,8 @@ def started(target: Callable[..., None], *arguments: object) -> SpawnProcess:
     return process
 
 
-async def with_driver(controller: psutil.Process, frequency_hz: float) -> list[tuple[str, dict[str, float]]]:
-    """CPU of controller, driver and its process, at rest and on the move."""
+async def with_driver(controller: psutil.Process, frequency_hz: float) -> tuple[list[Row], list[float]]:
+    """CPU of controller, driver and its process, at rest and on the move; durations of `state()` in s, in order."""
     settings = ArmSettings(host=HOST, frequency_hz=frequency_hz, joint_speed_rad_s=0.3)
     async with UrArm(settings) as arm:
         await arm.ready(20.0)
@@ -103,13 +106,10 @@ async def with_driver(controller: psutil.Process, frequency_hz: float) -> list[t
             begun_s = time.perf_counter()
             await arm.state()
             durations.append(time.perf_counter() - begun_s)
-        rows.append(
-            (f"`state()` {1000 * sorted(durations)[ROUND_TRIPS // 2]:.2f} ms, worst {1000 * max(durations):.2f} ms", {})
-        )
-        return rows
+        return rows, sorted(durations)
 
 
-def bare_receive(controller: psutil.Process) -> tuple[str, dict[str, float]]:
+def bare_receive(controller: psutil.Process) -> Row:
     """CPU of controller and of a bare receive loop."""
     peer = started(run_bare_receive, 500.0)
     time.sleep(2.0)
@@ -129,7 +129,7 @@ def bare_control() -> float:
     return duration_s
 
 
-def table(rows: list[tuple[str, dict[str, float]]]) -> str:
+def table(rows: list[Row]) -> str:
     """The rows as Markdown, in per cent of one core."""
     lines = ["| | controller | driver | ur-rtde's process |", "|---|---|---|---|"]
     for name, cost in rows:
@@ -146,12 +146,19 @@ def main() -> int:
     server = psutil.Process(controller.pid)
     rows = [("nobody connected", share({"controller": server}, MEASURE_S))]
     rows.append(bare_receive(server))
-    rows += asyncio.run(with_driver(server, 500.0))
-    rows += asyncio.run(with_driver(server, 125.0))[:2]
-    rows.append((f"bare ur-rtde, one blocking call {1000 * bare_control():.2f} ms", {}))
+    at_500, durations_s = asyncio.run(with_driver(server, 500.0))
+    at_125, _ = asyncio.run(with_driver(server, 125.0))
+    rows += at_500 + at_125
+    blocking_s = bare_control()
     controller.kill()
     controller.join()
-    written = f"{table(rows)}\n\nPython {sys.version.split()[0]}, {psutil.cpu_count()} cores, {MEASURE_S:g} s each."
+    written = (
+        f"{table(rows)}\n\n"
+        f"The driver's `state()` takes {1000 * durations_s[ROUND_TRIPS // 2]:.2f} ms in the median and "
+        f"{1000 * durations_s[-1]:.2f} ms at worst of {ROUND_TRIPS}; one blocking call of bare ur-rtde "
+        f"{1000 * blocking_s:.2f} ms. Measured for {MEASURE_S:g} s each with Python {sys.version.split()[0]} on "
+        f"{psutil.cpu_count()} cores."
+    )
     print(written)
     head, _, rest = DOCUMENT.read_text().partition(BEGIN)
     _, _, tail = rest.partition(END)

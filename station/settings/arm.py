@@ -180,10 +180,10 @@ class ArmSettings(Settings):
         le=300.0,
     )
     recovery_deadline_s: float = setting(
-        30.0,
+        60.0,
         title="Recovery deadline",
         description="How long a recovery that a person asked for may take; a controller refuses to leave a protective "
-        "stop in its first 5 s, and powering on takes some seconds more.",
+        "stop in its first 5 s, and powering on and releasing the brakes may take half a minute.",
         unit="s",
         ge=1.0,
         le=300.0,

@@ -51,18 +51,22 @@ class Bench:
         return ArmSettings.model_validate(base | changes)
 
 
-@pytest.fixture
-def host() -> str:
-    """A loopback address that no other test has: the ports are fixed, so the address tells tests apart."""
+def fresh_host() -> str:
+    """A loopback address that no other test has: the ports are fixed, so the address tells controllers apart."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     return f"127.{10 + worker}.{os.getpid() % 250}.{2 + next(_numbers) % 250}"
 
 
 @pytest.fixture
-def bench(host: str) -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
+def host() -> str:
+    return fresh_host()
+
+
+@pytest.fixture
+def bench() -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
     @contextlib.asynccontextmanager
     async def running(**controller: object) -> AsyncIterator[Bench]:
-        made = Bench(host, **controller)
+        made = Bench(fresh_host(), **controller)
         await made.controller.start()
         try:
             yield made

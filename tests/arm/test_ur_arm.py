@@ -100,6 +100,21 @@ def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("turns", [0, 1, 3, 10, 30])
+def test_a_stop_at_the_very_beginning_of_a_move_stops_it_too(healthy_arm, until, turns):
+    async def run():
+        async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            move = asyncio.create_task(arm.move_to("home"))
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            await asyncio.gather(arm.stop(), return_exceptions=True)
+            assert await cause_of(move) is ArmCause.STOPPED
+            await until(lambda: not bench.controller.body.moving)
+            assert bench.controller.joints_rad[0] < 0.2
+
+    asyncio.run(run())
+
+
 def test_a_cancelled_move_is_stopped(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY) as (bench, arm):
@@ -130,7 +145,9 @@ def test_a_protective_stop_in_mid_move_waits_for_a_person_and_for_its_five_secon
             await until(lambda: moving(bench))
             bench.faults.set("protective_stop")
             assert await cause_of(move) is ArmCause.PROTECTIVE_STOP
-            await until(lambda: not bench.controller.body.moving)
+            await arm.stop()
+            assert not bench.controller.body.moving
+            assert (await arm.state()).moving is False
             assert await cause_of(arm.move_to("home")) is ArmCause.PROTECTIVE_STOP
             assert await cause_of(arm.upload_again()) is ArmCause.PROTECTIVE_STOP
             stopped_at_s = bench.clock.now_s()
@@ -302,6 +319,7 @@ def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_a
             state = await arm.state()
             assert state.joints_rad is None
             assert not state.ready
+            assert await cause_of(arm.stop()) is ArmCause.LINK_LOST
             await until(lambda: not bench.controller.body.moving)
             assert bench.controller.joints_rad[0] < 1.9
             bench.faults.clear("link_cut")

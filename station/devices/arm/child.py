@@ -53,6 +53,7 @@ class ArmProcess:
     async def _start(endpoint: str, host: str, frequency_hz: float) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(
             sys.executable,
+            "-P",  # a folder named `station` where the caller stands is not this package
             "-m",
             "station.devices.arm.process",
             endpoint,

@@ -55,6 +55,11 @@ class ArmLink:
         return self._lost or self._latched
 
     @property
+    def lost(self) -> ArmFault | None:
+        """Why nothing is known of the arm; None where the link is up, whatever else waits for a person."""
+        return self._lost
+
+    @property
     def pid(self) -> int | None:
         """The id of the process at the moment."""
         return self._process.pid if self._process is not None else None

@@ -16,7 +16,7 @@ from station.settings.arm import ArmSettings, PoseName
 
 POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
 POLL_S = 0.02
-RECOVERY_POLL_S = 0.25
+RECOVERY_POLL_S = 0.5
 UNLOCK_AFTER_S = 5.1
 """A controller refuses to leave a protective stop in its first 5 s."""
 AT_REST_RAD_S = 1e-3
@@ -113,12 +113,14 @@ class UrArm:
             ArmFault: the controller does not confirm; its watchdog then stops the arm.
         """
         self._stopped.set()
-        if self._link.fault is not None:
-            return
-        await self._brake()
+        if self._link.fault is None:
+            await self._brake()
         deadline_s = time.monotonic() + self._settings.call_deadline_s
         while time.monotonic() < deadline_s:
-            if self._link.fault is not None or not _moves(await self._link.snapshot()):
+            if self._link.lost is not None:
+                raise self._link.lost
+            snapshot = await self._fresh_enough()
+            if snapshot is not None and not _moves(snapshot):
                 return
             await asyncio.sleep(POLL_S)
         raise ArmFault(ArmCause.DEADLINE, "the arm did not come to rest in time")
@@ -144,7 +146,10 @@ class UrArm:
                 await conversation.say("restart safety")
             while "RUNNING" not in (mode := await conversation.say("robotmode")):
                 await conversation.say("close safety popup")
-                await conversation.say("brake release" if "IDLE" in mode else "power on")
+                if "POWER_OFF" in mode:
+                    await conversation.say("power on")
+                elif "IDLE" in mode:
+                    await conversation.say("brake release")
                 await asyncio.sleep(RECOVERY_POLL_S)
             await self._link.upload()
 
@@ -203,6 +208,7 @@ class UrArm:
         resting_since_s: float | None = None
         while time.monotonic() < deadline_s:
             if self._stopped.is_set():
+                await self._brake()  # once more: the stop may have come just before the motion began
                 raise ArmFault(ArmCause.STOPPED, f"the way to {pose} was stopped by the station")
             if self._link.fault is not None:
                 raise self._link.fault
@@ -242,7 +248,9 @@ async def _require_remote(conversation: DashboardConversation) -> None:
 
 
 def _moves(snapshot: Snapshot) -> bool:
-    return snapshot.underway or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
+    # A program that was stopped leaves its report of a motion behind.
+    begun = snapshot.underway and snapshot.runtime_state == PLAYING
+    return begun or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
 
 
 def _near(joints_rad: Six, target_rad: Six, tolerance_rad: float) -> bool:

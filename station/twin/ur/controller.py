@@ -91,7 +91,7 @@ class UrController:
         self.digital_outputs = 0
         self.network = Network(self)
         self._tick = 0
-        self._timer: asyncio.TimerHandle | None = None
+        self._timer: asyncio.Handle | None = None
         self._due_s = 0.0
         self._known_faults: dict[str, float] = {}
         self._cut_at_s = 0.0
@@ -160,7 +160,7 @@ class UrController:
         await self.network.open()
         loop = asyncio.get_running_loop()
         self._due_s = loop.time()
-        self._timer = loop.call_soon(self._cycle)  # pyright: ignore[reportAttributeAccessIssue]
+        self._timer = loop.call_soon(self._cycle)
 
     async def stop(self) -> None:
         """Cut every connection and close the ports; the controller may be started again."""
