@@ -20,7 +20,7 @@ from station.settings.segmentation import Segmentation
 from station.vision.contact import Image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
-from station.vision.scale import typical_mm_per_px
+from station.vision.scale import Scale
 
 _THUMBNAIL_PX = 220
 _STAGE_PX = 150
@@ -77,7 +77,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     _check_widths(request)
     references = [decoded.image for decoded in request.references]
     shape = references[0].shape
-    mm_per_px = typical_mm_per_px(shape[0], shape[1])
+    scale = Scale.typical(shape[0], shape[1])
     gathered = _Gathered()
     refused: list[Refused] = []
     with OutputFolder(request.out) as output:
@@ -91,13 +91,13 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             if isinstance(item, Refused):
                 refused.append(item)
             else:
-                area_mm2 = item.contact.area_px * mm_per_px**2
+                area_mm2, _ = scale.area_mm2(item.contact.area_px)
                 output.add(item, area_mm2)
                 output.add_stages(item)
                 _gather(gathered, item, area_mm2, request.widths_mm)
             on_done()
         if gathered.rows:
-            _write_summaries(output, request, gathered, refused, mm_per_px)
+            _write_summaries(output, request, gathered, refused, scale)
     return Outcome(len(gathered.rows), refused)
 
 
@@ -145,7 +145,7 @@ def _quality(item: Measured) -> DenoisingQuality:
 
 
 def _write_summaries(
-    output: OutputFolder, request: Request, gathered: _Gathered, refused: Sequence[Refused], mm_per_px: float
+    output: OutputFolder, request: Request, gathered: _Gathered, refused: Sequence[Refused], scale: Scale
 ) -> None:
     output.write_errors(refused)
     output.write_picture("contact_sheet.png", _paged(gathered.thumbnails))
@@ -158,7 +158,7 @@ def _write_summaries(
     svg, rows = _write_curve(output, request, gathered)
     report = Report(
         title=f"Contact areas of {len(gathered.rows)} images",
-        facts=_facts(request, mm_per_px),
+        facts=_facts(request, scale),
         rows=rows,
         errors=[(item.source.name, item.reason) for item in refused],
         curve_svg=svg,
@@ -182,7 +182,7 @@ def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) ->
     return svg, [replace(row, closing_mm=closing_mm[row.image]) for row in gathered.rows]
 
 
-def _facts(request: Request, mm_per_px: float) -> list[tuple[str, str]]:
+def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
     count = len(request.references)
     parameters = request.segmentation.paper if request.segmentation.method == "paper" else request.segmentation.robust
     return [
@@ -190,7 +190,7 @@ def _facts(request: Request, mm_per_px: float) -> list[tuple[str, str]]:
         ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
         ("Recipe", request.recipe or "none: the method's defaults"),
         ("Reference", request.reference_name + (f", median of {count} images" if count > 1 else "")),
-        ("Scale", f"{mm_per_px:.4f} mm per pixel, typical for the sensor and not calibrated"),
+        ("Scale", f"{scale.mm_per_px:.4f} mm per pixel, typical: areas in mm² are good to {2 * scale.uncertainty:.0%}"),
         ("Program", f"fruit-station {version('fruit-station')}"),
     ]
 

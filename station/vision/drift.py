@@ -132,8 +132,9 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
         change: shape (height, width, 3), grey levels.
         background: shape (height, width), 0 to 1.
     """
+    weights = cv2.merge([background] * 3)
     for axis in (0, 1):
-        weighted = cv2.reduce(cv2.multiply(change, cv2.merge([background] * 3)), axis, cv2.REDUCE_SUM)
+        weighted = cv2.reduce(cv2.multiply(change, weights), axis, cv2.REDUCE_SUM)
         support = cv2.reduce(background, axis, cv2.REDUCE_SUM) + _STREAK_PRIOR_SHARE * background.shape[axis]
         change = change - weighted / support[..., None]
     return change

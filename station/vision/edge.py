@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from station.vision.contact import FloatImage, Mask
 
-RAYS = 72
+RAYS = 64
 _STEPS = 64
 _FIRST_SPAN = (0.3, 1.2)
 _SECOND_SPAN = (0.6, 1.4)
@@ -34,11 +34,11 @@ class Edge:
     """A closed edge and what the image shows across it."""
 
     points: _Floats
-    """Shape (72, 2), x and y in pixels, some perhaps beyond the image's border."""
+    """Shape (64, 2), x and y in pixels, some perhaps beyond the image's border."""
     seen: npt.NDArray[np.bool_]
-    """Shape (72,): whether the point lies in the image."""
+    """Shape (64,): whether the point lies in the image."""
     drop_levels: _Floats
-    """Shape (72,): by how much the change falls across the edge there, grey levels."""
+    """Shape (64,): by how much the change falls across the edge there, grey levels."""
 
 
 def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
@@ -123,9 +123,9 @@ def _steepest(
 
 
 def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
-    """The cheapest path around: run over one and three quarter turns, of which the middle one is taken."""
+    """The cheapest path around: run over one and a half turns, of which the middle one is taken."""
     rays, steps = cost.shape
-    turns = np.concatenate([cost, cost[: 3 * rays // 4]])
+    turns = np.concatenate([cost, cost[: rays // 2]])
     jumps = np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1)
     price = (stiffness * jumps**2)[:, None]
     padded = np.full(steps + 2 * _LONGEST_JUMP, np.inf)
@@ -143,5 +143,5 @@ def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArra
     path[-1] = inner.argmin()
     for index in range(len(turns) - 1, 0, -1):
         path[index - 1] = came_from[index, path[index]]
-    start = 3 * rays // 8
+    start = rays // 4
     return np.roll(path[start : start + rays], start)

@@ -28,8 +28,8 @@ PRINTED_IMAGE_PX = 640 * 480
 _SUBPIXEL_BITS = 4
 _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
-_ONE_SIDED = 0.6
-_LEAST_SUPPORT = 0.05
+_ONE_SIDED = 0.85
+_LEAST_SUPPORT = 0.03
 
 
 class RobustMethod:
@@ -150,8 +150,9 @@ class RobustMethod:
         if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
             flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
-        looked_at = work[inside] if inside.any() else work.reshape(-1, 3)
-        if np.mean((looked_at >= SATURATED_LEVEL).any(axis=1)) > _SATURATED_SHARE:
+        blue, green, red = cv2.split(work)
+        saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
+        if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
         confidence = min((confidence for _, confidence in found), default=1.0)
         if Flag.REFERENCE_MISMATCH in flags:
