@@ -16,8 +16,9 @@ from station.analysis.report import Report, ReportRow, data_uri, render
 from station.analysis.sources import Source
 from station.errors import BadInputError
 from station.inspection.curve import Reading, area_curve
+from station.inspection.monotone import wrong_frames
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Image
+from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
 from station.vision.scale import Scale
@@ -25,6 +26,7 @@ from station.vision.scale import Scale
 _THUMBNAIL_PX = 220
 _STAGE_PX = 150
 _COLUMNS = 10
+_NO_MASK = np.zeros((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,8 @@ class _Gathered:
     stages: list[tuple[str, list[Image]]] = field(default_factory=list)
     stage_names: tuple[str, ...] = ()
     qualities: list[tuple[str, DenoisingQuality]] = field(default_factory=list)
+    details: list[tuple[str, Contact]] = field(default_factory=list)
+    """Without their masks: those lie on the disk."""
     readings: list[tuple[str, Reading]] = field(default_factory=list)
 
 
@@ -124,10 +128,12 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
             area_mm2=area_mm2,
             width_mm=width_mm,
             closing_mm=None,
+            confidence=item.contact.confidence,
             flags=flag_names(item),
             notes=item.conversions,
         )
     )
+    gathered.details.append((name, replace(item.contact, mask=_NO_MASK)))
     gathered.thumbnails.append((f"{name}\n{area_mm2:.2f} mm2", [picture]))
     if width_mm is not None:
         gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2)))
@@ -148,6 +154,8 @@ def _write_summaries(
     output: OutputFolder, request: Request, gathered: _Gathered, refused: Sequence[Refused], scale: Scale
 ) -> None:
     output.write_errors(refused)
+    if any(contact.confidence is not None for _, contact in gathered.details):
+        output.write_details(gathered.details)
     output.write_picture("contact_sheet.png", _paged(gathered.thumbnails))
     stages_picture = None
     if gathered.stages:
@@ -175,11 +183,19 @@ def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) ->
         return None, gathered.rows
     names = {id(reading): name for name, reading in gathered.readings}
     images = [names[id(point.reading)] for point in curve.points]
-    output.write_curve(images, curve)
-    svg = curve_svg(curve, f"{request.recipe or 'press'}, method {request.segmentation.method}")
+    points = [point.reading for point in curve.points]
+    wrong = wrong_frames([reading.width_mm for reading in points], [reading.area_mm2 for reading in points])
+    output.write_curve(images, curve, wrong)
+    svg = curve_svg(curve, wrong, f"{request.recipe or 'press'}, method {request.segmentation.method}")
     output.write_bytes("curve.svg", svg.encode())
     closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
-    return svg, [replace(row, closing_mm=closing_mm[row.image]) for row in gathered.rows]
+    unfit = {images[frame.index] for frame in wrong}
+    return svg, [_on_curve(row, closing_mm[row.image], unfit) for row in gathered.rows]
+
+
+def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
+    flags = [*row.flags, "area_does_not_fit_the_other_steps"] if row.image in unfit else row.flags
+    return replace(row, closing_mm=closing_mm, flags=flags)
 
 
 def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:

@@ -16,17 +16,20 @@ import numpy.typing as npt
 from station.analysis.measurement import Measured, Refused
 from station.errors import BadInputError
 from station.inspection.curve import AreaCurve
-from station.vision.contact import Flag
+from station.inspection.monotone import WrongFrame
+from station.vision.contact import Contact, Flag
 from station.vision.quality import DenoisingQuality
 
 RESULT_COLUMNS = ("image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags")
-CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2")
+CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2")
+DETAIL_COLUMNS = ("image", "confidence", "gate", "drift_levels")
 _OWN_NAMES = (
     "results.csv",
     "errors.csv",
     "curve.csv",
     "curve.svg",
     "denoising.csv",
+    "details.csv",
     "masks",
     "stages",
     "stages.png",
@@ -128,13 +131,15 @@ class OutputFolder:
         if rows:
             self._write_table("errors.csv", ("image", "error"), rows)
 
-    def write_curve(self, images: Sequence[str], curve: AreaCurve) -> None:
+    def write_curve(self, images: Sequence[str], curve: AreaCurve, wrong: Sequence[WrongFrame]) -> None:
         """Write the area curve.
 
         Args:
             images: the images' names in the curve's order.
             curve: as many points as images.
+            wrong: the frames whose area in mm² does not fit the others; what was expected stands in their rows.
         """
+        expected = {frame.index: f"{frame.expected_low:.3f} to {frame.expected_high:.3f}" for frame in wrong}
         rows = [
             (
                 image,
@@ -142,10 +147,23 @@ class OutputFolder:
                 f"{point.closing_mm:.3f}",
                 point.reading.area_px,
                 f"{point.reading.area_mm2:.3f}",
+                expected.get(index, ""),
             )
-            for image, point in zip(images, curve.points, strict=True)
+            for index, (image, point) in enumerate(zip(images, curve.points, strict=True))
         ]
         self._write_table("curve.csv", CURVE_COLUMNS, rows)
+
+    def write_details(self, contacts: Sequence[tuple[str, Contact]]) -> None:
+        """Write what the method says of its own measurement; see `Contact` for the meaning.
+
+        Args:
+            contacts: the image's name with its contact.
+        """
+        rows = [
+            (name, *("" if value is None else f"{value:.3f}" for value in (c.confidence, c.gate, c.drift_levels)))
+            for name, c in contacts
+        ]
+        self._write_table("details.csv", DETAIL_COLUMNS, rows)
 
     def write_denoising(self, qualities: Sequence[tuple[str, DenoisingQuality]]) -> None:
         """Write the figures of the denoising, as the paper's Table 2 has them.

@@ -1,18 +1,21 @@
 """The area curve as a plot."""
 
+from collections.abc import Sequence
 from io import StringIO
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from station.inspection.curve import AreaCurve
+from station.inspection.monotone import WrongFrame
 
 
-def curve_svg(curve: AreaCurve, title: str) -> str:
+def curve_svg(curve: AreaCurve, wrong: Sequence[WrongFrame], title: str) -> str:
     """Draw area over closing in the manner of the paper's Fig. 14.
 
     Args:
         curve: a curve with at least one point.
+        wrong: the points that do not fit the others; they are marked, not moved.
         title: what was pressed and how it was measured.
 
     Returns:
@@ -24,6 +27,18 @@ def curve_svg(curve: AreaCurve, title: str) -> str:
         figure = Figure(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.add_subplot()
         axes.plot(closing_mm, area_mm2, color="#1f4e79", marker="o", markersize=4, linewidth=1.5)
+        if wrong:
+            axes.plot(
+                [closing_mm[frame.index] for frame in wrong],
+                [area_mm2[frame.index] for frame in wrong],
+                color="#b3261e",
+                marker="x",
+                markersize=9,
+                markeredgewidth=2,
+                linestyle="none",
+                label="does not fit: a contact cannot shrink while closing",
+            )
+            axes.legend(loc="lower right", frameon=False)
         axes.axvline(0, color="#888888", linewidth=0.8, linestyle="--")
         axes.annotate(
             f"onset at {curve.onset_mm:g} mm",

@@ -27,6 +27,7 @@ class ReportRow:
     area_mm2: float
     width_mm: float | None
     closing_mm: float | None
+    confidence: float | None
     flags: Sequence[str]
     notes: Sequence[str]
 

@@ -40,7 +40,6 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
 
 
 async def _look(configuration: Configuration, *, bench: bool) -> list[Finding]:
-    looks = [probe_gripper(configuration.gripper), probe_camera(configuration.camera)]
-    if not bench:
-        looks.insert(0, probe_arm(configuration.arm))
-    return [finding for found in await asyncio.gather(*looks) for finding in found]
+    others = asyncio.gather(probe_gripper(configuration.gripper), probe_camera(configuration.camera))
+    arm = [] if bench else await probe_arm(configuration.arm)
+    return [*arm, *(finding for found in await others for finding in found)]

@@ -35,7 +35,7 @@ _LEAST_SUPPORT = 0.03
 class RobustMethod:
     """The robust measurement against one or several reference images."""
 
-    stages = ("difference", "amplified", "denoised", "bending", "clustered", "edge", "segmented")
+    stages: tuple[str, ...] = ("difference", "amplified", "denoised", "bending", "clustered", "edge", "segmented")
 
     def __init__(self, references: Sequence[Image], parameters: RobustParameters) -> None:
         """Prepare the reference, which is the median of the references.
