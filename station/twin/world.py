@@ -33,14 +33,12 @@ class World:
     Args:
         clock: the twin's time, for creep.
         gel: the gel on the sensor.
-        sponge_mm: what the sponge takes of the room between the fingers where it is not pressed; 0 means that
-            the gripper's width is calibrated with the sponge on.
     """
 
-    def __init__(self, clock: Clock, gel: Gel | None = None, sponge_mm: float = 0.0) -> None:
+    def __init__(self, clock: Clock, gel: Gel | None = None) -> None:
         self._clock = clock
         self._gel = gel or Gel()
-        self._sponge_mm = sponge_mm
+        self._holder_mm = 0.0
         self._opening_mm = 85.0
         self._pose = Pose()
         self._fruit: Fruit | None = None
@@ -59,13 +57,15 @@ class World:
         """The fruit in the nest, as it is by now."""
         return self._fruit
 
-    def place(self, fruit: Fruit, pose: Pose | None = None) -> None:
+    def place(self, fruit: Fruit, pose: Pose | None = None, holder_mm: float = 0.0) -> None:
         """Lay a fruit into the nest, in the place of what was there.
 
         Args:
             fruit: the fruit.
             pose: where it meets the gel; the middle where left out.
+            holder_mm: what it lies on takes so much of the room between the fingers.
         """
+        self._holder_mm = holder_mm
         self._pose = pose or Pose()
         self._since_s = self._worst = None
         self._lay(fruit)
@@ -80,7 +80,7 @@ class World:
         Args:
             opening_mm: distance between the gripper's own pads, 0 to 85.
         """
-        return opening_mm - DIGIT_MM - self._sponge_mm
+        return opening_mm - DIGIT_MM
 
     def force_N(self, opening_mm: float) -> float:  # noqa: N802 (the gripper's protocol)
         """The force that pushes the fingers apart at an opening, N.
@@ -108,7 +108,7 @@ class World:
     def _squeezed_at(self, opening_mm: float) -> Squeezed:
         if self._fruit is None or self._squeeze is None or not self.arm_at_nest():
             return Squeezed(-self.width_mm(opening_mm), 0.0, 0.0, 0.0)
-        closing_mm = self._fruit.width_mm - self.width_mm(opening_mm)
+        closing_mm = self._fruit.width_mm + self._holder_mm - self.width_mm(opening_mm)
         self._age(self._fruit, touching=closing_mm > 0)
         squeezed = self._squeeze.at(closing_mm)
         if squeezed.force_n > self._fruit.variety.yield_n and (

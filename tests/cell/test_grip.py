@@ -50,6 +50,9 @@ def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
     assert float(rows[0]["width_mm"]) == pytest.approx(46, abs=0.4)
     assert float(rows[-1]["width_mm"]) == pytest.approx(33, abs=0.4)
     assert len(rows) == 14
+    truth = [np.asarray(cv2.imread(str(tmp_path / "grip" / "truth" / row["image"]), 0)).any() for row in rows]
+    touched = [float(row["width_mm"]) for row, touching in zip(rows, truth, strict=True) if touching]
+    assert max(touched) == pytest.approx(41.5, abs=1.0)
 
 
 def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):

@@ -115,9 +115,9 @@ class TestWorld:
         assert footprint is not None
         assert footprint.true_area_px > 10_000
 
-    def test_a_sponge_takes_room(self):
-        world = World(ManualClock(), sponge_mm=18.0)
-        world.place(draw_fruit(Kind.RUBBER_BALL, 0))
+    def test_a_holder_takes_room(self):
+        world = World(ManualClock())
+        world.place(draw_fruit(Kind.RUBBER_BALL, 0), holder_mm=18.0)
         assert world.force_N(DIGIT_MM + 42.5) == 0
         assert world.force_N(DIGIT_MM + 41.5) > 0
 
