@@ -513,7 +513,7 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     asyncio.run(run())
 
 
-def test_the_process_goes_when_its_caller_is_killed(bench, until):
+def test_the_process_goes_when_its_caller_is_killed(bench, until, tmp_path):
     """Killed, not closed: nothing of the caller's own can clean up."""
     caller = """
 import asyncio, sys
@@ -533,7 +533,12 @@ asyncio.run(main())
     async def run():
         async with bench() as made:
             process = await asyncio.create_subprocess_exec(
-                sys.executable, "-c", caller, made.host, stdout=subprocess.PIPE
+                sys.executable,
+                "-c",
+                caller,
+                made.host,
+                stdout=subprocess.PIPE,
+                env=os.environ | {"TMPDIR": str(tmp_path)},
             )
             assert process.stdout is not None
             line = await asyncio.wait_for(process.stdout.readline(), 30)
