@@ -2,11 +2,10 @@
 
 import asyncio
 import struct
-from dataclasses import dataclass
-from typing import Literal
 
 from station.devices.arm.dashboard import DashboardFacts, dashboard
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
+from station.devices.finding import Finding
 from station.settings.arm import ArmSettings
 
 RTDE_PORT = 30004
@@ -14,18 +13,6 @@ SCRIPT_PORT = 30003
 PORT_DEADLINE_S = 2.5
 HEADER = struct.Struct(">HB")
 CLAIM = b"input_int_register_0,input_double_register_0"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One line of `station devices check`."""
-
-    device: str
-    found: str
-    """What answered, and where."""
-    verdict: Literal["ok", "warning", "fault"]
-    remedy: str
-    """What a person is to do; empty where the verdict is ok."""
 
 
 async def probe_arm(settings: ArmSettings) -> list[Finding]:
