@@ -48,7 +48,7 @@ def contact_area_idea(reference: Image) -> Measure:
     base = reference.astype(np.float32)
 
     def measure(image: Image) -> Mask:
-        scaled = np.abs(image.astype(np.float32) - base).mean(axis=2) / 510
+        scaled = np.abs(image.astype(np.float32) - base).mean(axis=2) / 255
         inside = (cv2.boxFilter(scaled, -1, (64, 64)) > 0.04).astype(np.uint8)
         inside = cv2.erode(inside, np.ones((16, 16), np.uint8))
         mask = np.zeros(image.shape[:2], np.uint8)
