@@ -95,14 +95,14 @@ class RobustParameters(Settings):
         description="`one` outlines one body, seeds, drupelets and all; `several` measures separate contacts each.",
     )
     gate_ratio: float = setting(
-        2.8,
+        3.0,
         title="Gate",
         description="Contact is looked for where the gel bends more than this many times the background's median.",
         ge=1.5,
         le=20.0,
     )
     least_bend: float = setting(
-        0.14,
+        0.15,
         title="Least bending",
         description="Bending below this is never contact, however quiet the image: light drifts by as much.",
         unit="grey level/px",

@@ -8,7 +8,7 @@ from station.vision.working import resized
 
 _BLUR_SHARE = 0.045
 _BLUR_PX = (1.0, 3.5)
-_TEXTURED_SHARE = 0.165
+_TEXTURED_SHARE = 0.15
 _CAP_QUANTILE = 0.4
 _WINDOW_SHARE = 0.7
 

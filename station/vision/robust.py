@@ -30,6 +30,7 @@ _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
 _LEAST_SUPPORT = 0.03
+_SURE_GATE = 2.0
 
 
 class RobustMethod:
@@ -86,7 +87,8 @@ class RobustMethod:
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         levels = cluster_levels(bend)
         search = body_candidates if self._parameters.contacts == "one" else separate_candidates
-        found = self._edges(change, bend, search(bend, levels, threshold), drift.background)
+        gate = float(bend.max()) / threshold
+        found = self._edges(change, bend, search(bend, levels, threshold), drift.background, sure=gate > _SURE_GATE)
         mask = self._mask([edge for edge, _ in found])
         if on_stage:
             pictures.emit(
@@ -100,19 +102,25 @@ class RobustMethod:
                 edges=[edge for edge, _ in found],
                 mask=mask,
             )
-        flags, confidence = self._judge(work, drift, mask, found)
+        flags, confidence = self._judge(work, drift, mask, found, gate)
         return contact_from_mask(
             mask,
             flags,
             confidence=confidence,
-            gate=float(bend.max()) / threshold,
+            gate=gate,
             drift_levels=drift.strength_levels,
         )
 
     def _edges(
-        self, change: FloatImage, bend: FloatImage, candidates: list[Candidate], background: FloatImage
+        self,
+        change: FloatImage,
+        bend: FloatImage,
+        candidates: list[Candidate],
+        background: FloatImage,
+        *,
+        sure: bool,
     ) -> list[tuple[Edge, float]]:
-        """The edges that the image supports, each with its confidence."""
+        """The edges that the image supports, or any where contact is sure, each with its confidence."""
         found: list[tuple[Edge, float]] = []
         height, width = change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
@@ -129,7 +137,7 @@ class RobustMethod:
             if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], edge):
                 continue
             confidence = edge_confidence(edge, background_spread(signal, background))
-            if confidence >= _LEAST_SUPPORT:
+            if sure or confidence >= _LEAST_SUPPORT:
                 found.append((edge, confidence))
         return found
 
@@ -142,9 +150,9 @@ class RobustMethod:
         return mask
 
     def _judge(
-        self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]]
+        self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
     ) -> tuple[frozenset[Flag], float]:
-        """The flags, and the confidence of the whole: the areas' confidences, weakest first."""
+        """The flags, and the weakest area's confidence; without an area, less the more the gate is open."""
         flags: set[Flag] = set()
         light = float(np.sqrt(np.mean(self._light**2)))
         if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
@@ -154,7 +162,7 @@ class RobustMethod:
         saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
-        confidence = min((confidence for _, confidence in found), default=1.0)
+        confidence = min((confidence for _, confidence in found), default=min(1.0, 1.0 / max(gate, 1e-3)))
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:

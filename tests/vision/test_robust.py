@@ -1,0 +1,187 @@
+"""The robust method on golden spheres and on real presses."""
+
+import csv
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.settings.segmentation import RobustParameters
+from station.vision.contact import Flag
+from station.vision.robust import RobustMethod
+
+FEW = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def read(path):
+    image = cv2.imread(path)
+    assert image is not None
+    return np.asarray(image, np.uint8)
+
+
+def measure(reference, image, **parameters):
+    return RobustMethod([reference], RobustParameters(**parameters)).measure(image)
+
+
+@FEW
+@given(
+    where=st.fixed_dictionaries(
+        {"x_px": st.floats(110, 370), "y_px": st.floats(110, 530), "radius_px": st.floats(30, 80)}
+    ),
+    levels=st.floats(30, 70),
+    seed=st.integers(0, 1000),
+)
+def test_the_edge_of_a_sphere_anywhere(sphere_press, overlap, where, levels, seed):
+    press = sphere_press(**where, levels=levels, seed=seed)
+    contact = measure(press.reference, press.image)
+    assert overlap(contact.mask, press.truth) > 0.85
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.truth), rel=0.12)
+    assert contact.centroid_px == pytest.approx((where["x_px"], where["y_px"]), abs=4)
+    assert contact.confidence is not None
+    assert contact.confidence > 0.5
+
+
+@FEW
+@given(turn=st.sampled_from(["left to right", "upside down", "transposed"]), seed=st.integers(0, 1000))
+def test_the_mask_turns_with_the_images(sphere_press, overlap, turn, seed):
+    press = sphere_press(170, 400, 65, seed=seed)
+    turned = {
+        "left to right": lambda image: np.ascontiguousarray(image[:, ::-1]),
+        "upside down": lambda image: np.ascontiguousarray(image[::-1]),
+        "transposed": lambda image: np.ascontiguousarray(image.swapaxes(0, 1)),
+    }[turn]
+    straight = measure(press.reference, press.image).mask
+    contact = measure(turned(press.reference), turned(press.image))
+    assert overlap(contact.mask, turned(straight) > 0) > 0.93
+
+
+@FEW
+@given(offset=st.tuples(*[st.integers(-20, 20)] * 3), gain=st.floats(0.85, 1.15))
+def test_exposure_does_not_change_the_area(sphere_press, overlap, offset, gain):
+    press = sphere_press()
+    brighter = np.clip(np.rint(press.image * gain + offset), 0, 255).astype(np.uint8)
+    assert overlap(measure(press.reference, brighter).mask, press.truth) > 0.85
+
+
+@pytest.mark.parametrize("shape", [(320, 240), (240, 320), (480, 640), (1280, 960)])
+def test_the_area_scales_with_the_image(sphere_press, overlap, shape):
+    scale = max(shape) / 640
+    press = sphere_press(shape[1] * 0.45, shape[0] * 0.55, 70 * scale, shape=shape)
+    assert overlap(measure(press.reference, press.image).mask, press.truth) > 0.85
+
+
+@FEW
+@given(seed=st.integers(0, 10_000))
+def test_noise_alone_is_no_contact(sphere_press, seed):
+    press = sphere_press(levels=0.0, seed=seed)
+    contact = measure(press.reference, press.image)
+    assert contact.area_px == 0
+    assert contact.flags == {Flag.NO_CONTACT}
+    assert contact.gate is not None
+    assert contact.gate < 1
+
+
+def test_one_frame_against_itself_is_no_contact(sphere_press):
+    reference = sphere_press().reference
+    assert measure(reference, reference).flags == {Flag.NO_CONTACT}
+
+
+@pytest.mark.parametrize(("level", "flag"), [(0, Flag.REFERENCE_MISMATCH), (255, Flag.SATURATED)])
+def test_a_black_or_white_frame_is_no_contact_and_says_so(sphere_press, level, flag):
+    reference = sphere_press().reference
+    contact = measure(reference, np.full_like(reference, level))
+    assert contact.area_px == 0
+    assert {Flag.NO_CONTACT, Flag.REFERENCE_MISMATCH, flag} <= contact.flags
+
+
+def test_a_contact_over_most_of_the_frame_survives_the_normalisation(sphere_press, overlap):
+    press = sphere_press(radius_px=215, levels=60)
+    assert np.count_nonzero(press.truth) > 0.45 * press.truth.size
+    assert overlap(measure(press.reference, press.image).mask, press.truth) > 0.85
+
+
+def test_a_contact_cut_by_the_border_is_a_lower_bound(sphere_press, overlap):
+    press = sphere_press(x_px=20, radius_px=80)
+    contact = measure(press.reference, press.image)
+    assert Flag.CUT_BY_BORDER in contact.flags
+    assert overlap(contact.mask, press.truth) > 0.75
+
+
+def test_two_contacts_are_found_where_the_recipe_expects_several(sphere_press, overlap):
+    one = sphere_press(130, 180, 60)
+    other = sphere_press(340, 460, 60, seed=2)
+    both = np.clip(one.image.astype(int) + other.image - other.reference, 0, 255).astype(np.uint8)
+    truth = one.truth | other.truth
+    assert overlap(measure(one.reference, both, contacts="several").mask, truth) > 0.8
+    assert overlap(measure(one.reference, both, contacts="one").mask, truth) < 0.6
+
+
+def test_dirt_of_one_colour_is_no_contact(sphere_press):
+    press = sphere_press(levels=0.0)
+    shade = cv2.GaussianBlur(cv2.circle(np.zeros((640, 480), np.float32), (200, 300), 25, 1.0, -1), (0, 0), 6)
+    dirty = (press.image * (1 - 0.5 * shade[..., None])).astype(np.uint8)
+    assert measure(press.reference, dirty).area_px == 0
+
+
+def test_confidence_falls_with_the_contrast(sphere_press):
+    given = [sphere_press(levels=levels) for levels in (60, 12, 6)]
+    confidences = [measure(press.reference, press.image).confidence or 0.0 for press in given]
+    assert confidences == sorted(confidences, reverse=True)
+    assert confidences[0] > confidences[-1] + 0.05
+
+
+def test_several_references_are_their_median(sphere_press, overlap):
+    press = sphere_press()
+    references = [sphere_press(seed=seed).reference for seed in range(3)]
+    spoiled = np.zeros_like(press.reference)
+    contact = RobustMethod([*references, spoiled], RobustParameters()).measure(press.image)
+    assert overlap(contact.mask, press.truth) > 0.85
+
+
+def test_every_stage_hands_on_a_picture_of_the_image_size(sphere_press):
+    press = sphere_press()
+    method = RobustMethod([press.reference], RobustParameters())
+    seen = {}
+    method.measure(press.image, seen.__setitem__)
+    assert tuple(seen) == method.stages
+    assert all(picture.shape[:2] == (640, 480) and picture.dtype == np.uint8 for picture in seen.values())
+
+
+def test_what_does_not_fit_the_reference_is_refused(sphere_press):
+    reference = sphere_press().reference
+    with pytest.raises(ValueError, match="no reference"):
+        RobustMethod([], RobustParameters())
+    with pytest.raises(ValueError, match="one size"):
+        RobustMethod([reference, reference[:100]], RobustParameters())
+    with pytest.raises(ValueError, match="of the reference's shape"):
+        measure(reference, reference[:100])
+
+
+def test_real_presses_reach_the_contact_edge(real_images, overlap):
+    folder = real_images / "digit_presses"
+    method = RobustMethod([read(str(folder / "reference.jpg"))], RobustParameters())
+    y, x = np.mgrid[:640, :480]
+    overlaps, ratios = [], []
+    for row in csv.DictReader((folder / "contacts.csv").read_text().splitlines()):
+        truth = np.hypot(x - float(row["centre_x_px"]), y - float(row["centre_y_px"])) <= float(row["radius_px"])
+        contact = method.measure(read(str(folder / row["image"])))
+        overlaps.append(overlap(contact.mask, truth))
+        ratios.append(contact.area_px / np.count_nonzero(truth))
+    assert np.median(overlaps) >= 0.88
+    assert np.percentile(overlaps, 10) >= 0.82
+    assert 0.93 <= np.median(ratios) <= 1.07
+    assert np.percentile(ratios, 10) >= 0.85
+    assert np.percentile(ratios, 90) <= 1.15
+
+
+def test_real_backgrounds_show_no_contact(real_images, noisy_again):
+    for path in [
+        *sorted((real_images / "digit_backgrounds").glob("*.jpg")),
+        real_images / "digit_presses/reference.jpg",
+    ]:
+        reference = read(str(path))
+        method = RobustMethod([reference], RobustParameters())
+        for seed in range(3):
+            assert method.measure(noisy_again(reference, seed)).area_px == 0, path.name
