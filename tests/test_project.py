@@ -65,6 +65,14 @@ def test_relative_links_in_the_documents_lead_somewhere():
     assert not broken
 
 
+def test_the_readmes_figures_are_those_that_the_benchmark_wrote():
+    lines = (ROOT / "README.md").read_text().splitlines()
+    rows = [line for line in lines if line.startswith(("| `paper`", "| `robust`"))]
+    assert len(rows) == 4
+    measured = (ROOT / "docs" / "measurement.md").read_text().splitlines()
+    assert [row for row in rows if row not in measured] == []
+
+
 def test_the_wheel_holds_what_the_program_reads(tmp_path):
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=60)

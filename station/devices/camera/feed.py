@@ -4,7 +4,7 @@ import asyncio
 import time
 
 from station.devices.camera.health import FrameHealth
-from station.devices.camera.interface import Frame, FrameFault, Image, NoFrameError, content_hash
+from station.devices.camera.interface import Frame, FrameFault, Image, NoFrameError
 
 
 class FrameFeed:
@@ -69,4 +69,4 @@ class FrameFeed:
 
     def _judged(self, image: Image) -> Frame:
         faults: frozenset[FrameFault] = self._health.judge(image, self._before, time.monotonic() - self._captured_s)
-        return Frame(image, self._sequence, self._captured_s, content_hash(image), faults, self._width_mm)
+        return Frame(image, self._sequence, self._captured_s, faults, self._width_mm)

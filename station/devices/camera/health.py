@@ -94,7 +94,8 @@ def find_seam(image: Image, axis: int) -> int | None:
     means = (total[half:] - total[:-half]) / half
     change = means[half:] - means[:-half]
     beside = (change[: -4 * half] + change[4 * half :]) / 2
-    step = np.abs(change[2 * half : -2 * half] - beside).max(axis=2)
+    blue, green, red = np.moveaxis(np.abs(change[2 * half : -2 * half] - beside), 2, 0)
+    step = np.maximum(np.maximum(blue, green), red)
     whole = np.percentile(step, _SEAM_SHARE, axis=1)
     place = int(np.argmax(whole))
     around = np.median(whole[max(0, place - 20) : place + 21])

@@ -68,11 +68,14 @@ class Frame:
     sequence: int
     captured_s: float
     """Monotonic time (`time.monotonic`) at which it was captured."""
-    content_hash: str
-    """BLAKE2b of the pixels, 16 bytes in hexadecimal."""
     faults: frozenset[FrameFault] = frozenset()
     width_mm: float | None = None
     """The gripper's width that was recorded with it; only a replay knows one."""
+
+    @property
+    def content_hash(self) -> str:
+        """BLAKE2b of the pixels, 16 bytes in hexadecimal; about a millisecond, so it is made only when asked for."""
+        return hashlib.blake2b(np.ascontiguousarray(self.image).data, digest_size=16).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +131,3 @@ class Camera(Protocol):
     async def close(self) -> None:
         """Let the camera go. Idempotent."""
         ...
-
-
-def content_hash(image: Image) -> str:
-    """The hash by which repeated pixels are known.
-
-    Args:
-        image: any shape, contiguous.
-    """
-    return hashlib.blake2b(np.ascontiguousarray(image).data, digest_size=16).hexdigest()
