@@ -75,21 +75,20 @@ class BareGrip:
         """Grip once, let go, and go home. Not idempotent: each call grips.
 
         Raises:
-            GripError: no sound frame came, nothing was touched down to the recipe's smallest width, or after another
-                error the fruit could not be let go.
+            GripError: no sound frame came, nothing was touched down to the recipe's smallest width, or the gripper
+                or the arm could not be brought back.
             StationError: a device's own fault; by then the gripper is open and the arm home where they could be.
         """
         async with _kept_healthy(self._cell.arm):
             try:
                 await self._grip()
             except (StationError, asyncio.CancelledError) as error:
-                try:
-                    await self._let_go()
-                except StationError as second:
-                    what = str(error) or "the grip was called off"
-                    raise GripError(f"{what}. After that the fruit could not be let go: {second}") from error
+                what = str(error).rstrip(".") or "the grip was called off"
+                if left := await self._let_go():
+                    raise GripError(what + f". {left}".removesuffix(f": {error}")) from error
                 raise
-            await self._let_go()
+            if left := await self._let_go():
+                raise GripError(left)
 
     async def _grip(self) -> None:
         imaging = self._recipe.imaging
@@ -110,10 +109,21 @@ class BareGrip:
         for number in range(1, plan.number + 1):
             await self._on_step(await self._step(number, start.move.width_mm - number * plan.step_mm))
 
-    async def _let_go(self) -> None:
-        """Open, then leave: an arm that leaves with closed fingers would tear what they hold."""
-        await self._cell.gripper.open()
-        await self._go("above_nest", "home")
+    async def _let_go(self) -> str | None:
+        """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
+
+        Returns:
+            What could not be done, in words.
+        """
+        try:
+            await self._cell.gripper.open()
+        except StationError as error:
+            return f"The gripper could not be opened, and the arm stays where it is: {error}"
+        try:
+            await self._go("above_nest", "home")
+        except StationError as error:
+            return f"The gripper is open, and the arm stays where it is: {error}"
+        return None
 
     async def _onset(self, references: Sequence[Image]) -> tuple[GripStep | None, GripStep]:
         """Close step by step until the gel is touched; give the last image before the contact and the first with it."""

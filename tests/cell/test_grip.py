@@ -100,6 +100,7 @@ def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, t
     _, errors = grip.communicate(timeout=60)
     assert grip.returncode == 1
     assert words in errors
+    assert "The gripper is open, and the arm stays where it is" in errors
     assert "Traceback" not in errors
 
 
