@@ -94,10 +94,12 @@ async def measure(configuration: Configuration, twin: psutil.Process, *, grippin
 
         steps, frames = await asyncio.gather(use_gripper(), use_camera_and_arm())
         taken_s = time.monotonic() - began_s
-        shares = [(cpu_s(p) - b) / taken_s for p, b in zip(processes, before, strict=True)]
+        twin_share, arm_share, station_share = (
+            (cpu_s(process) - earlier_s) / taken_s for process, earlier_s in zip(processes, before, strict=True)
+        )
     await gripper.close()
     await camera.close()
-    return Shares(*shares, frames / taken_s, steps / taken_s)
+    return Shares(twin_share, arm_share, station_share, frames / taken_s, steps / taken_s)
 
 
 def bare_client() -> float:

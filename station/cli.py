@@ -1,6 +1,8 @@
 """The command `station`: a table of commands, each loaded only when it is asked for."""
 
+import errno
 import importlib
+import os
 import sys
 from importlib.metadata import version
 from typing import NamedTuple, NoReturn
@@ -83,4 +85,9 @@ def main() -> NoReturn:
     except BrokenPipeError:
         sys.stderr.close()
         code = 1
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        click.echo(f"station: {error.strerror}; free space where the output goes", err=True)
+        os._exit(1)  # standard output cannot be flushed: the interpreter would complain of it on its way out
     raise SystemExit(code if isinstance(code, int) else 0)

@@ -1,6 +1,6 @@
 """One run of `station analyze`: images in, the folder of results out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -64,6 +64,8 @@ class Outcome:
     """What came of a run."""
 
     measured: int
+    touched: int
+    """In how many of them anything touches the gel."""
     refused: Sequence[Refused]
 
 
@@ -102,13 +104,14 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             on_done()
         if gathered.rows:
             _write_summaries(output, request, gathered, refused, scale)
-    return Outcome(len(gathered.rows), refused)
+    return Outcome(len(gathered.rows), sum(row.contact for row in gathered.rows), refused)
 
 
 def _check_widths(request: Request) -> None:
     if request.widths_mm is None:
         return
-    missing = [source.name for source in request.sources if source.name not in request.widths_mm]
+    measurable = (source.name for source in request.sources if not source.refused)
+    missing = [name for name in measurable if name not in request.widths_mm]
     if missing:
         more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
         raise BadInputError(f"--widths: no width for {', '.join(missing[:3])}{more}; add a row for each image")
@@ -156,13 +159,14 @@ def _write_summaries(
     output.write_errors(refused)
     if any(contact.confidence is not None for _, contact in gathered.details):
         output.write_details(gathered.details)
-    output.write_picture("contact_sheet.png", _paged(gathered.thumbnails))
-    stages_picture = None
-    if gathered.stages:
-        sheet_of_stages = _paged(gathered.stages, gathered.stage_names)
-        output.write_picture("stages.png", sheet_of_stages)
+    for name, picture in _pages("contact_sheet", gathered.thumbnails, 4):
+        output.write_picture(name, picture)
+    stages_pictures: list[tuple[str, str]] = []
+    for name, picture in _pages("stages", gathered.stages, 1, gathered.stage_names):
+        output.write_picture(name, picture)
+        stages_pictures.append((name, data_uri(picture)))
+    if gathered.qualities:
         output.write_denoising(gathered.qualities)
-        stages_picture = data_uri(sheet_of_stages)
     svg, rows = _write_curve(output, request, gathered)
     report = Report(
         title=f"Contact areas of {len(gathered.rows)} images",
@@ -170,7 +174,8 @@ def _write_summaries(
         rows=rows,
         errors=[(item.source.name, item.reason) for item in refused],
         curve_svg=svg,
-        stages=stages_picture,
+        stages=stages_pictures,
+        no_onset=request.widths_mm is not None and svg is None,
         quality=_mean_quality(gathered.qualities),
     )
     output.write_bytes("report.html", render(report).encode())
@@ -200,12 +205,16 @@ def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
 
 def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
     count = len(request.references)
+    converted = sorted({text for decoded in request.references for text in decoded.conversions})
     parameters = request.segmentation.paper if request.segmentation.method == "paper" else request.segmentation.robust
     return [
         ("Method", request.segmentation.method),
         ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
         ("Recipe", request.recipe or "none: the method's defaults"),
-        ("Reference", request.reference_name + (f", median of {count} images" if count > 1 else "")),
+        (
+            "Reference",
+            "; ".join([request.reference_name + (f", median of {count} images" if count > 1 else ""), *converted]),
+        ),
         ("Scale", f"{scale.mm_per_px:.4f} mm per pixel, typical: areas in mm² are good to {2 * scale.uncertainty:.0%}"),
         ("Program", f"fruit-station {version('fruit-station')}"),
     ]
@@ -220,5 +229,11 @@ def _mean_quality(qualities: Sequence[tuple[str, DenoisingQuality]]) -> str | No
     return f"PSNR {psnr_db:.2f} dB, MSE {mse:.1f}, SSIM {ssim:.3f}"
 
 
-def _paged(columns: Sequence[tuple[str, Sequence[Image]]], row_names: Sequence[str] = ()) -> Image:
-    return stacked([sheet(columns[start : start + _COLUMNS], row_names) for start in range(0, len(columns), _COLUMNS)])
+def _pages(
+    name: str, columns: Sequence[tuple[str, Sequence[Image]]], sheets: int, row_names: Sequence[str] = ()
+) -> Iterator[tuple[str, Image]]:
+    """Pictures of so many sheets each, with their files' names: NAME.png, then NAME_2.png and so on."""
+    for page, start in enumerate(range(0, len(columns), sheets * _COLUMNS), start=1):
+        part = columns[start : start + sheets * _COLUMNS]
+        rows = [sheet(part[first : first + _COLUMNS], row_names) for first in range(0, len(part), _COLUMNS)]
+        yield f"{name}.png" if page == 1 else f"{name}_{page}.png", stacked(rows)

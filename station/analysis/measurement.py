@@ -66,7 +66,8 @@ def measure_all(
         return Measured(source, decoded.image, contact, decoded.conversions, pictures)
 
     waiting: deque[Future[Measured] | Refused] = deque()
-    with ThreadPoolExecutor(jobs, thread_name_prefix="measure") as pool:
+    pool = ThreadPoolExecutor(jobs, thread_name_prefix="measure")
+    try:
         for source in sources:
             try:
                 decoded = source.load()
@@ -79,6 +80,8 @@ def measure_all(
                 yield _finished(waiting.popleft())
         while waiting:
             yield _finished(waiting.popleft())
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _check_size(source: Source, decoded: Decoded, shape: tuple[int, ...]) -> None:

@@ -1,7 +1,9 @@
 """The files of one analysis: written as results come, so that what is measured is never lost."""
 
+import contextlib
 import csv
 import errno
+import math
 import os
 from collections.abc import Iterable, Sequence
 from io import FileIO, StringIO
@@ -45,7 +47,7 @@ class OutputFolder:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._made = False
+        self._made: list[Path] = []
         self._results: FileIO | None = None
 
     def __enter__(self) -> Self:
@@ -54,13 +56,13 @@ class OutputFolder:
         Raises:
             BadInputError: it holds an earlier result, is a file, or cannot be written.
         """
-        earlier = [name for name in _OWN_NAMES if (self.folder / name).exists()]
-        if earlier:
-            raise BadInputError(
-                f"{self.folder}: holds an earlier result ({', '.join(earlier)}); name another folder or remove it"
-            )
         try:
-            self._made = not self.folder.exists()
+            earlier = [name for name in _OWN_NAMES if (self.folder / name).exists()]
+            if earlier:
+                raise BadInputError(
+                    f"{self.folder}: holds an earlier result ({', '.join(earlier)}); name another folder or remove it"
+                )
+            self._made = [place for place in (self.folder, *self.folder.parents) if not place.exists()]
             (self.folder / "masks").mkdir(parents=True)
         except OSError as error:
             raise self._refusal(self.folder, error) from error
@@ -73,9 +75,12 @@ class OutputFolder:
         if self._results is not None:
             self._results.close()
             return
-        (self.folder / "masks").rmdir()
-        if self._made and not any(self.folder.iterdir()):
-            self.folder.rmdir()
+        with contextlib.suppress(OSError):  # what cannot be tidied is not worth more than the error that led here
+            for orphan in (self.folder / "masks").iterdir():
+                orphan.unlink()
+            (self.folder / "masks").rmdir()
+            for place in self._made:
+                place.rmdir()
 
     def add(self, measured: Measured, area_mm2: float) -> None:
         """Write an image's mask, then its row.
@@ -139,7 +144,7 @@ class OutputFolder:
             curve: as many points as images.
             wrong: the frames whose area in mm² does not fit the others; what was expected stands in their rows.
         """
-        expected = {frame.index: f"{frame.expected_low:.3f} to {frame.expected_high:.3f}" for frame in wrong}
+        expected = {frame.index: _expectation(frame) for frame in wrong}
         rows = [
             (
                 image,
@@ -198,7 +203,8 @@ class OutputFolder:
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(data)
         except OSError as error:
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
             raise self._refusal(path, error) from error
 
     def _write_table(self, name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -206,7 +212,14 @@ class OutputFolder:
 
     def _refusal(self, path: Path, error: OSError) -> BadInputError:
         kept = f"; the results so far are kept in {self.folder}" if self._results is not None else ""
-        return BadInputError(f"{path}: cannot be written: {error.strerror}; name another --out or free space{kept}")
+        remedy = "free space" if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG} else "name another --out"
+        return BadInputError(f"{path}: cannot be written: {error.strerror}; {remedy}{kept}")
+
+
+def _expectation(frame: WrongFrame) -> str:
+    if math.isinf(frame.expected_high):
+        return f"at least {frame.expected_low:.3f}"
+    return f"{frame.expected_low:.3f} to {frame.expected_high:.3f}"
 
 
 def _csv_bytes(rows: Iterable[Sequence[object]]) -> bytes:

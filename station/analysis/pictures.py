@@ -14,6 +14,7 @@ _PAPER_GREY = 245
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _MARGIN_PX = 8
 _LINE_PX = 16
+_WIDEST_SHARE = 3
 
 
 def outlined(image: Image, mask: Mask) -> Image:
@@ -32,14 +33,15 @@ def outlined(image: Image, mask: Mask) -> Image:
 
 
 def thumbnail(picture: npt.NDArray[np.uint8], height_px: int) -> Image:
-    """Shrink to a height and make colour of grey.
+    """Shrink to a height, or less where it would become more than three times as wide, and make colour of grey.
 
     Args:
         picture: shape (height, width) or (height, width, 3), dtype uint8.
         height_px: the wanted height.
     """
-    width_px = max(1, round(picture.shape[1] * height_px / picture.shape[0]))
-    small = cv2.resize(picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    scale = min(height_px / picture.shape[0], _WIDEST_SHARE * height_px / picture.shape[1])
+    size = max(1, round(scale * picture.shape[1])), max(1, round(scale * picture.shape[0]))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.cvtColor(small, cv2.COLOR_GRAY2BGR) if small.ndim == 2 else small, np.uint8)
 
 

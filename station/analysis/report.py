@@ -42,8 +42,10 @@ class Report:
     rows: Sequence[ReportRow]
     errors: Sequence[tuple[str, str]]
     curve_svg: str | None
-    stages: str | None
-    """The stages' sheet as a path beside the report."""
+    no_onset: bool
+    """There are widths, and nothing touched: there is no curve."""
+    stages: Sequence[tuple[str, str]]
+    """The stages' sheets: the file beside the report, and a data URI."""
     quality: str | None
     """The mean of the denoising's figures in words."""
 

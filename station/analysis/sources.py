@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 from natsort import natsorted, ns
 
-from station.analysis.decoding import SUFFIXES, Decoded, decode_file
+from station.analysis.decoding import SUFFIXES, Decoded, decode_file, shown
 from station.errors import BadInputError
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg"})
 _MOST_REFERENCE_FRAMES = 32
+_LONGEST_STEM_BYTES = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,8 @@ class Source:
     """The name that its mask and stages get."""
     load: Callable[[], Decoded]
     """Decodes it; raises BadInputError."""
+    refused: bool = False
+    """It is known already that it cannot be loaded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,49 +87,55 @@ def load_references(place: Path) -> list[Decoded]:
 
 
 def _list_place(place: Path, reference: Path | None) -> Listing:
+    try:
+        return _found_at(place, reference)
+    except OSError as error:  # a name too long, or a folder above it that may not be searched
+        raise BadInputError(f"{shown(place)}: cannot be read: {error.strerror}") from error
+
+
+def _found_at(place: Path, reference: Path | None) -> Listing:
     if place.is_dir():
-        files = natsorted((path for path in _children(place) if path.is_file()), alg=ns.PATH)
+        files = natsorted((path for path in place.iterdir() if path.is_file()), alg=ns.PATH)
         chosen = [path for path in files if path.suffix.lower() in SUFFIXES and not _same(path, reference)]
         if not chosen:
-            raise BadInputError(f"{place}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}")
+            raise BadInputError(f"{shown(place)}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}")
         passed_over = tuple(path for path in files if path not in chosen)
         return Listing(tuple(_file_source(path) for path in chosen), passed_over)
     if place.suffix.lower() in VIDEO_SUFFIXES:
         return Listing(tuple(_video_sources(place)), ())
     if not place.exists():
-        raise BadInputError(f"{place}: there is no such file")
+        raise BadInputError(f"{shown(place)}: there is no such file")
     return Listing((_file_source(place),), ())
 
 
-def _children(folder: Path) -> list[Path]:
-    try:
-        return list(folder.iterdir())
-    except OSError as error:
-        raise BadInputError(f"{folder}: the folder cannot be read: {error.strerror}") from error
-
-
 def _same(path: Path, other: Path | None) -> bool:
-    return other is not None and other.exists() and path.samefile(other)
+    return other is not None and path.samefile(other)
 
 
 def _file_source(path: Path) -> Source:
-    return Source(path.name, path.stem, lambda: decode_file(path))
+    stem = shown(path.stem)
+    if len(stem.encode()) > _LONGEST_STEM_BYTES:
+        return _refused_source(path, BadInputError(f"{shown(path)}: the name is too long for its mask's; rename it"))
+    return Source(shown(path.name), stem, lambda: decode_file(path))
 
 
 def _refused_source(place: Path, error: BadInputError) -> Source:
     def load() -> Decoded:
         raise error
 
-    return Source(str(place), str(place), load)
+    return Source(shown(place.name), shown(place), load, refused=True)
 
 
 def _video_sources(path: Path) -> Iterator[Source]:
     """List a video's frames; each is decoded in turn, since seeking in a compressed video is not exact."""
     if not path.is_file():
-        raise BadInputError(f"{path}: there is no such file")
+        raise BadInputError(f"{shown(path)}: there is no such file")
     frames = _Video(path)
+    if frames.announced > frames.count:
+        whole = f"{frames.count} of {frames.announced} frames could be decoded; it is cut short or damaged"
+        yield _refused_source(path, BadInputError(f"{shown(path)}: {whole}"))
     for index in range(frames.count):
-        name = f"{path.stem}_{index:05d}"
+        name = f"{shown(path.stem)}_{index:05d}"
         yield Source(name, name, lambda index=index: frames.frame(index))
 
 
@@ -135,19 +144,21 @@ class _Video:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.count = self._count()
         self._capture = cv2.VideoCapture(str(path))
+        self.announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        """What the header says; an estimate in some formats, 0 in a broken file."""
+        self.count = self._count()
         self._next = 0
 
     def _count(self) -> int:
-        """Count by decoding: the number in a video's header is an estimate, and zero in a broken one."""
+        """Count by decoding."""
         capture = cv2.VideoCapture(str(self._path))
         count = 0
         while capture.grab():
             count += 1
         capture.release()
         if count == 0:
-            raise BadInputError(f"{self._path}: no frame of this video can be decoded; export it as MP4 or AVI")
+            raise BadInputError(f"{shown(self._path)}: no frame of this video can be decoded; export it as MP4 or AVI")
         return count
 
     def frame(self, index: int) -> Decoded:
@@ -156,7 +167,7 @@ class _Video:
             self._next += 1
         good, image = self._capture.read()
         if not good:
-            raise BadInputError(f"{self._path}: frame {index} cannot be decoded")
+            raise BadInputError(f"{shown(self._path)}: frame {index} cannot be decoded")
         self._next += 1
         if self._next == self.count:
             self._capture.release()

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from io import StringIO
 from pathlib import Path
 
 from station.errors import BadInputError
@@ -24,16 +25,12 @@ def read_widths(path: Path) -> dict[str, float]:
         BadInputError: the file cannot be read, lacks a column, names an image twice, or has a width that is no
             number from 0 to 200 mm.
     """
+    reader = csv.DictReader(StringIO(_text(path), newline=""))
     try:
-        if path.stat().st_size > _LARGEST_FILE_BYTES:
-            raise BadInputError(f"{path}: expected a table of widths below {_LARGEST_FILE_BYTES} bytes")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise BadInputError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise BadInputError(f"{path}: expected UTF-8; save the table as CSV UTF-8") from error
-    reader = csv.DictReader(text.splitlines())
-    if reader.fieldnames is None or not set(_HEADER) <= set(reader.fieldnames):
+        header = reader.fieldnames or ()
+    except csv.Error as error:
+        raise BadInputError(f"{path}:1: not a CSV table: {error}") from error
+    if not set(_HEADER) <= set(header):
         raise BadInputError(f"{path}:1: expected the header {','.join(_HEADER)}")
     widths: dict[str, float] = {}
     try:
@@ -50,6 +47,22 @@ def read_widths(path: Path) -> dict[str, float]:
     if not widths:
         raise BadInputError(f"{path}: expected a row for each image, found none")
     return widths
+
+
+def _text(path: Path) -> str:
+    try:
+        if not path.is_file():
+            raise BadInputError(f"{path}: expected a CSV file; there is none, or it is something else")
+        with path.open("rb") as file:
+            data = file.read(_LARGEST_FILE_BYTES + 1)
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > _LARGEST_FILE_BYTES:
+        raise BadInputError(f"{path}: expected a table of widths of at most {_LARGEST_FILE_BYTES} bytes")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadInputError(f"{path}: expected UTF-8; save the table as CSV UTF-8") from error
 
 
 def _width_mm(place: str, text: str | None) -> float:

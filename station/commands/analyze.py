@@ -6,15 +6,17 @@ from functools import partial
 from pathlib import Path
 
 import click
+import cv2
 
 from station.analysis.analysis import Request, analyze
 from station.analysis.sources import list_sources, load_references
 from station.analysis.widths import read_widths
 from station.errors import BadInputError
+from station.settings.configuration import load_configuration
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 
-PLACE = click.Path(path_type=Path)
+PLACE = click.Path(path_type=Path, readable=False)
 
 
 @click.command("analyze")
@@ -47,11 +49,15 @@ def analyze_command(
     Writes results.csv, masks/, contact_sheet.png and report.html into the folder given with --out. An image that
     cannot be measured is listed in errors.csv; the others' results are kept, and the exit code is 2.
     """
-    recipe = find_recipe(recipe_name) if recipe_name else None
+    cv2.setNumThreads(1)  # so that --jobs says how many cores are used
+    site = load_configuration()
+    recipe = find_recipe(recipe_name, site.recipes_folder) if recipe_name is not None else None
     segmentation = recipe.segmentation if recipe else Segmentation()
     if method:
         segmentation = segmentation.model_copy(update={"method": method})
     references = load_references(reference)
+    for conversion in sorted({text for decoded in references for text in decoded.conversions}):
+        click.echo(f"station: reference converted: {conversion}", err=True)
     listing = list_sources(images, reference)
     if listing.passed_over:
         names = ", ".join(path.name for path in listing.passed_over[:5])
@@ -73,6 +79,8 @@ def analyze_command(
         outcome = analyze(request, partial(bar.update, 1))
     for item in outcome.refused:
         click.echo(f"station: {item.reason}", err=True)
+    if request.widths_mm is not None and outcome.measured and not outcome.touched:
+        click.echo("station: nothing touched the gel in any image, so there is no onset and no area curve", err=True)
     if outcome.measured:
         click.echo(f"{outcome.measured} images measured; report: {out / 'report.html'}")
     if outcome.refused:

@@ -4,6 +4,8 @@ import csv
 import os
 import resource
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -322,3 +324,117 @@ def test_bad_usage_is_exit_code_2_with_a_hint(analyze, arguments):
     done = analyze(*arguments)
     assert done.returncode == 2
     assert "Usage:" in done.stderr
+
+
+def test_a_long_series_is_shown_on_several_sheets(press, analyze, tmp_path):
+    for number in range(44):
+        shutil.copy(press.folder / "frame_12.png", press.folder / f"more_{number}.png")
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--stages", "--out", out, press.folder)
+    assert done.returncode == 0, done.stderr
+    for name in ("contact_sheet.png", "contact_sheet_2.png", "stages.png", "stages_5.png"):
+        picture = cv2.imread(str(out / name))
+        assert picture is not None, name
+    assert not (out / "stages_6.png").exists()
+    assert (out / "report.html").read_text().count("The stages of each image") == 5
+
+
+@pytest.mark.parametrize("shape", [(32, 3000), (3000, 32)])
+def test_an_image_of_odd_proportions_is_measured_and_shown(analyze, tmp_path, shape):
+    reference = tmp_path / "reference.png"
+    cv2.imwrite(str(reference), np.full((*shape, 3), 90, np.uint8))
+    shutil.copy(reference, tmp_path / "image.png")
+    out = tmp_path / "out"
+    done = analyze("--reference", reference, "--method", "paper", "--stages", "--out", out, tmp_path / "image.png")
+    assert done.returncode == 0, done.stderr
+    assert (out / "report.html").exists()
+
+
+def test_names_that_are_no_text_or_too_long_cost_nobody_else_his_result(press, analyze, tmp_path):
+    odd = os.fsencode(press.folder) + b"/odd_\xff.png"
+    shutil.copy(press.folder / "frame_9.png", odd)
+    shutil.copy(press.folder / "frame_9.png", press.folder / f"{'x' * 240}.png")
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder, "y" * 300)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert "the name is too long" in done.stderr
+    assert "yyy: cannot be read: File name too long" in done.stderr
+    names = [row["image"] for row in read_table(out / "results.csv")]
+    assert len(names) == 7
+    assert "odd_\\xff.png" in names
+
+
+def test_an_image_that_is_missing_needs_no_width(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--widths", press.widths, "--out", out,
+        press.folder / "frame_9.png", press.folder / "gone.png", press.folder / "frame_12.png",
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert [row["image"] for row in read_table(out / "curve.csv")] == ["frame_9.png", "frame_12.png"]
+    assert [row["image"] for row in read_table(out / "errors.csv")] == ["gone.png"]
+
+
+def test_without_any_contact_it_is_said_that_there_is_no_curve(press, analyze, tmp_path):
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--widths", press.widths, "--out", out, press.folder / "frame_7.png")
+    assert done.returncode == 0
+    assert "nothing touched the gel in any image" in done.stderr
+    assert not (out / "curve.csv").exists()
+    assert "there is no onset, and so no curve" in (out / "report.html").read_text()
+
+
+def test_a_table_of_widths_that_is_no_file_is_refused_at_once(press, analyze, tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for widths in (pipe, "/dev/zero"):
+        done = analyze(
+            "--reference", press.reference, "--widths", widths, "--out", tmp_path / "out", press.folder / "frame_9.png"
+        )
+        assert done.returncode == 2
+        assert "expected a CSV file" in done.stderr
+
+
+def test_a_converted_reference_is_said(press, analyze, tmp_path):
+    grey = tmp_path / "grey.png"
+    cv2.imwrite(str(grey), np.asarray(cv2.imread(str(press.reference), cv2.IMREAD_GRAYSCALE)))
+    out = tmp_path / "out"
+    done = analyze("--reference", grey, "--method", "paper", "--out", out, press.folder / "frame_9.png")
+    assert done.returncode == 0
+    assert "reference converted: grey spread to three channels" in done.stderr
+    assert "grey spread to three channels" in (out / "report.html").read_text()
+
+
+def test_a_video_that_is_cut_short_is_measured_as_far_as_it_goes(press, analyze, tmp_path):
+    video = tmp_path / "close.avi"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10, (240, 320))
+    for number in range(7, 13):
+        writer.write(np.asarray(cv2.imread(str(press.folder / f"frame_{number}.png"))))
+    writer.release()
+    video.write_bytes(video.read_bytes()[: video.stat().st_size * 2 // 3])
+    out = tmp_path / "out"
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, video)
+    assert done.returncode == 2
+    assert "of 6 frames could be decoded" in done.stderr
+    assert 1 <= len(read_table(out / "results.csv")) < 6
+
+
+def test_the_sites_own_recipes_are_found(press, analyze, tmp_path):
+    done = analyze(
+        "--reference", press.reference, "--recipe", "cherry", "--out", tmp_path / "out", press.folder,
+        env={**os.environ, "STATION_RECIPES_FOLDER": str(tmp_path / "none")},
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert str(tmp_path / "none") in done.stderr
+
+
+def test_a_full_standard_output_is_told_without_a_traceback(press, analyze, tmp_path):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "station", "recipes", "check"], stdout=full, stderr=subprocess.PIPE, text=True,
+            timeout=60, check=False,
+        )  # fmt: skip
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "No space left" in done.stderr
