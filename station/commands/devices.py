@@ -1,23 +1,29 @@
 """`station devices`: what answers at the devices' addresses."""
 
 import asyncio
+import contextlib
 from pathlib import Path
+from typing import Literal
 
 import click
 
+from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
+from station.devices.arm.ur import UrArm
 from station.devices.camera.probe import probe_camera
 from station.devices.finding import Finding
 from station.devices.gripper.probe import probe_gripper
 from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
 
+_ARM_DEADLINE_S = 15.0
+_LEASE_S = 60.0
 _COLOURS = {"ok": "green", "warning": "yellow", "fault": "red"}
 
 
 @click.group("devices")
 def devices() -> None:
-    """Look at the station's devices."""
+    """Look at the station's devices, and bring the arm back after a stop."""
 
 
 @devices.command("check")
@@ -37,6 +43,40 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
     faulty = sorted({finding.device for finding in findings if finding.verdict == "fault"})
     if faulty:
         raise StationError(f"not usable: {', '.join(faulty)}")
+
+
+VERBS = ("protective-stop", "power", "program")
+
+
+@devices.command("recover")
+@click.argument("what", type=click.Choice(VERBS))
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@click.option("--yes", is_flag=True, help="Do not ask: a person has looked.")
+def recover(what: Literal["protective-stop", "power", "program"], config: Path | None, yes: bool) -> None:  # noqa: FBT001
+    """Bring the arm back after a stop, once a person has looked at the cell.
+
+    protective-stop: confirm it and start the program again; power: power on and release the brakes, after an
+    emergency stop too; program: upload it again, after the pendant stopped it or took local control.
+    """
+    if not yes:
+        click.confirm("Is the cause found, and nobody at the arm?", abort=True)
+    asyncio.run(_recover(load_configuration(config), what))
+    click.echo("the arm is ready")
+
+
+async def _recover(configuration: Configuration, what: str) -> None:
+    async with UrArm(configuration.arm) as arm:
+        with contextlib.suppress(ArmFault):  # being not ready is what brings a person here
+            await arm.ready(_ARM_DEADLINE_S)
+        arm.renew_health(_LEASE_S)
+        match what:
+            case "protective-stop":
+                await arm.confirm_protective_stop()
+            case "power":
+                await arm.power_on_and_release_brakes()
+            case _:
+                await arm.upload_again()
+        await arm.ready(_ARM_DEADLINE_S)
 
 
 async def _look(configuration: Configuration, *, bench: bool) -> list[Finding]:

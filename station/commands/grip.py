@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import csv
+import signal
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -40,7 +41,10 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
     configuration = load_configuration(config)
     recipe = find_recipe(recipe_name, configuration.recipes_folder)
     recording = _Recording(out)
-    asyncio.run(_grip(configuration, recipe, recording, bench=bench))
+    try:
+        asyncio.run(_grip(configuration, recipe, recording, bench=bench))
+    except asyncio.CancelledError:
+        raise click.Abort from None
     click.echo(
         f"{recording.count} images in {out}; measure them with:\n"
         f"station analyze --recipe {recipe_name} --reference {out / 'reference'} --widths {out / 'widths.csv'} "
@@ -49,6 +53,10 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
 
 
 async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
+    this = asyncio.current_task()
+    if this is not None:  # what ends a service must let go of the fruit as Ctrl-C does
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            asyncio.get_running_loop().add_signal_handler(number, this.cancel)
     camera = camera_from(configuration.camera)
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(camera.close)
@@ -76,13 +84,10 @@ class _Recording:
     """The folder of one grip; what was reached stays, whatever comes after."""
 
     def __init__(self, folder: Path) -> None:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise BadInputError(f"{folder}: is there already and not empty; name a new folder with --out")
         self._folder = folder
         self._rows: list[tuple[object, ...]] = []
-        try:
-            for name in ("reference", "frames"):
-                (folder / name).mkdir(parents=True)
-        except OSError as error:
-            raise BadInputError(f"{folder}: cannot be made: {error.strerror}; name a new folder with --out") from error
 
     @property
     def count(self) -> int:
@@ -130,7 +135,7 @@ class _Recording:
     def _write_bytes(self, name: str, data: bytes) -> None:
         path = self._folder / name
         try:
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         except OSError as error:
             raise BadInputError(

@@ -2,6 +2,8 @@
 
 from enum import StrEnum
 
+LARGEST_AMOUNT = 1000.0
+
 
 class CommonFault(StrEnum):
     """Faults that every device knows."""
@@ -35,13 +37,14 @@ class FaultBoard:
 
         Args:
             fault: one of `known`.
-            amount: its strength in the unit that the device documents (seconds for `delayed`, …).
+            amount: its strength in the unit that the device documents (seconds for `delayed`, …), 0 to 1000.
 
         Raises:
-            ValueError: the device has no such fault.
+            ValueError: the device has no such fault, or the amount is beyond its bounds.
         """
-        if fault not in self.known:
-            raise ValueError(f"{self.device} has no fault {fault!r}; it knows: {', '.join(self.known)}")
+        self._check(fault)
+        if not 0 <= amount <= LARGEST_AMOUNT:
+            raise ValueError(f"amount: expected a number from 0 to {LARGEST_AMOUNT:g}, found {amount!r}")
         self._active[fault] = amount
 
     def clear(self, fault: str | None = None) -> None:
@@ -49,11 +52,19 @@ class FaultBoard:
 
         Args:
             fault: the fault's name; None for all.
+
+        Raises:
+            ValueError: the device has no such fault.
         """
         if fault is None:
             self._active.clear()
         else:
+            self._check(fault)
             self._active.pop(fault, None)
+
+    def _check(self, fault: str) -> None:
+        if fault not in self.known:
+            raise ValueError(f"{self.device} has no fault {fault!r}; it knows: {', '.join(self.known)}")
 
     def active(self, fault: str) -> bool:
         """Whether a fault is switched on.

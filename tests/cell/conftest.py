@@ -44,7 +44,10 @@ class Cell:
 
 @pytest.fixture
 def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]:
-    """Start a twin with the arguments given; it is ended after the test."""
+    """Start a twin with the arguments given; it is ended after the test.
+
+    The station's patience is that of a machine that runs other tests too.
+    """
     cells: list[Cell] = []
 
     def make(*arguments: object) -> Cell:
@@ -52,8 +55,8 @@ def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]
         configuration = tmp_path / f"station_{len(cells)}.yaml"
         configuration.write_text(
             f"arm: {{host: {host}}}\n"
-            f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}}}\n"
-            f"camera: {{twin: {{port: {unused_port}}}}}\n"
+            f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
+            f"camera: {{oldest_s: 1.0, twin: {{port: {unused_port}}}}}\n"
         )
         command = [sys.executable, "-m", "station", "twin", "--console", "0", "--config", str(configuration)]
         process = subprocess.Popen([*command, *map(str, arguments)], stdout=subprocess.PIPE, text=True)

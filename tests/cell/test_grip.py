@@ -104,24 +104,27 @@ def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, t
     assert "Traceback" not in errors
 
 
-def test_ctrl_c_in_mid_grip_lets_go(make_cell, tmp_path):
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_grip_that_is_called_off_lets_go(make_cell, tmp_path, ending):
     cell = make_cell("--bench", "--fruit", "strawberry")
     grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     for _ in range(3):
         assert grip.stdout.readline()
-    grip.send_signal(signal.SIGINT)
+    grip.send_signal(ending)
     _, errors = grip.communicate(timeout=60)
     assert grip.returncode == 130
-    assert "Traceback" not in errors
+    assert errors.strip() == "station: interrupted"
     assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
 
 
-def test_an_existing_folder_is_not_mixed_into(make_cell, tmp_path):
+def test_a_folder_is_made_with_the_first_image_and_never_mixed_into(make_cell, tmp_path):
     cell = make_cell("--bench")
-    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path)
-    assert done.returncode in {0, 2}
-    (tmp_path / "again" / "reference").mkdir(parents=True)
-    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "again")
+    out = tmp_path / "grip"
+    cell.ask(do="set", device="camera", fault="off")
+    assert cell.station("grip", "--bench", "--recipe", "strawberry", "--out", out).returncode == 1
+    assert not out.exists()
+    (out / "frames").mkdir(parents=True)
+    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", out)
     assert done.returncode == 2
     assert "name a new folder" in done.stderr

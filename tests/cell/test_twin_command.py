@@ -20,7 +20,7 @@ def test_faults_and_fruit_from_the_command_line(make_cell):
     assert station("twin", "fault", "camera", "dirt", "--clear", *console).stdout == "camera: sound\n"
     assert "raspberry 4" in station("twin", "lay", "raspberry", "--seed", 4, *console).stdout
     refused = station("twin", "fault", "camera", "cold", *console)
-    assert refused.returncode == 1
+    assert refused.returncode == 2
     assert "it knows: off, stuck" in refused.stderr
 
 

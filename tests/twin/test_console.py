@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from station.twin.console import LONGEST_LINE_BYTES, ConsoleError, ConsoleServer, ask
+from station.twin.console import LONGEST_LINE_BYTES, ConsoleError, ConsoleRefusalError, ConsoleServer, ask
 from station.twin.faults import FaultBoard
 
 
@@ -46,8 +46,11 @@ def test_faults_are_set_listed_and_cleared():
     [
         ({"do": "set", "device": "oven", "fault": "off"}, "there is no device 'oven'; there are: camera"),
         ({"do": "set", "device": "camera", "fault": "hot"}, "camera has no fault 'hot'; it knows: off, stuck"),
-        ({"do": "set", "device": "camera", "fault": "off", "amount": True}, "expected a finite number"),
-        ({"do": "set", "device": "camera", "fault": "off", "amount": float("nan")}, "expected a finite number"),
+        ({"do": "set", "device": "camera", "fault": "off", "amount": True}, "amount: expected a number, found True"),
+        ({"do": "set", "device": "camera", "fault": "off", "amount": float("nan")}, "expected a number from 0 to 1000"),
+        ({"do": "set", "device": "camera", "fault": "off", "amount": -1}, "expected a number from 0 to 1000"),
+        ({"do": "set", "device": "camera", "fault": "off", "amount": 10**400}, "expected a number from 0 to 1000"),
+        ({"do": "clear", "device": "camera", "fault": "hot"}, "camera has no fault 'hot'"),
         ({"do": "brew"}, "one of list, known, set, clear, echo"),
         ({"do": ["set"]}, "one of list, known, set, clear, echo"),
         ({"do": "echo"}, "word"),
@@ -55,7 +58,7 @@ def test_faults_are_set_listed_and_cleared():
 )
 def test_what_is_wrong_is_refused_with_what_there_is(asked, words):
     def check(host: str, port: int, board: FaultBoard) -> None:
-        with pytest.raises(ConsoleError, match=words):
+        with pytest.raises(ConsoleRefusalError, match=words):
             ask(host, port, asked)
         assert board.snapshot() == {}
         assert ask(host, port, {"do": "echo", "word": "still here"}) == "still here"
@@ -64,7 +67,7 @@ def test_what_is_wrong_is_refused_with_what_there_is(asked, words):
 
 
 @pytest.mark.parametrize(
-    "line", [b"[]\n", b"\xff\xfe\n", b"nonsense\n", b"{}\n", b"x" * 2 * LONGEST_LINE_BYTES + b"\n"]
+    "line", [b"[]\n", b"\xff\xfe\n", b"nonsense\n", b"{}\n", b"[" * 4000 + b"\n", b"x" * 2 * LONGEST_LINE_BYTES + b"\n"]
 )
 def test_garbage_never_stops_the_console(line):
     async def run() -> None:
