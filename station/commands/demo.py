@@ -11,7 +11,7 @@ from station.commands.analyze import analyze_command
 from station.errors import StationError
 from station.settings.configuration import load_configuration
 
-# The fruit with the clearest contacts, to the closing of the paper's first figures.
+# The fruit whose contacts the method finds best (docs/measurement.md), in steps that the eye can follow.
 _FRUIT = "blueberry"
 _STEPS = 8
 _STEP_MM = 1.0
