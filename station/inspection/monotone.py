@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,24 +47,51 @@ def wrong_frames(
         raise ValueError(f"{len(widths_mm)} widths and {len(areas)} areas: there must be one width for each area")
     if not (np.isfinite(widths_mm).all() and np.isfinite(areas).all()):
         raise ValueError("every width and area must be a finite number")
-    closing = [i for i, width in enumerate(widths_mm) if i == 0 or width < min(widths_mm[:i])]
-    values = [areas[i] for i in closing]
-    slack = [max(least_noise, relative_noise * value) for value in values]
-    kept = _longest_run(values, slack)
-    wrong: list[WrongFrame] = []
-    for place, index in enumerate(closing):
-        if place not in kept:
-            before = [values[k] - slack[k] for k in kept if k < place]
-            after = [values[k] + slack[k] for k in kept if k > place]
-            low, high = max(before, default=0.0), min(after, default=float("inf"))
-            wrong.append(WrongFrame(index, float(values[place]), float(low), float(high)))
-    return wrong
+    closing = _narrower_than_before(widths_mm)
+    values = np.array([areas[i] for i in closing], np.float64)
+    slack = np.maximum(least_noise, relative_noise * values)
+    kept = np.zeros(len(closing), np.bool_)
+    kept[_longest_run(values, values - slack)] = True
+    low = np.maximum.accumulate(np.where(kept, values - slack, -np.inf))
+    high = np.minimum.accumulate(np.where(kept, values + slack, np.inf)[::-1])[::-1]
+    return [
+        WrongFrame(
+            closing[place],
+            float(values[place]),
+            float(low[place]) if kept[:place].any() else 0.0,
+            float(high[place]),
+        )
+        for place in np.flatnonzero(~kept)
+    ]
 
 
-def _longest_run(values: list[float], slack: list[float]) -> set[int]:
-    """Places of the longest run in which no value falls below the largest before it by more than that one's slack."""
-    best: list[list[int]] = []
+def _narrower_than_before(widths_mm: Sequence[float]) -> list[int]:
+    """Places whose width is below all widths before."""
+    places: list[int] = []
+    for place, width in enumerate(widths_mm):
+        if not places or width < widths_mm[places[-1]]:
+            places.append(place)
+    return places
+
+
+def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64]) -> list[int]:
+    """Places of the longest run in which no value falls below the floor of one before it.
+
+    Dynamic programming over the run's last place, in quadratic time.
+    """
+    lengths = np.ones(values.size, np.int64)
+    highest_floor = floors.copy()
+    before = np.full(values.size, -1)
     for place, value in enumerate(values):
-        runs = [run for run in best if value >= max(values[k] - slack[k] for k in run)]
-        best.append([*max(runs, key=len, default=[]), place])
-    return set(max(reversed(best), key=len, default=[]))
+        fitting = np.where(value >= highest_floor[:place], lengths[:place], 0)
+        if fitting.any():
+            best = int(fitting.argmax())
+            before[place] = best
+            lengths[place] += lengths[best]
+            highest_floor[place] = max(highest_floor[best], floors[place])
+    if not values.size:
+        return []
+    run = [values.size - 1 - int(lengths[::-1].argmax())]
+    while before[run[-1]] >= 0:
+        run.append(int(before[run[-1]]))
+    return run

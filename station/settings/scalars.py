@@ -72,7 +72,9 @@ def _ambiguous(text: str, kind: str, old_kind: str) -> str:
     """The message for a word with two meanings, with the ways to write what was meant."""
     shown = shortened(text, 40)
     quoted = f'"{shown}" in quotes for a text'
-    if old_kind == "bool":
+    if old_kind == "timestamp":
+        remedy = f"write {quoted}"
+    elif old_kind == "bool":
         remedy = f"write true or false, or {quoted}"
     elif _LEADING_ZERO.fullmatch(text):
         remedy = f"write it without the leading zero, or {quoted}"

@@ -125,7 +125,7 @@ def press(fruit: str, seed: int, steps: int, step_mm: float, out: Path) -> None:
     closings_mm = [step_mm * (step + 1 - _OPEN_STEPS) for step in range(steps + _OPEN_STEPS)]
     sequence = render_press(fruit, seed, closings_mm)
     for number, image in enumerate(sequence.references):
-        _write(out / "reference" / f"reference_{number}.png", image)
+        _write_picture(out / "reference" / f"reference_{number}.png", image)
     table = StringIO(newline="")
     writer = csv.writer(table)
     writer.writerow(("image", "width_mm"))
@@ -133,12 +133,21 @@ def press(fruit: str, seed: int, steps: int, step_mm: float, out: Path) -> None:
         zip(sequence.frames, sequence.true_masks, sequence.widths_mm, strict=True)
     ):
         name = f"step_{number:02d}.png"
-        _write(out / "frames" / name, image)
-        _write(out / "truth" / name, mask)
+        _write_picture(out / "frames" / name, image)
+        _write_picture(out / "truth" / name, mask)
         writer.writerow((name, f"{width_mm:.2f}"))
-    (out / "widths.csv").write_bytes(table.getvalue().encode())
+    _write(out / "widths.csv", table.getvalue().encode())
     click.echo(f"{len(sequence.frames)} images of a {fruit} in {out}")
 
 
-def _write(path: Path, picture: npt.NDArray[np.uint8]) -> None:
-    path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+def _write_picture(path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    _write(path, cv2.imencode(".png", picture)[1].tobytes())
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise BadInputError(
+            f"{path}: cannot be written: {error.strerror}; free space and name a new folder with --out"
+        ) from error

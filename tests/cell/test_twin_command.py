@@ -1,14 +1,20 @@
 """`station twin` as a person uses it."""
 
+import os
+import resource
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
+WITHOUT_COVERAGE = {name: value for name, value in os.environ.items() if not name.startswith("COV")}
+"""The environment of a program whose files are limited in size: the coverage's own file would be, too."""
 
-def station(*arguments: object) -> subprocess.CompletedProcess[str]:
+
+def station(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "station", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **options)
 
 
 def test_faults_and_fruit_from_the_command_line(make_cell):
@@ -43,3 +49,17 @@ def test_a_drawn_press_is_the_same_each_time_and_grows(fruit, tmp_path):
     assert len(files) == 5 + 5 + 5 + 1
     assert all((folders[0] / file).read_bytes() == (folders[1] / file).read_bytes() for file in files)
     assert station("twin", "press", "--out", folders[0]).returncode == 2
+
+
+def test_a_full_disk_ends_a_drawn_press_with_a_remedy(tmp_path):
+    """The limit on a file's size stands for the full disk."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    out = tmp_path / "press"
+    done = station("twin", "press", "--steps", 1, "--out", out, preexec_fn=limit, env=WITHOUT_COVERAGE)
+    assert done.returncode == 2
+    assert "reference_0.png: cannot be written" in done.stderr
+    assert "free space and name a new folder" in done.stderr
+    assert "Traceback" not in done.stderr

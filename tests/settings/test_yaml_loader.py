@@ -37,7 +37,11 @@ BAD = {
     ),
     "date": (
         "a: 2025-01-31",
-        [f'{ALIKE} 2025-01-31: write a number in plain decimal digits, or "2025-01-31" in quotes for a text'],
+        [f'{ALIKE} 2025-01-31: write "2025-01-31" in quotes for a text'],
+    ),
+    "date and time": (
+        "a: 2025-01-31T12:30:00Z",
+        [f'{ALIKE} 2025-01-31T12:30:00Z: write "2025-01-31T12:30:00Z" in quotes for a text'],
     ),
     "NaN": ("a: .nan", ["f:1: a: expected a finite number, got .nan"]),
     "infinity": ("a:\n  - -.Inf", ["f:2: a[0]: expected a finite number, got -.Inf"]),
