@@ -31,6 +31,8 @@ CLOSINGS_MM = (0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.8, 2.5, 3.5, 5.0, 7.0)
 SIGMA_PIXEL, SIGMA_COLUMN, SIGMA_ROW, SIGMA_OFFSET = (3.1, 1.8, 2.5), (1.8, 1.3, 2.6), 1.0, 1.5
 """Noise measured on real presses, grey levels, B, G, R."""
 DRIFT_LEVELS = 4.0
+DARKER_COUNTS = 0.7
+"""What PyTouch scales a difference below the reference by before it takes the size."""
 
 Measure = Callable[[Image], Mask]
 Floats = npt.NDArray[np.float64]
@@ -44,11 +46,12 @@ class Scores(NamedTuple):
 
 
 def contact_area_idea(reference: Image) -> Measure:
-    """The idea of PyTouch's ContactArea, written from its description: smoothed difference, threshold, ellipse."""
+    """The idea of PyTouch's ContactArea, written from its description: scaled difference, box, threshold, ellipse."""
     base = reference.astype(np.float32)
 
     def measure(image: Image) -> Mask:
-        scaled = np.abs(image.astype(np.float32) - base).mean(axis=2) / 255
+        signed = (image.astype(np.float32) - base) / 255
+        scaled = np.where(signed < 0, -DARKER_COUNTS * signed, signed).mean(axis=2)
         inside = (cv2.boxFilter(scaled, -1, (64, 64)) > 0.04).astype(np.uint8)
         inside = cv2.erode(inside, np.ones((16, 16), np.uint8))
         mask = np.zeros(image.shape[:2], np.uint8)

@@ -13,7 +13,13 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.candidates import Candidate, body_candidates, cluster_levels, separate_candidates
+from station.vision.candidates import (
+    Candidate,
+    body_candidates,
+    changed_places,
+    cluster_levels,
+    separate_candidates,
+)
 from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_streaks
@@ -86,9 +92,14 @@ class RobustMethod:
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         levels = cluster_levels(bend)
-        search = body_candidates if self._parameters.contacts == "one" else separate_candidates
         gate = float(bend.max()) / threshold
-        found = self._edges(change, bend, search(bend, levels, threshold), drift.background, sure=gate > _SURE_GATE)
+        sure = gate > _SURE_GATE
+        if self._parameters.contacts == "several":
+            candidates = separate_candidates(bend, levels, threshold)
+        else:
+            changed = None if sure else changed_places(change, drift.background)
+            candidates = body_candidates(bend, levels, threshold, changed)
+        found = self._edges(change, bend, candidates, drift.background, sure=sure)
         mask = self._mask([edge for edge, _ in found])
         if on_stage:
             pictures.emit(
@@ -152,7 +163,7 @@ class RobustMethod:
     def _judge(
         self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
     ) -> tuple[frozenset[Flag], float]:
-        """The flags, and the weakest area's confidence; without an area, less the more the gate is open."""
+        """The flags, and the weakest area's confidence; without an area 1, or 0 where the gate is open all the same."""
         flags: set[Flag] = set()
         light = float(np.sqrt(np.mean(self._light**2)))
         if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
@@ -162,7 +173,10 @@ class RobustMethod:
         saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
-        confidence = min((confidence for _, confidence in found), default=min(1.0, 1.0 / max(gate, 1e-3)))
+        undecided = not found and gate > 1
+        if undecided:
+            flags.add(Flag.UNDECIDED)
+        confidence = min((confidence for _, confidence in found), default=0.0 if undecided else 1.0)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
