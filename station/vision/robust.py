@@ -163,7 +163,7 @@ class RobustMethod:
     def _judge(
         self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
     ) -> tuple[frozenset[Flag], float]:
-        """The flags, and the weakest area's confidence; without an area 1, or 0 where the gate is open all the same."""
+        """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
         light = float(np.sqrt(np.mean(self._light**2)))
         if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
@@ -173,10 +173,10 @@ class RobustMethod:
         saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
-        undecided = not found and gate > 1
-        if undecided:
+        if not found and gate > 1:
             flags.add(Flag.UNDECIDED)
-        confidence = min((confidence for _, confidence in found), default=0.0 if undecided else 1.0)
+        untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
+        confidence = min((confidence for _, confidence in found), default=untouched)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
