@@ -107,7 +107,7 @@ class DriftModel:
         for _ in range(_ITERATIONS):
             weighted = self._transposed * weight
             normal = weighted @ self._coarse + self._ridge
-            coefficients = np.linalg.solve(normal, weighted @ samples[..., None])
+            coefficients = np.asarray(np.linalg.solve(normal, weighted @ samples[..., None]), np.float64)
             fitted = (self._coarse @ coefficients)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             spread = SPREAD_CAP_LEVELS / 2

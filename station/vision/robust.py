@@ -65,7 +65,8 @@ class RobustMethod:
         self._reference = working_image(reference)
         self._light = np.minimum(self._reference, SATURATED_LEVEL).astype(np.float32)
         self._drift = DriftModel(self._reference)
-        self._blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
+        blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
+        self._blind = blind if blind.any() else None
         self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
@@ -86,7 +87,8 @@ class RobustMethod:
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
         drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
         change = difference - drift.levels
-        change[self._blind] = 0
+        if self._blind is not None:
+            change[self._blind] = 0
         change = without_streaks(change, drift.background)
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
@@ -186,7 +188,8 @@ class RobustMethod:
 
 def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[float, float]:
     """Where a region bends most, in pixels of an image of the given width and height."""
-    moments = cv2.moments((bend * region) ** 4)
+    squared = (bend * region) ** 2
+    moments = cv2.moments(squared * squared)
     x_scale, y_scale = size[0] / bend.shape[1], size[1] / bend.shape[0]
     return (
         (moments["m10"] / moments["m00"] + 0.5) * x_scale - 0.5,
