@@ -6,13 +6,22 @@ import cv2
 import numpy as np
 
 from station.vision.clusters import boundaries
+from station.vision.confidence import background_spread
 from station.vision.contact import FloatImage, Mask
+from station.vision.drift import weighted_median
+from station.vision.edge_signal import length_of
+from station.vision.working import resized
 
 _FOOT_SHARE = 0.5
 _BODY_SHARE = 0.12
 _BRIDGE_SHARE = 0.05
 _OWN_SHARE = 0.35
 _LEAST_BEND = 0.01
+_CHANGE_SIGMA_PX = 2.5
+_CHANGE_OVER_NOISE = 5.0
+_CHANGE_OVER_STREAK = 2.5
+_STREAK_QUANTILE = 0.25
+_SPECK_PX = 5
 _NECKS = (0.4, 0.55, 0.7, 0.8)
 _NECK_DEPTH = 0.12
 
@@ -35,18 +44,45 @@ def cluster_levels(bend: FloatImage) -> list[float]:
     return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend, _LEAST_BEND)))]
 
 
-def body_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
+def changed_places(change: FloatImage, background: FloatImage) -> Mask:
+    """Where the change is larger than noise and streaks: a large, soft contact changes much where it bends little.
+
+    A column's lower quartile is what its streak reaches; a place has to stand out of that as well.
+
+    Args:
+        change: without drift, shape (height, width, 3), grey levels.
+        background: shape (height, width), 0 to 1.
+
+    Returns:
+        At half the change's size, 0 or 1; small specks are left out.
+    """
+    size = ((change.shape[1] + 1) // 2, (change.shape[0] + 1) // 2)
+    length = length_of(np.asarray(cv2.GaussianBlur(resized(change, size), (0, 0), _CHANGE_SIGMA_PX), np.float32))
+    calm = resized(background, size)
+    noise = weighted_median(length, calm) + _CHANGE_OVER_NOISE * background_spread(length, calm)
+    streak = _CHANGE_OVER_STREAK * np.quantile(length, _STREAK_QUANTILE, axis=0)
+    changed = (length > np.maximum(noise, streak)).astype(np.uint8)
+    speck = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SPECK_PX, _SPECK_PX))
+    return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, speck), np.uint8)
+
+
+def body_candidates(
+    bend: FloatImage, levels: list[float], threshold: float, changed: Mask | None = None
+) -> list[Candidate]:
     """Where one body may touch: strong bending, bridged over the gaps between seeds and drupelets.
 
     Args:
         bend: shape (height, width), grey levels per pixel.
         levels: from `cluster_levels`.
         threshold: the gate's, grey levels per pixel.
+        changed: from `changed_places`, where a region may lie although it bends less.
 
     Returns:
         The heaviest first.
     """
     strong = (bend > max(_foot(levels, threshold), _BODY_SHARE * float(bend.max()))).astype(np.uint8)
+    if changed is not None:
+        strong |= changed
     side = 2 * round(_BRIDGE_SHARE * max(bend.shape) / 2) + 1
     bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     framed = cv2.copyMakeBorder(strong, side, side, side, side, cv2.BORDER_CONSTANT)

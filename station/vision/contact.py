@@ -26,6 +26,8 @@ class Flag(StrEnum):
 
     NO_CONTACT = "no_contact"
     """Nothing touches the gel: the area is 0."""
+    UNDECIDED = "undecided"
+    """Something bends the gel, but no edge was found: the area is given as 0 and is unknown."""
     CUT_BY_BORDER = "cut_by_border"
     """The contact reaches the image's border: the area is a lower bound."""
     SATURATED = "saturated"
@@ -98,7 +100,8 @@ def contact_from_mask(
     inside = mask > 0
     area_px = int(np.count_nonzero(inside))
     if area_px == 0:
-        return Contact(mask, 0, None, flags | {Flag.NO_CONTACT}, **known)
+        nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
+        return Contact(mask, 0, None, flags | nothing, **known)
     rows, columns = inside.sum(axis=1), inside.sum(axis=0)
     centroid_px = (
         float(np.arange(columns.size) @ columns) / area_px,

@@ -74,14 +74,16 @@ class DriftModel:
         cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
         stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
         slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
-        self._coarse: list[_Floats] = []
+        grids: list[_Floats] = []
         self._fine: list[FloatImage] = []
         for channel in range(3):
             shapes = cosines + [slope[..., channel] * stretch for slope in slopes for stretch in stretches]
             gained = resized(self._light[..., channel], self._grid)
             coarse = [resized(shape, self._grid) for shape in shapes]
-            self._coarse.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
+            grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
             self._fine.append(np.stack([resized(shape, self._half).ravel() for shape in shapes]))
+        self._coarse: _Floats = np.stack(grids)
+        self._transposed: _Floats = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
         prior = [
             _PRIOR_GAIN,
             *(_PRIOR_COSINE_LEVELS / (1 + i * i + j * j) for i, j in orders),
@@ -96,31 +98,28 @@ class DriftModel:
             difference: frame minus reference, shape (height, width, 3), float32, grey levels.
             background: a first guess of where nothing touches, any size, float32, 0 to 1.
         """
-        samples = resized(difference, self._grid).reshape(-1, 3).astype(np.float64)
+        samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T, np.float64)
         weight = resized(background, self._grid).ravel().astype(np.float64)
         trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
         spread = 0.0
-        coefficients: list[_Floats] = []
+        coefficients: _Floats = np.zeros((3, self._coarse.shape[2], 1))
         fitted = np.zeros_like(samples)
         for _ in range(_ITERATIONS):
-            coefficients = [self._solve(channel, samples[:, channel], weight) for channel in range(3)]
-            fitted = np.stack([a @ c for a, c in zip(self._coarse, coefficients, strict=True)], axis=1)
-            residual = np.sqrt(((samples - fitted) ** 2).sum(axis=1))
+            weighted = self._transposed * weight
+            normal = weighted @ self._coarse + self._ridge
+            coefficients = np.asarray(np.linalg.solve(normal, weighted @ samples[..., None]), np.float64)
+            fitted = (self._coarse @ coefficients)[..., 0]
+            residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             spread = SPREAD_CAP_LEVELS / 2
             if weight.sum() >= _LEAST_BACKGROUND * weight.size:
                 spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
             weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2 * trust
-        smooth = [c[1:].astype(np.float32) @ f for c, f in zip(coefficients, self._fine, strict=True)]
+        smooth = [c[1:, 0].astype(np.float32) @ f for c, f in zip(coefficients, self._fine, strict=True)]
         levels = resized(np.stack(smooth, axis=-1).reshape(self._half[1], self._half[0], 3), self._size)
-        levels += self._light * np.array([c[0] for c in coefficients], np.float32)
+        levels += self._light * coefficients[:, 0, 0].astype(np.float32)
         strength = float(np.sqrt(np.mean(fitted**2)))
         certain = weight.reshape(self._grid[1], self._grid[0]).astype(np.float32)
         return Drift(levels, resized(certain, self._size), spread, strength)
-
-    def _solve(self, channel: int, samples: _Floats, weight: _Floats) -> _Floats:
-        shapes = self._coarse[channel]
-        weighted = shapes * weight[:, None]
-        return np.asarray(np.linalg.solve(weighted.T @ shapes + self._ridge, weighted.T @ samples), np.float64)
 
 
 def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
@@ -132,12 +131,15 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
         change: shape (height, width, 3), grey levels.
         background: shape (height, width), 0 to 1.
     """
-    weights = cv2.merge([background] * 3)
-    for axis in (0, 1):
-        weighted = cv2.reduce(cv2.multiply(change, weights), axis, cv2.REDUCE_SUM)
-        support = cv2.reduce(background, axis, cv2.REDUCE_SUM) + _STREAK_PRIOR_SHARE * background.shape[axis]
-        change = change - weighted / support[..., None]
-    return change
+    height, width = background.shape
+    weighted = cv2.multiply(change, cv2.merge([background] * 3))
+    column_support = background.sum(axis=0) + _STREAK_PRIOR_SHARE * height
+    row_support = background.sum(axis=1) + _STREAK_PRIOR_SHARE * width
+    columns = cv2.reduce(weighted, 0, cv2.REDUCE_SUM)[0] / column_support[:, None]
+    rows = (cv2.reduce(weighted, 1, cv2.REDUCE_SUM)[:, 0] - background @ columns) / row_support[:, None]
+    even = change - columns
+    even -= rows[:, None]
+    return np.asarray(even, np.float32)
 
 
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:

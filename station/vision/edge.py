@@ -132,13 +132,14 @@ def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArra
     windows = np.lib.stride_tricks.sliding_window_view(padded, steps)
     inner = padded[_LONGEST_JUMP:-_LONGEST_JUMP]
     inner[:] = turns[0]
-    came_from = np.empty(turns.shape, np.intp)
-    columns = np.arange(steps)
+    steps_taken = np.empty(turns.shape, np.intp)
+    candidates = np.empty((jumps.size, steps))
     for index in range(1, len(turns)):
-        candidates = windows + price
-        best = candidates.argmin(axis=0)
-        came_from[index] = columns + best - _LONGEST_JUMP
-        inner[:] = candidates[best, columns] + turns[index]
+        np.add(windows, price, out=candidates)
+        candidates.argmin(axis=0, out=steps_taken[index])
+        np.minimum.reduce(candidates, axis=0, out=inner)
+        inner += turns[index]
+    came_from = steps_taken + (np.arange(steps) - _LONGEST_JUMP)
     path = np.empty(len(turns), np.intp)
     path[-1] = inner.argmin()
     for index in range(len(turns) - 1, 0, -1):

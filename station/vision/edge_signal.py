@@ -24,6 +24,19 @@ def denoised(change: FloatImage, radius_px: float) -> FloatImage:
     return np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
 
 
+def length_of(change: FloatImage) -> FloatImage:
+    """The change's length over the channels.
+
+    Args:
+        change: shape (height, width, 3), grey levels.
+
+    Returns:
+        Shape (height, width), grey levels.
+    """
+    ones = np.ones((1, 3), np.float32)
+    return np.asarray(cv2.sqrt(cv2.transform(cv2.multiply(change, change), ones)), np.float32)
+
+
 def edge_signal(smooth: FloatImage, bend: FloatImage, region: Mask, radius_px: float) -> FloatImage:
     """The change's length over the channels; for textured skin its capped and spread envelope.
 
@@ -40,8 +53,7 @@ def edge_signal(smooth: FloatImage, bend: FloatImage, region: Mask, radius_px: f
     Returns:
         Shape (height, width), grey levels.
     """
-    ones = np.ones((1, 3), np.float32)
-    length = np.asarray(cv2.sqrt(cv2.transform(cv2.multiply(smooth, smooth), ones)), np.float32)
+    length = length_of(smooth)
     within = length[region > 0]
     small = resized(region.astype(np.float32), (bend.shape[1], bend.shape[0])) > 0
     element_px = float(within.mean() / bend[small].mean())

@@ -13,7 +13,13 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.candidates import Candidate, body_candidates, cluster_levels, separate_candidates
+from station.vision.candidates import (
+    Candidate,
+    body_candidates,
+    changed_places,
+    cluster_levels,
+    separate_candidates,
+)
 from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_streaks
@@ -59,7 +65,8 @@ class RobustMethod:
         self._reference = working_image(reference)
         self._light = np.minimum(self._reference, SATURATED_LEVEL).astype(np.float32)
         self._drift = DriftModel(self._reference)
-        self._blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
+        blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
+        self._blind = blind if blind.any() else None
         self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
@@ -80,15 +87,21 @@ class RobustMethod:
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
         drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
         change = difference - drift.levels
-        change[self._blind] = 0
+        if self._blind is not None:
+            change[self._blind] = 0
         change = without_streaks(change, drift.background)
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         levels = cluster_levels(bend)
-        search = body_candidates if self._parameters.contacts == "one" else separate_candidates
         gate = float(bend.max()) / threshold
-        found = self._edges(change, bend, search(bend, levels, threshold), drift.background, sure=gate > _SURE_GATE)
+        sure = gate > _SURE_GATE
+        if self._parameters.contacts == "several":
+            candidates = separate_candidates(bend, levels, threshold)
+        else:
+            changed = None if sure else changed_places(change, drift.background)
+            candidates = body_candidates(bend, levels, threshold, changed)
+        found = self._edges(change, bend, candidates, drift.background, sure=sure)
         mask = self._mask([edge for edge, _ in found])
         if on_stage:
             pictures.emit(
@@ -152,7 +165,7 @@ class RobustMethod:
     def _judge(
         self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
     ) -> tuple[frozenset[Flag], float]:
-        """The flags, and the weakest area's confidence; without an area, less the more the gate is open."""
+        """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
         light = float(np.sqrt(np.mean(self._light**2)))
         if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
@@ -162,7 +175,10 @@ class RobustMethod:
         saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
-        confidence = min((confidence for _, confidence in found), default=min(1.0, 1.0 / max(gate, 1e-3)))
+        if not found and gate > 1:
+            flags.add(Flag.UNDECIDED)
+        untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
+        confidence = min((confidence for _, confidence in found), default=untouched)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
@@ -172,7 +188,8 @@ class RobustMethod:
 
 def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[float, float]:
     """Where a region bends most, in pixels of an image of the given width and height."""
-    moments = cv2.moments((bend * region) ** 4)
+    squared = (bend * region) ** 2
+    moments = cv2.moments(squared * squared)
     x_scale, y_scale = size[0] / bend.shape[1], size[1] / bend.shape[0]
     return (
         (moments["m10"] / moments["m00"] + 0.5) * x_scale - 0.5,

@@ -9,6 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.settings.segmentation import RobustParameters
+from station.twin.digit.press import render_press
+from station.vision.candidates import changed_places
 from station.vision.contact import Flag
 from station.vision.robust import RobustMethod
 
@@ -118,11 +120,46 @@ def test_two_contacts_are_found_where_the_recipe_expects_several(sphere_press, o
     assert overlap(measure(one.reference, both, contacts="one").mask, truth) < 0.6
 
 
-def test_dirt_of_one_colour_is_no_contact(sphere_press):
+def test_what_opens_the_gate_without_an_edge_is_undecided_and_never_sure(sphere_press):
     press = sphere_press(levels=0.0)
     shade = cv2.GaussianBlur(cv2.circle(np.zeros((640, 480), np.float32), (200, 300), 25, 1.0, -1), (0, 0), 6)
     dirty = (press.image * (1 - 0.5 * shade[..., None])).astype(np.uint8)
-    assert measure(press.reference, dirty).area_px == 0
+    contact = measure(press.reference, dirty)
+    assert contact.area_px == 0
+    assert contact.gate is not None
+    assert contact.gate > 1
+    assert contact.flags == {Flag.UNDECIDED, Flag.LOW_CONFIDENCE}
+    assert contact.confidence == 0
+
+
+def test_no_contact_is_the_less_sure_the_nearer_the_gate(sphere_press):
+    presses = [sphere_press(radius_px=150, levels=levels) for levels in (0.0, 9.0, 12.0)]
+    given = [measure(press.reference, press.image) for press in presses]
+    assert [contact.area_px for contact in given] == [0, 0, 0]
+    confidences = [contact.confidence or 0.0 for contact in given]
+    assert confidences == sorted(confidences, reverse=True)
+    assert confidences[0] == 1
+    assert confidences[-1] < 0.5
+
+
+def test_a_large_soft_contact_that_bends_the_gel_little_is_whole():
+    press = render_press("rubber_ball", 0, (7.0, 8.0))
+    method = RobustMethod(press.references, RobustParameters())
+    for frame, truth in zip(press.frames, press.true_masks, strict=True):
+        contact = method.measure(frame)
+        assert contact.gate is not None
+        assert contact.gate < 2
+        assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.15)
+
+
+def test_a_streak_is_no_changed_place(sphere_press):
+    press = sphere_press(levels=0.0)
+    change = cv2.resize(press.image.astype(np.float32) - press.reference, (240, 320), interpolation=cv2.INTER_AREA)
+    change[:, 100:120] += 8
+    change[150:190, 160:200, 0] += 8
+    changed = changed_places(change, np.ones((320, 240), np.float32))
+    assert changed[80:90, 82:98].mean() > 0.9
+    assert not changed[:, 45:65].any()
 
 
 def test_confidence_falls_with_the_contrast(sphere_press):
