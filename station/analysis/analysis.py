@@ -18,7 +18,7 @@ from station.errors import BadInputError
 from station.inspection.curve import Reading, area_curve
 from station.inspection.monotone import wrong_frames
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Contact, Image
+from station.vision.contact import Contact, Flag, Image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
 from station.vision.scale import Scale
@@ -138,7 +138,7 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
     )
     gathered.details.append((name, replace(item.contact, mask=_NO_MASK)))
     gathered.thumbnails.append((f"{name}\n{area_mm2:.2f} mm2", [picture]))
-    if width_mm is not None:
+    if width_mm is not None and Flag.UNDECIDED not in item.contact.flags:  # its area is unknown, not 0
         gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2)))
     if item.stages:
         gathered.stage_names = tuple(item.stages)
@@ -195,7 +195,9 @@ def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) ->
     output.write_bytes("curve.svg", svg.encode())
     closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
     unfit = {images[frame.index] for frame in wrong}
-    return svg, [_on_curve(row, closing_mm[row.image], unfit) for row in gathered.rows]
+    return svg, [
+        _on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in gathered.rows
+    ]
 
 
 def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
