@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import math
 import socket
 import struct
 import subprocess
@@ -190,6 +191,61 @@ def test_rubbish_costs_its_sender_the_connection_and_nobody_else(bench, rubbish)
             other.close()
 
     asyncio.run(run())
+
+
+HEAD_AND_SIX = (4, 48)
+"""Bytes of a data package beside its values, and of one `actual_q`."""
+
+
+@pytest.mark.parametrize("count", [1365, 1366])
+def test_an_output_recipe_is_no_longer_than_a_package_can_be(bench, count):
+    async def run():
+        async with bench() as made:
+            client, other = await plain(made.host), await plain(made.host)
+            fits = HEAD_AND_SIX[0] + HEAD_AND_SIX[1] * count <= 65535
+            asked = struct.pack(">d", 500.0) + ",".join(["actual_q"] * count).encode()
+            assert (await client.ask("O", asked))[:1] == bytes([fits])
+            assert await client.ask("S") == bytes([fits])
+            assert await other.ask("O", struct.pack(">d", 500.0) + b"timestamp") == b"\x01DOUBLE"
+            assert await other.ask("S") == b"\x01"
+            stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
+            assert stamps == sorted(set(stamps))
+            if fits:
+                assert len(await client.hear("U")) == 1 + HEAD_AND_SIX[1] * count
+            client.close()
+            other.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("frequency_hz", [1e-320, 0.0, 0.5, -1.0, math.inf, math.nan])
+def test_an_output_frequency_is_finite_and_at_least_one(bench, frequency_hz):
+    async def run():
+        async with bench() as made:
+            client = await plain(made.host)
+            assert await client.ask("O", struct.pack(">d", frequency_hz) + b"timestamp") == b"\x00DOUBLE"
+            assert await client.ask("O", struct.pack(">d", 1.0) + b"timestamp") == b"\x01DOUBLE"
+            client.close()
+
+    asyncio.run(run())
+
+
+def test_a_client_whose_package_cannot_be_made_is_cut_and_the_others_are_served(bench, until, caplog):
+    async def run():
+        async with bench() as made:
+            client, other = await plain(made.host), await plain(made.host)
+            for one, name in ((client, b"output_int_register_3"), (other, b"timestamp")):
+                await one.ask("O", struct.pack(">d", 500.0) + name)
+                await one.ask("S")
+            made.controller.registers.output_int[3] = 1 << 40
+            await until(lambda: len(made.controller.network.connections) == 1)
+            stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
+            assert stamps == sorted(set(stamps))
+            client.close()
+            other.close()
+
+    asyncio.run(run())
+    assert "is cut" in caplog.text
 
 
 def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 from typing import Any, Literal
 
 from station.twin.clock import Clock
@@ -31,6 +32,8 @@ OWN_FAULTS = (
     "link_cut",
     "safety_fault",
 )
+
+log = logging.getLogger(__name__)
 
 
 def arm_faults() -> FaultBoard:
@@ -185,7 +188,11 @@ class UrController:
             self.script.step(now_s)
         self._tick += 1
         for connection in list(self.network.connections):
-            connection.publish(self._tick, now_s)
+            try:
+                connection.publish(self._tick, now_s)
+            except Exception:  # one client's package must not cost the others theirs
+                log.exception("a client of the RTDE server is cut")
+                connection.cut()
 
     def _apply_faults(self, now_s: float) -> None:
         period_s = self.faults.amount(CommonFault.INTERMITTENT)
