@@ -1,6 +1,7 @@
 """The emulated controller met by other clients than the driver: ur-rtde's receive and I/O, and plain sockets."""
 
 import asyncio
+import contextlib
 import itertools
 import math
 import socket
@@ -13,6 +14,9 @@ import pytest
 
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
+from station.twin.clock import SteadyClock
+from station.twin.faults import FaultBoard
+from station.twin.ur.controller import UrController
 
 HEADER = struct.Struct(">HB")
 
@@ -246,6 +250,52 @@ def test_a_client_whose_package_cannot_be_made_is_cut_and_the_others_are_served(
 
     asyncio.run(run())
     assert "is cut" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("port", "cut"),
+    [
+        *itertools.product((29999, 30001, 30003, 30004), ("off", "link_cut", "intermittent", "stop")),
+        *itertools.product((30001, 30003), ("local_mode",)),
+    ],
+)
+def test_connections_that_are_cut_end_without_a_word(bench, until, port, cut):
+    async def run():
+        complaints = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+        async with bench() as made:
+            reader, writer = await asyncio.open_connection(made.host, port)
+            if port in {29999, 30001}:
+                await reader.readexactly(1)
+            else:
+                writer.write(HEADER.pack(5, ord("V")) + b"\x00\x02")
+                await until(lambda: bool(made.controller.network.connections or made.controller.network._programmers))
+            if cut == "stop":
+                await made.controller.stop()
+            else:
+                made.faults.set(cut, 0.1)
+            with contextlib.suppress(ConnectionError):
+                async with asyncio.timeout(5):
+                    while await reader.read(4096):
+                        pass
+            made.faults.clear()
+            writer.transport.abort()
+        await asyncio.sleep(0)
+        assert complaints == []
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(("amount", "share"), [(-1.0, 1.0), (-5.0, 1.0), (0.0, 1.0), (3.0, 0.25), (math.inf, 0.0)])
+def test_the_slow_fault_leaves_a_share_of_the_speed_whatever_its_amount(host, amount, share):
+    class Board(FaultBoard):
+        """One that lets every amount through."""
+
+        def amount(self, fault: str) -> float:
+            return amount if fault == "slow" else 0.0
+
+    controller = UrController(host, SteadyClock(), Board("arm"))
+    assert controller.speed_scaling == share
 
 
 def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):

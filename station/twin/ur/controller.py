@@ -129,7 +129,7 @@ class UrController:
     @property
     def speed_scaling(self) -> float:
         """The share of the commanded speed at which the arm really moves."""
-        return self.speed_slider / (1.0 + self.faults.amount(CommonFault.SLOW))
+        return self.speed_slider / (1.0 + max(0.0, self.faults.amount(CommonFault.SLOW)))
 
     def tool_position_m(self) -> tuple[float, float, float]:
         """The tool centre point in the base's frame, m."""
@@ -149,7 +149,7 @@ class UrController:
             self.registers.write(name, value, now_s)
         written = dict(values)
         if written.get("speed_slider_mask"):
-            self.speed_slider = min(max(written.get("speed_slider_fraction", 1.0), 0.0), 1.0)
+            self.speed_slider = min(max(0.0, written.get("speed_slider_fraction", 1.0)), 1.0)
         mask = written.get("standard_digital_output_mask", 0)
         wanted = written.get("standard_digital_output", 0)
         self.digital_outputs = (self.digital_outputs & ~mask) | (wanted & mask)
