@@ -17,6 +17,7 @@ from station.devices.arm.ur import UrArm
 from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController
+from station.twin.ur.registers import Registers
 
 HEADER = struct.Struct(">HB")
 
@@ -393,6 +394,8 @@ def test_the_dashboard_answers_line_by_line(bench, until):
         ("protective_stop", ["fault", "ok", "ok"], "confirm"),
         ("registers_in_use", ["ok", "warning", "ok"], "EtherNet/IP"),
         ("rtde_silent", ["ok", "fault", "ok"], "cable"),
+        ("stuck", ["ok", "fault", "ok"], "frozen"),
+        ("delayed", ["ok", "fault", "ok"], "late"),
         ("link_cut", ["fault"], "cable"),
         ("garbage", ["fault"], "cable"),
     ],
@@ -401,12 +404,46 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
     async def run():
         async with bench() as made:
             if fault is not None:
-                made.faults.set(fault)
+                made.faults.set(fault, 0.32)
                 await asyncio.sleep(0.1)
             findings = await probe_arm(made.settings())
             assert [finding.verdict for finding in findings] == verdicts
             assert word in " ".join(finding.found + finding.remedy for finding in findings)
             assert all(bool(finding.remedy) == (finding.verdict != "ok") for finding in findings)
+
+    asyncio.run(run())
+
+
+def test_the_device_check_claims_nothing_that_the_station_needs(bench, healthy, monkeypatch):
+    async def run():
+        async with bench() as made, UrArm(made.settings()) as arm, healthy(arm):
+            await arm.ready(20.0)
+            held, claimed = set(made.controller.registers._owners), []
+            claim = Registers.claim
+
+            def listening(registers, name, owner, *, fieldbus_on):
+                claimed.append(name)
+                return claim(registers, name, owner, fieldbus_on=fieldbus_on)
+
+            monkeypatch.setattr(Registers, "claim", listening)
+            findings = await probe_arm(made.settings())
+            assert [finding.verdict for finding in findings] == ["ok", "ok", "ok"]
+            assert claimed
+            assert held
+            assert not held & set(claimed)
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_the_device_check_cuts_what_a_peer_says_too_much(bench):
+    async def run():
+        async with bench() as made:
+            made.controller.serial_number = "\x1b[31m" + "9" * 3000
+            findings = await probe_arm(made.settings())
+            assert "9" * 100 in findings[0].found
+            assert len(findings[0].found) < 400
+            assert "\x1b" not in findings[0].found
 
     asyncio.run(run())
 
