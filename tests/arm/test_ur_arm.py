@@ -11,6 +11,7 @@ import psutil
 import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.messages import Reachable
 from station.devices.arm.ur import UrArm
 from station.settings.arm import ArmPoses, ArmSettings
 from station.twin.ur.script import RuntimeState
@@ -406,6 +407,35 @@ def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
             await until(lambda: arm.process_id not in {first, None})
             bench.faults.clear("stuck")
             await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("fault", ["stuck", "garbage"])
+def test_an_order_ends_when_the_state_has_grown_too_old(healthy_arm, fault):
+    """The call's own deadline is far off: only the state's age can end it before the test's limit."""
+
+    async def run():
+        async with healthy_arm(call_deadline_s=10.0) as (bench, arm):
+            bench.faults.set(fault)
+            async with asyncio.timeout(6.0):
+                with pytest.raises(ArmFault) as caught:
+                    await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
+            assert caught.value.cause is ArmCause.LINK_LOST
+            assert "Reachable" not in str(caught.value)
+            bench.faults.clear(fault)
+            await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+def test_an_order_does_not_wait_for_ever_for_its_turn(healthy_arm):
+    async def run():
+        async with healthy_arm(call_deadline_s=0.5) as (_, arm), arm._link._lock:
+            async with asyncio.timeout(5.0):
+                with pytest.raises(ArmFault, match="when asked whether the pose is reachable") as caught:
+                    await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
+            assert caught.value.cause is ArmCause.BUSY
 
     asyncio.run(run())
 
