@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import psutil
@@ -543,8 +544,8 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     asyncio.run(run())
 
 
-def test_the_process_goes_when_its_caller_is_killed(bench, until, tmp_path):
-    """Killed, not closed: nothing of the caller's own can clean up."""
+def test_the_process_goes_when_its_caller_is_killed(bench, until, tmp_path, monkeypatch):
+    """Killed, not closed: nothing of the caller's own can clean up, so the next start does."""
     caller = """
 import asyncio, sys
 from station.devices.arm.ur import UrArm
@@ -576,6 +577,15 @@ asyncio.run(main())
             process.kill()
             await process.wait()
             await until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
+            (left,) = tmp_path.glob("fruit-station-arm-*")
+            living = tmp_path / f"fruit-station-arm-{os.getppid()}-living"
+            living.mkdir()
+            monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+            async with UrArm(made.settings()) as arm:
+                await arm.ready(20.0)
+                assert not left.exists()
+                assert len(list(tmp_path.glob(f"fruit-station-arm-{os.getpid()}-*"))) == 1
+            assert list(tmp_path.iterdir()) == [living]
 
     asyncio.run(run())
 
