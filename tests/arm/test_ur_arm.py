@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -544,7 +545,14 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     asyncio.run(run())
 
 
-def test_the_process_goes_when_its_caller_is_killed(bench, until, tmp_path, monkeypatch):
+@pytest.fixture
+def short_folder():
+    """A folder for sockets, whose paths have 107 bytes at most."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+def test_the_process_goes_when_its_caller_is_killed(bench, until, short_folder, monkeypatch):
     """Killed, not closed: nothing of the caller's own can clean up, so the next start does."""
     caller = """
 import asyncio, sys
@@ -569,7 +577,7 @@ asyncio.run(main())
                 caller,
                 made.host,
                 stdout=subprocess.PIPE,
-                env=os.environ | {"TMPDIR": str(tmp_path)},
+                env=os.environ | {"TMPDIR": str(short_folder)},
             )
             assert process.stdout is not None
             line = await asyncio.wait_for(process.stdout.readline(), 30)
@@ -577,15 +585,15 @@ asyncio.run(main())
             process.kill()
             await process.wait()
             await until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
-            (left,) = tmp_path.glob("fruit-station-arm-*")
-            living = tmp_path / f"fruit-station-arm-{os.getppid()}-living"
+            (left,) = short_folder.glob("fruit-station-arm-*")
+            living = short_folder / f"fruit-station-arm-{os.getppid()}-living"
             living.mkdir()
-            monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+            monkeypatch.setattr(tempfile, "tempdir", str(short_folder))
             async with UrArm(made.settings()) as arm:
                 await arm.ready(20.0)
                 assert not left.exists()
-                assert len(list(tmp_path.glob(f"fruit-station-arm-{os.getpid()}-*"))) == 1
-            assert list(tmp_path.iterdir()) == [living]
+                assert len(list(short_folder.glob(f"fruit-station-arm-{os.getpid()}-*"))) == 1
+            assert list(short_folder.iterdir()) == [living]
 
     asyncio.run(run())
 

@@ -63,7 +63,7 @@ class ArmProcess:
         """
         sweep()
         folder = tempfile.TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-", ignore_cleanup_errors=True)
-        endpoint = f"ipc://{folder.name}/channel"
+        endpoint = f"ipc://{folder.name}/0"  # short: a socket's path has 107 bytes at most
         try:
             process = await cls._start(endpoint, host, frequency_hz)
         except BaseException as error:
