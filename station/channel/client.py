@@ -76,7 +76,8 @@ class ChannelClient:
                 await self._socket.send_multipart([envelope, name.encode(), request.model_dump_json().encode()])
                 status, body = await answer
         except TimeoutError:
-            raise DeadlineError(f"{self._peer} gave no answer to {name} within {deadline_s:g} s") from None
+            asked = request.asked or f"for {name}"
+            raise DeadlineError(f"{self._peer} gave no answer within {deadline_s:g} s when asked {asked}") from None
         finally:
             self._waiting.pop(number, None)
         if status != b"ok":

@@ -1,6 +1,7 @@
 """What goes over a channel, and what can go wrong with it."""
 
 import struct
+from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -16,6 +17,8 @@ class Message(BaseModel):
     """A request or a reply: strict, frozen, nothing unknown. Its class name is its name on the wire."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    asked: ClassVar[str] = ""
+    """The request in an operator's words, to go on after "when asked"; empty for the class name."""
 
 
 class ChannelError(StationError):

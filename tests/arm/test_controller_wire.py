@@ -1,7 +1,9 @@
 """The emulated controller met by other clients than the driver: ur-rtde's receive and I/O, and plain sockets."""
 
 import asyncio
+import contextlib
 import itertools
+import math
 import socket
 import struct
 import subprocess
@@ -12,6 +14,10 @@ import pytest
 
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
+from station.twin.clock import SteadyClock
+from station.twin.faults import FaultBoard
+from station.twin.ur.controller import UrController
+from station.twin.ur.registers import Registers
 
 HEADER = struct.Struct(">HB")
 
@@ -192,6 +198,107 @@ def test_rubbish_costs_its_sender_the_connection_and_nobody_else(bench, rubbish)
     asyncio.run(run())
 
 
+HEAD_AND_SIX = (4, 48)
+"""Bytes of a data package beside its values, and of one `actual_q`."""
+
+
+@pytest.mark.parametrize("count", [1365, 1366])
+def test_an_output_recipe_is_no_longer_than_a_package_can_be(bench, count):
+    async def run():
+        async with bench() as made:
+            client, other = await plain(made.host), await plain(made.host)
+            fits = HEAD_AND_SIX[0] + HEAD_AND_SIX[1] * count <= 65535
+            asked = struct.pack(">d", 500.0) + ",".join(["actual_q"] * count).encode()
+            assert (await client.ask("O", asked))[:1] == bytes([fits])
+            assert await client.ask("S") == bytes([fits])
+            assert await other.ask("O", struct.pack(">d", 500.0) + b"timestamp") == b"\x01DOUBLE"
+            assert await other.ask("S") == b"\x01"
+            stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
+            assert stamps == sorted(set(stamps))
+            if fits:
+                assert len(await client.hear("U")) == 1 + HEAD_AND_SIX[1] * count
+            client.close()
+            other.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("frequency_hz", [1e-320, 0.0, 0.5, -1.0, math.inf, math.nan])
+def test_an_output_frequency_is_finite_and_at_least_one(bench, frequency_hz):
+    async def run():
+        async with bench() as made:
+            client = await plain(made.host)
+            assert await client.ask("O", struct.pack(">d", frequency_hz) + b"timestamp") == b"\x00DOUBLE"
+            assert await client.ask("O", struct.pack(">d", 1.0) + b"timestamp") == b"\x01DOUBLE"
+            client.close()
+
+    asyncio.run(run())
+
+
+def test_a_client_whose_package_cannot_be_made_is_cut_and_the_others_are_served(bench, until, caplog):
+    async def run():
+        async with bench() as made:
+            client, other = await plain(made.host), await plain(made.host)
+            for one, name in ((client, b"output_int_register_3"), (other, b"timestamp")):
+                await one.ask("O", struct.pack(">d", 500.0) + name)
+                await one.ask("S")
+            made.controller.registers.output_int[3] = 1 << 40
+            await until(lambda: len(made.controller.network.connections) == 1)
+            stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
+            assert stamps == sorted(set(stamps))
+            client.close()
+            other.close()
+
+    asyncio.run(run())
+    assert "is cut" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("port", "cut"),
+    [
+        *itertools.product((29999, 30001, 30003, 30004), ("off", "link_cut", "intermittent", "stop")),
+        *itertools.product((30001, 30003), ("local_mode",)),
+    ],
+)
+def test_connections_that_are_cut_end_without_a_word(bench, until, port, cut):
+    async def run():
+        complaints = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+        async with bench() as made:
+            reader, writer = await asyncio.open_connection(made.host, port)
+            if port in {29999, 30001}:
+                await reader.readexactly(1)
+            else:
+                writer.write(HEADER.pack(5, ord("V")) + b"\x00\x02")
+                await until(lambda: bool(made.controller.network.connections or made.controller.network._programmers))
+            if cut == "stop":
+                await made.controller.stop()
+            else:
+                made.faults.set(cut, 0.1)
+            with contextlib.suppress(ConnectionError):
+                async with asyncio.timeout(5):
+                    while await reader.read(4096):
+                        pass
+            made.faults.clear()
+            writer.transport.abort()
+        await asyncio.sleep(0)
+        assert complaints == []
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(("amount", "share"), [(-1.0, 1.0), (-5.0, 1.0), (0.0, 1.0), (3.0, 0.25), (math.inf, 0.0)])
+def test_the_slow_fault_leaves_a_share_of_the_speed_whatever_its_amount(host, amount, share):
+    class Board(FaultBoard):
+        """One that lets every amount through."""
+
+        def amount(self, fault: str) -> float:
+            return amount if fault == "slow" else 0.0
+
+    controller = UrController(host, SteadyClock(), Board("arm"))
+    assert controller.speed_scaling == share
+
+
 def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):
     async def run():
         async with bench() as made:
@@ -287,6 +394,8 @@ def test_the_dashboard_answers_line_by_line(bench, until):
         ("protective_stop", ["fault", "ok", "ok"], "confirm"),
         ("registers_in_use", ["ok", "warning", "ok"], "EtherNet/IP"),
         ("rtde_silent", ["ok", "fault", "ok"], "cable"),
+        ("stuck", ["ok", "fault", "ok"], "frozen"),
+        ("delayed", ["ok", "fault", "ok"], "late"),
         ("link_cut", ["fault"], "cable"),
         ("garbage", ["fault"], "cable"),
     ],
@@ -295,12 +404,46 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
     async def run():
         async with bench() as made:
             if fault is not None:
-                made.faults.set(fault)
+                made.faults.set(fault, 0.32)
                 await asyncio.sleep(0.1)
             findings = await probe_arm(made.settings())
             assert [finding.verdict for finding in findings] == verdicts
             assert word in " ".join(finding.found + finding.remedy for finding in findings)
             assert all(bool(finding.remedy) == (finding.verdict != "ok") for finding in findings)
+
+    asyncio.run(run())
+
+
+def test_the_device_check_claims_nothing_that_the_station_needs(bench, healthy, monkeypatch):
+    async def run():
+        async with bench() as made, UrArm(made.settings()) as arm, healthy(arm):
+            await arm.ready(20.0)
+            held, claimed = set(made.controller.registers._owners), []
+            claim = Registers.claim
+
+            def listening(registers, name, owner, *, fieldbus_on):
+                claimed.append(name)
+                return claim(registers, name, owner, fieldbus_on=fieldbus_on)
+
+            monkeypatch.setattr(Registers, "claim", listening)
+            findings = await probe_arm(made.settings())
+            assert [finding.verdict for finding in findings] == ["ok", "ok", "ok"]
+            assert claimed
+            assert held
+            assert not held & set(claimed)
+            assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_the_device_check_cuts_what_a_peer_says_too_much(bench):
+    async def run():
+        async with bench() as made:
+            made.controller.serial_number = "\x1b[31m" + "9" * 3000
+            findings = await probe_arm(made.settings())
+            assert "9" * 100 in findings[0].found
+            assert len(findings[0].found) < 400
+            assert "\x1b" not in findings[0].found
 
     asyncio.run(run())
 

@@ -5,12 +5,15 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import psutil
 import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.messages import Reachable
 from station.devices.arm.ur import UrArm
 from station.settings.arm import ArmPoses, ArmSettings
 from station.twin.ur.script import RuntimeState
@@ -410,6 +413,35 @@ def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
     asyncio.run(run())
 
 
+@pytest.mark.parametrize("fault", ["stuck", "garbage"])
+def test_an_order_ends_when_the_state_has_grown_too_old(healthy_arm, fault):
+    """The call's own deadline is far off: only the state's age can end it before the test's limit."""
+
+    async def run():
+        async with healthy_arm(call_deadline_s=10.0) as (bench, arm):
+            bench.faults.set(fault)
+            async with asyncio.timeout(6.0):
+                with pytest.raises(ArmFault) as caught:
+                    await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
+            assert caught.value.cause is ArmCause.LINK_LOST
+            assert "Reachable" not in str(caught.value)
+            bench.faults.clear(fault)
+            await arm.ready(15.0)
+
+    asyncio.run(run())
+
+
+def test_an_order_does_not_wait_for_ever_for_its_turn(healthy_arm):
+    async def run():
+        async with healthy_arm(call_deadline_s=0.5) as (_, arm), arm._link._lock:
+            async with asyncio.timeout(5.0):
+                with pytest.raises(ArmFault, match="when asked whether the pose is reachable") as caught:
+                    await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
+            assert caught.value.cause is ArmCause.BUSY
+
+    asyncio.run(run())
+
+
 @pytest.mark.parametrize("fault", ["stuck", "delayed"])
 def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault):
     async def run():
@@ -513,8 +545,15 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     asyncio.run(run())
 
 
-def test_the_process_goes_when_its_caller_is_killed(bench, until, tmp_path):
-    """Killed, not closed: nothing of the caller's own can clean up."""
+@pytest.fixture
+def short_folder():
+    """A folder for sockets, whose paths have 107 bytes at most."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+def test_the_process_goes_when_its_caller_is_killed(bench, until, short_folder, monkeypatch):
+    """Killed, not closed: nothing of the caller's own can clean up, so the next start does."""
     caller = """
 import asyncio, sys
 from station.devices.arm.ur import UrArm
@@ -538,7 +577,7 @@ asyncio.run(main())
                 caller,
                 made.host,
                 stdout=subprocess.PIPE,
-                env=os.environ | {"TMPDIR": str(tmp_path)},
+                env=os.environ | {"TMPDIR": str(short_folder)},
             )
             assert process.stdout is not None
             line = await asyncio.wait_for(process.stdout.readline(), 30)
@@ -546,6 +585,15 @@ asyncio.run(main())
             process.kill()
             await process.wait()
             await until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
+            (left,) = short_folder.glob("fruit-station-arm-*")
+            living = short_folder / f"fruit-station-arm-{os.getppid()}-living"
+            living.mkdir()
+            monkeypatch.setattr(tempfile, "tempdir", str(short_folder))
+            async with UrArm(made.settings()) as arm:
+                await arm.ready(20.0)
+                assert not left.exists()
+                assert len(list(short_folder.glob(f"fruit-station-arm-{os.getpid()}-*"))) == 1
+            assert list(short_folder.iterdir()) == [living]
 
     asyncio.run(run())
 

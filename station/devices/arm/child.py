@@ -3,9 +3,12 @@
 import asyncio
 import contextlib
 import os
+import re
+import shutil
 import sys
 import tempfile
 from collections import deque
+from pathlib import Path
 from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
@@ -15,6 +18,26 @@ from station.devices.arm.faults import ArmCause, ArmFault
 ReplyT = TypeVar("ReplyT", bound=Message)
 LAST_WORDS = 5
 LONGEST_LINE = 65536
+FOLDER = "fruit-station-arm-"
+_OWNED = re.compile(rf"{FOLDER}(\d{{1,9}})-.+")
+
+
+def sweep() -> None:
+    """Remove the folders of stations that are gone: one that was killed could not clear up, nor could its process."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{FOLDER}*"):
+        owned = _OWNED.fullmatch(folder.name)
+        if owned is not None and not _alive(int(owned[1])):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        pass
+    return True
 
 
 class ArmProcess:
@@ -38,8 +61,9 @@ class ArmProcess:
         Raises:
             ArmFault: no process can be started.
         """
-        folder = tempfile.TemporaryDirectory(prefix="fruit-station-arm-", ignore_cleanup_errors=True)
-        endpoint = f"ipc://{folder.name}/channel"
+        sweep()
+        folder = tempfile.TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-", ignore_cleanup_errors=True)
+        endpoint = f"ipc://{folder.name}/0"  # short: a socket's path has 107 bytes at most
         try:
             process = await cls._start(endpoint, host, frequency_hz)
         except BaseException as error:

@@ -9,6 +9,7 @@ import contextlib
 import logging
 import time
 from collections import deque
+from typing import NoReturn
 
 from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
@@ -128,17 +129,48 @@ class ArmLink:
         """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
 
         Raises:
-            ArmFault: there is no process, or it gave no answer.
+            ArmFault: there is no process, it gave no answer, or the controller's state grew too old meanwhile.
         """
-        async with self._lock:
+        limit_s = self._settings.call_deadline_s
+        try:
+            async with asyncio.timeout(limit_s):
+                await self._lock.acquire()
+        except TimeoutError as error:
+            busy = ArmFault(ArmCause.BUSY, f"the arm's link was busy for {limit_s:g} s when asked {request.asked}")
+            raise self.fault or busy from error
+        try:
             process = self._process
             if process is None:
                 raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
             try:
-                return await process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s)
+                return await self._ask_watched(process, request)
             except ArmFault as fault:
                 await self._lose(fault)
                 raise
+        finally:
+            self._lock.release()
+
+    async def _ask_watched(self, process: ArmProcess, request: Move | Reachable | Halt) -> Outcome:
+        asking = asyncio.create_task(process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s))
+        fading = asyncio.create_task(self._until_faded(process))
+        try:
+            await asyncio.wait({asking, fading}, return_when=asyncio.FIRST_COMPLETED)
+            return asking.result() if asking.done() else fading.result()
+        finally:
+            for task in (asking, fading):
+                task.cancel()
+            await asyncio.gather(asking, fading, return_exceptions=True)
+
+    async def _until_faded(self, process: ArmProcess) -> NoReturn:
+        while True:
+            await asyncio.sleep(BEAT_S)
+            await self._heard(process)
+
+    async def _heard(self, process: ArmProcess) -> Snapshot:
+        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        if snapshot.age_s > self._settings.link_lost_after_s:
+            raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
+        return snapshot
 
     async def upload(self) -> None:
         """Bring the program to play, over the standing link or a new one; a playing one is left alone.
@@ -221,9 +253,7 @@ class ArmLink:
     async def _watch(self, process: ArmProcess) -> None:
         if not self.healthy:
             self._was_healthy = False
-        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        if snapshot.age_s > self._settings.link_lost_after_s:
-            raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
+        snapshot = await self._heard(process)
         self._failures = 0
         seen = from_state(snapshot)
         latched = self._latched.cause if self._latched is not None else None

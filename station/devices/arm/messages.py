@@ -1,5 +1,7 @@
 """What the driver and its process say to each other."""
 
+from typing import ClassVar
+
 from station.channel.messages import Message
 
 Six = tuple[float, float, float, float, float, float]
@@ -8,10 +10,13 @@ Six = tuple[float, float, float, float, float, float]
 class Watch(Message):
     """Connect to receive the controller's state."""
 
+    asked: ClassVar[str] = "to receive the controller's state"
+
 
 class Command(Message):
     """Connect to command the arm, which uploads the control program."""
 
+    asked: ClassVar[str] = "to start the control program"
     tool_centre_mm: tuple[float, float, float]
     payload_kg: float
     payload_centre_mm: tuple[float, float, float]
@@ -21,16 +26,20 @@ class Command(Message):
 class Upload(Message):
     """Send the control program again over the standing connection and see that it plays."""
 
+    asked: ClassVar[str] = "to upload the control program again"
+
 
 class Beat(Message):
     """Tell the state; the station is healthy for so long from now."""
 
+    asked: ClassVar[str] = "for the arm's state"
     healthy_for_s: float
 
 
 class Move(Message):
     """Begin a motion to joint positions, straight for the tool or straight for the joints."""
 
+    asked: ClassVar[str] = "to begin a motion"
     joints_rad: Six
     straight: bool
     speed: float
@@ -42,12 +51,14 @@ class Move(Message):
 class Reachable(Message):
     """Ask whether joint positions are within the safety limits and have a solution."""
 
+    asked: ClassVar[str] = "whether the pose is reachable"
     joints_rad: Six
 
 
 class Halt(Message):
     """Brake to rest."""
 
+    asked: ClassVar[str] = "to brake"
     deceleration_rad_s2: float
 
 

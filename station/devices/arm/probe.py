@@ -11,8 +11,18 @@ from station.settings.arm import ArmSettings
 RTDE_PORT = 30004
 SCRIPT_PORT = 30003
 PORT_DEADLINE_S = 2.5
+FRESH_S = 0.3
+"""In that time from its start on a stream must have shown its clock advance: it is neither frozen nor late."""
+STREAM_HZ = 125.0
 HEADER = struct.Struct(">HB")
-CLAIM = b"input_int_register_0,input_double_register_0"
+CLAIM = b"input_int_register_23,input_double_register_23"
+"""A fieldbus holds registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: to claim one of those, however
+shortly, would refuse a station that connects at that moment."""
+LONGEST_WORD = 120
+FROZEN = (
+    "Check the network between the station and the controller; if the pendant does not react either, "
+    "restart the controller."
+)
 
 
 async def probe_arm(settings: ArmSettings) -> list[Finding]:
@@ -25,14 +35,15 @@ async def probe_arm(settings: ArmSettings) -> list[Finding]:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
     except ArmFault as fault:
-        return [Finding("arm", fault.detail, "fault", fault.remedy)]
+        return [Finding("arm", fault.detail[: 2 * LONGEST_WORD], "fault", fault.remedy)]
     return [_controller(settings.host, facts), await _rtde(settings.host), await _script(settings.host)]
 
 
 def _controller(host: str, facts: DashboardFacts) -> Finding:
     found = (
-        f"{facts.model} at {host}, serial number {facts.serial_number}, PolyScope {facts.version}: {facts.robot_mode}, "
-        f"safety {facts.safety_status}, {'remote' if facts.remote else 'local'} control"
+        f"{_short(facts.model)} at {host}, serial number {_short(facts.serial_number)}, "
+        f"PolyScope {_short(facts.version)}: {_short(facts.robot_mode)}, "
+        f"safety {_short(facts.safety_status)}, {'remote' if facts.remote else 'local'} control"
     )
     cause = _cause(facts)
     if cause is None:
@@ -55,8 +66,14 @@ def _cause(facts: DashboardFacts) -> ArmCause | None:
     return None if facts.robot_mode == "RUNNING" else ArmCause.NOT_POWERED
 
 
+def _short(words: str) -> str:
+    """What a peer said, cut to what fits a line, without what a terminal would obey."""
+    legible = "".join(letter if letter.isprintable() else "?" for letter in words)
+    return legible if len(legible) <= LONGEST_WORD else f"{legible[: LONGEST_WORD - 1]}…"
+
+
 async def _rtde(host: str) -> Finding:
-    """Ask for protocol version 2 and for the control program's registers; the claim ends with the connection."""
+    """Ask for protocol version 2, for what a fieldbus holds and for the clock; the claim ends with the connection."""
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, RTDE_PORT)
@@ -64,6 +81,8 @@ async def _rtde(host: str) -> Finding:
                 accepted = await _exchange(reader, writer, b"V", struct.pack(">H", 2))
                 version = struct.unpack(">4I", await _exchange(reader, writer, b"v", b""))
                 kinds = await _exchange(reader, writer, b"I", CLAIM)
+                await _exchange(reader, writer, b"O", struct.pack(">d", STREAM_HZ) + b"timestamp")
+                fresh = await _advances(reader, writer)
             finally:
                 writer.transport.abort()
     except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error):
@@ -72,15 +91,35 @@ async def _rtde(host: str) -> Finding:
     found = f"RTDE at {host}:{RTDE_PORT}, controller {'.'.join(map(str, version))}"
     if accepted[:1] != b"\x01":
         return Finding("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
+    if not fresh:
+        return Finding("arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN)
     if b"IN_USE" in kinds:
-        remedy = f"If the station is running, it is the client. If not: {REMEDIES[ArmCause.REGISTERS_IN_USE]}"
+        remedy = REMEDIES[ArmCause.REGISTERS_IN_USE]
         return Finding("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
     return Finding("arm RTDE", found, "ok", "")
+
+
+async def _advances(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
+    """Start the stream and see two different timestamps of it in time."""
+    try:
+        async with asyncio.timeout(FRESH_S):
+            await _exchange(reader, writer, b"S", b"")
+            first = await _package(reader, b"U")
+            while await _package(reader, b"U") == first:
+                pass
+    except TimeoutError:
+        return False
+    return True
 
 
 async def _exchange(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, kind: bytes, payload: bytes) -> bytes:
     writer.write(HEADER.pack(HEADER.size + len(payload), kind[0]) + payload)
     await writer.drain()
+    return await _package(reader, kind)
+
+
+async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
+    """The payload of the next package of a kind."""
     while True:
         size, answered = HEADER.unpack(await reader.readexactly(HEADER.size))
         answer = await reader.readexactly(max(0, size - HEADER.size))

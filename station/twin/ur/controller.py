@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 from typing import Any, Literal
 
 from station.twin.clock import Clock
@@ -31,6 +32,8 @@ OWN_FAULTS = (
     "link_cut",
     "safety_fault",
 )
+
+log = logging.getLogger(__name__)
 
 
 def arm_faults() -> FaultBoard:
@@ -126,7 +129,7 @@ class UrController:
     @property
     def speed_scaling(self) -> float:
         """The share of the commanded speed at which the arm really moves."""
-        return self.speed_slider / (1.0 + self.faults.amount(CommonFault.SLOW))
+        return self.speed_slider / (1.0 + max(0.0, self.faults.amount(CommonFault.SLOW)))
 
     def tool_position_m(self) -> tuple[float, float, float]:
         """The tool centre point in the base's frame, m."""
@@ -146,7 +149,7 @@ class UrController:
             self.registers.write(name, value, now_s)
         written = dict(values)
         if written.get("speed_slider_mask"):
-            self.speed_slider = min(max(written.get("speed_slider_fraction", 1.0), 0.0), 1.0)
+            self.speed_slider = min(max(0.0, written.get("speed_slider_fraction", 1.0)), 1.0)
         mask = written.get("standard_digital_output_mask", 0)
         wanted = written.get("standard_digital_output", 0)
         self.digital_outputs = (self.digital_outputs & ~mask) | (wanted & mask)
@@ -185,7 +188,11 @@ class UrController:
             self.script.step(now_s)
         self._tick += 1
         for connection in list(self.network.connections):
-            connection.publish(self._tick, now_s)
+            try:
+                connection.publish(self._tick, now_s)
+            except Exception:  # one client's package must not cost the others theirs
+                log.exception("a client of the RTDE server is cut")
+                connection.cut()
 
     def _apply_faults(self, now_s: float) -> None:
         period_s = self.faults.amount(CommonFault.INTERMITTENT)

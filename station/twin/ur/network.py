@@ -118,8 +118,10 @@ class Network:
             self._programmers.add(writer)
         try:
             yield
-        except* (OSError, ValueError):
-            pass  # a peer that goes, or a line without an end, ends its own connection only
+        except* (OSError, ValueError, asyncio.CancelledError):
+            # A peer that goes, or a line without an end, ends its own connection only. Only `close` cancels, and
+            # asyncio would report the cancelled task of a connection as an error.
+            pass
         finally:
             self._streams.pop(task)
             self._programmers.discard(writer)

@@ -4,6 +4,7 @@ Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide".
 """
 
 import asyncio
+import math
 import random
 import socket
 import struct
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 PORT = 30004
 FREQUENCY_HZ = 500.0
+LEAST_FREQUENCY_HZ = 1.0
+LARGEST_PACKAGE_BYTES = 65535
+"""A package tells its size in 16 bits."""
 SLOW_READER_S = 10.0
 SEND_BUFFER_BYTES = 32768
 HEADER = struct.Struct(">HB")
@@ -35,6 +39,11 @@ class OutputRecipe:
         self._struct = struct.Struct(f">HBB{codes}")
         self._identity = identity
         self.divider = divider
+
+    @property
+    def size_bytes(self) -> int:
+        """The size of one data package, its header included."""
+        return self._struct.size
 
     def package(self) -> bytes:
         """One data package of now."""
@@ -190,10 +199,12 @@ class RtdeConnection(asyncio.Protocol):
         sources = [output(self._controller, name) for name in names]
         kinds = ["NOT_FOUND" if source is None else source[0] for source in sources]
         found = [source for source in sources if source is not None]
-        accepted = len(found) == len(names) and bool(names) and frequency_hz > 0
+        accepted = len(found) == len(names) > 0 and LEAST_FREQUENCY_HZ <= frequency_hz < math.inf
         if accepted:
-            divider = max(1, round(FREQUENCY_HZ / min(frequency_hz, FREQUENCY_HZ)))
-            self._output = OutputRecipe(1, found, divider)
+            recipe = OutputRecipe(1, found, max(1, round(FREQUENCY_HZ / frequency_hz)))
+            accepted = recipe.size_bytes <= LARGEST_PACKAGE_BYTES
+            if accepted:
+                self._output = recipe
         self._reply(OUTPUTS, bytes([accepted]) + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> None:
