@@ -1,4 +1,5 @@
 import asyncio
+import contextlib
 import json
 import struct
 import time
@@ -10,6 +11,7 @@ import pytest
 from station.devices.camera.interface import FrameFault, Leds, NoCameraError, NoFrameError
 from station.devices.camera.probe import probe_camera
 from station.devices.camera.twin import TwinCamera
+from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import GEL_FAULTS
 
 
@@ -120,6 +122,37 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
                 await until(one.camera, lambda frame: not frame.faults)
 
     asyncio.run(play())
+
+
+@pytest.mark.parametrize(
+    ("fault", "amount"), [("dirt", 1e9), ("slow", 1e300), ("lens_fogged", 1e300), ("led_dead", 1e300)]
+)
+def test_no_amount_keeps_the_camera_from_coming_back_once_it_is_cleared(bench, fault, amount):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            one.server.faults.set(fault, amount)
+            with contextlib.suppress(NoFrameError):
+                await fresh(one.camera, 0.5)
+            one.server.faults.clear()
+            await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+
+
+def test_a_frame_that_cannot_be_drawn_is_logged_once_and_the_next_one_comes(bench, monkeypatch, caplog):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            with monkeypatch.context() as broken:
+                broken.setattr(DigitSensor, "frame", lambda *_: 1 / 0)
+                with pytest.raises(NoFrameError):
+                    await fresh(one.camera, 0.3)
+            await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+    [record] = [record for record in caplog.records if record.name == "station.twin.digit.server"]
+    assert "could not draw" in record.message
 
 
 def test_a_delayed_frame_is_not_fresh(bench):
