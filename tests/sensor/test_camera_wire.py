@@ -219,8 +219,13 @@ def test_nobody_there_is_said_with_a_remedy(twin_settings):
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        (b"{", "no JSON"),
+        (b"{", "no JSON that can be read"),
+        (b"[" * 4000, "no JSON that can be read"),
         (b"[1]", "JSON object"),
+        (
+            b'{"kind": "frame", "height": 640, "width": 480, "sequence": 1, "age_s": 1' + b"0" * 400 + b"}",
+            "age_s is 1000.*less than 1e",
+        ),
         (b'{"kind": "cake"}', "'cake' came"),
         (b'{"kind": "frame", "height": 640, "width": 480, "sequence": 1, "age_s": -1}', "age_s is -1"),
         (b'{"kind": "frame", "height": 640, "width": true, "sequence": 1, "age_s": 0}', "width is True"),
@@ -255,6 +260,20 @@ def test_a_bad_request_is_refused_with_words(bench):
             assert "at most" in json.loads(await reader.readexactly(length))["message"]
             writer.close()
             await writer.wait_closed()
+
+    asyncio.run(play())
+
+
+def test_a_request_nested_too_deep_is_refused_and_the_camera_goes_on(bench):
+    async def play():
+        async with bench() as one:
+            reader, writer = await asyncio.open_connection("127.0.0.1", one.server.port)
+            writer.write(struct.pack(">I", 4000) + b"[" * 4000)
+            (length,) = struct.unpack(">I", await reader.readexactly(4))
+            assert "nested too deep" in json.loads(await reader.readexactly(length))["message"]
+            writer.close()
+            await writer.wait_closed()
+            await one.camera.open()
 
     asyncio.run(play())
 

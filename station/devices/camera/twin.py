@@ -33,6 +33,7 @@ _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 _LONGEST_SIDE = 4096
 _SILENCE_S = 2.0
+_OLDEST_S = 1e6
 _RETRY_S = 0.1
 _SIZE = (640, 480)
 _FRAMES_PER_S = 30.0
@@ -191,8 +192,8 @@ async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
     text = await reader.readexactly(length)
     try:
         header = json.loads(text)
-    except ValueError as error:
-        raise CameraProtocolError(f"a header is no JSON: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise CameraProtocolError(f"a header is no JSON that can be read: {error}") from error
     if not isinstance(header, dict):
         raise CameraProtocolError("a header must be a JSON object")
     return header
@@ -203,8 +204,8 @@ async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> t
         raise CameraProtocolError(f"a frame was expected, {header.get('kind')!r} came: {header.get('message')}")
     height, width, sequence = (_whole(header, key) for key in ("height", "width", "sequence"))
     age_s = header.get("age_s")
-    if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < math.inf:
-        raise CameraProtocolError(f"age_s is {age_s!r}; expected seconds, 0 or more")
+    if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < _OLDEST_S:
+        raise CameraProtocolError(f"age_s is {str(age_s):.40}; expected seconds, from 0 to less than {_OLDEST_S:g}")
     if not (0 < height <= _LONGEST_SIDE and 0 < width <= _LONGEST_SIDE):
         raise CameraProtocolError(f"a frame of {width}x{height} pixels; at most {_LONGEST_SIDE} a side are expected")
     if header.get("bytes") != height * width * 3:
