@@ -1,6 +1,7 @@
 import asyncio
 import contextlib
 import json
+import re
 import struct
 import time
 
@@ -8,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from station.devices.camera.interface import FrameFault, Leds, NoCameraError, NoFrameError
+from station.devices.camera.interface import CameraDescription, Frame, FrameFault, Leds, NoCameraError, NoFrameError
 from station.devices.camera.probe import probe_camera
 from station.devices.camera.twin import TwinCamera
 from station.twin.digit.sensor import DigitSensor
@@ -115,6 +116,8 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
             with pytest.raises(NoFrameError, match=r"camera twin at 127\.0\.0\.1:\d+: no frame newer") as caught:
                 await fresh(one.camera, 0.5)
             assert time.monotonic() - began_s < 5
+            assert re.search(r"the newest is \d\.\d s old", str(caught.value))
+            assert "Error" not in str(caught.value)
             if fault == "garbage":
                 assert "header" in str(caught.value)
             one.server.faults.clear()
@@ -276,6 +279,43 @@ def test_a_request_nested_too_deep_is_refused_and_the_camera_goes_on(bench):
             await one.camera.open()
 
     asyncio.run(play())
+
+
+@pytest.mark.parametrize(("hold_s", "said"), [(0.0, "the connection was closed"), (30.0, "nothing came for 0.2 s")])
+def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, monkeypatch, hold_s, said):
+    monkeypatch.setattr("station.devices.camera.twin._SILENCE_S", 0.2)
+
+    async def answer(reader, writer):
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(hold_s):
+                await reader.read()
+        writer.close()
+
+    async def play():
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server:
+            camera = TwinCamera(twin_settings(server.sockets[0].getsockname()[1], open_deadline_s=0.5))
+            with pytest.raises(NoCameraError, match=f"within 0.5 s; {said}. Start it"):
+                await camera.open()
+
+    asyncio.run(play())
+
+
+def test_the_probe_counts_the_time_between_frames(monkeypatch, twin_settings):
+    class Steady:
+        description = CameraDescription("steady", 480, 640, 0.03, 30.0)
+        frames = iter([Frame(np.zeros((1, 1, 3), np.uint8), number, number / 30) for number in range(1, 99)])
+
+        async def open(self): ...
+
+        async def close(self): ...
+
+        async def frame(self, *_):
+            return next(self.frames)
+
+    monkeypatch.setattr("station.devices.camera.probe.camera_from", lambda _: Steady())
+    [finding] = asyncio.run(probe_camera(twin_settings(1)))
+    assert "30.0 frames/s" in finding.found
 
 
 def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings):

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import json
 import math
+import os
 import struct
 import time
 from typing import Any
@@ -106,7 +107,7 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the light could not be set ({error!r})") from error
+            raise CameraError(f"camera twin at {self._where}: the light could not be set; {_words(error)}") from error
         if answer.get("kind") != "leds":
             raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
 
@@ -136,7 +137,7 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the truth could not be read ({error!r})") from error
+            raise CameraError(f"camera twin at {self._where}: the truth could not be read; {_words(error)}") from error
         return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
 
     async def close(self) -> None:
@@ -153,7 +154,7 @@ class TwinCamera:
             except CameraProtocolError as error:
                 self._feed.trouble = str(error)
             except (OSError, EOFError, TimeoutError) as error:
-                self._feed.trouble = f"the connection failed ({error!r})"
+                self._feed.trouble = _words(error)
             await asyncio.sleep(_RETRY_S)
 
     async def _listen(self) -> None:
@@ -177,6 +178,16 @@ class TwinCamera:
         header = json.dumps(request).encode()
         writer.write(_LENGTH.pack(len(header)) + header)
         return reader, writer
+
+
+def _words(error: OSError | EOFError) -> str:
+    """What became of the connection."""
+    if isinstance(error, EOFError):
+        return "the connection was closed"
+    if isinstance(error, TimeoutError):
+        return f"nothing came for {_SILENCE_S:g} s"
+    known = error.errno is not None and error.errno > 0
+    return f"the connection failed: {os.strerror(error.errno) if known else error}"
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
