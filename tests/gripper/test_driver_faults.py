@@ -1,6 +1,9 @@
 """The station's driver over each wire, with everything wrong that can be."""
 
 import asyncio
+import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -146,7 +149,7 @@ def test_what_answers_but_does_not_do_it_is_given_up_in_time(on_wire: OnWire, fa
     async def scenario(rig: Any) -> None:
         rig.faults.set(fault, amount)
         began_s = time.monotonic()
-        with pytest.raises(GripperTimeoutError, match="did not end in time"):
+        with pytest.raises(GripperTimeoutError, match=r"did not end in time: it stands at count \d+, [a-z ]+; look"):
             await rig.driver.move_to_width(45.0, 100.0, 20.0)
         assert time.monotonic() - began_s < 5.0
         rig.faults.clear()
@@ -344,3 +347,23 @@ def test_a_value_that_a_variable_cannot_have_is_refused(lie: str):
         await asyncio.sleep(0.01)
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("answers", [False, True])
+def test_devices_check_of_a_dead_gripper_prints_the_stations_own_line_alone(tmp_path, answers):
+    with socket.socket() as dead:
+        dead.bind(("127.0.0.1", 0))
+        if answers:
+            dead.listen()
+        wire = f"{{line: tcp, host: 127.0.0.1, port: {dead.getsockname()[1]}}}"
+        configuration = tmp_path / "station.yaml"
+        configuration.write_text(
+            "arm: {host: 127.0.0.9}\ncamera: {open_deadline_s: 0.2, twin: {port: 1}}\n"
+            f"gripper: {{driver: modbus_rtu, answer_timeout_s: 0.2, modbus_rtu: {wire}}}\n"
+        )
+        command = [sys.executable, "-m", "station", "devices", "check", "--config", str(configuration)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 1
+    assert "Modbus RTU unit 9" in done.stdout
+    [line] = done.stderr.splitlines()
+    assert "not usable" in line

@@ -298,3 +298,13 @@ class Registers(RuleBasedStateMachine):
 
 Registers.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
 TestRegisters = Registers.TestCase
+
+
+@pytest.mark.parametrize("amount", [-1.0, -2.0, 1e300, float("inf"), float("nan")])
+@pytest.mark.parametrize("fault", [CommonFault.SLOW, CommonFault.WRONG])
+def test_no_amount_stops_the_model(twin: Twin, monkeypatch: pytest.MonkeyPatch, fault: CommonFault, amount: float):
+    with monkeypatch.context() as mad:
+        mad.setattr(twin.faults, "amount", lambda one: amount if one == fault else 0.0)
+        twin.gripper.write(CLOSE)
+        twin.after(1.0)
+    assert twin.after(10.0).position == 230

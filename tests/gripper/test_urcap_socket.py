@@ -38,6 +38,7 @@ async def until_said(rig: Any, line: str, reply: bytes) -> None:
         ("GET XYZ\n", b"?\n"),
         ("SET POS 256\n", b"?\n"),
         ("SET POS -1\n", b"?\n"),
+        (f"SET POS {'1' * 5000}\n", b"?\n"),
         ("SET ACT 2\n", b"?\n"),
         ("SET POS\n", b"?\n"),
         ("SET\n", b"?\n"),

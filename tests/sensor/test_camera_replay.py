@@ -44,7 +44,7 @@ def test_as_fast_as_asked_each_image_comes_once_in_natural_order_with_its_width(
             assert levels(frames)[:11] == list(range(11))
             assert [frame.width_mm for frame in frames] == [40 - number for number in range(12)]
             assert camera.description.height_px == 64
-            with pytest.raises(NoFrameError, match="the recording has ended"):
+            with pytest.raises(NoFrameError, match=r"the recording has ended\. Start again"):
                 await camera.frame(time.monotonic(), 1.0)
             await camera.close()
 

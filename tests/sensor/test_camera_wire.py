@@ -1,5 +1,7 @@
 import asyncio
+import contextlib
 import json
+import re
 import struct
 import time
 
@@ -7,9 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from station.devices.camera.interface import FrameFault, Leds, NoCameraError, NoFrameError
+from station.devices.camera.interface import CameraDescription, Frame, FrameFault, Leds, NoCameraError, NoFrameError
 from station.devices.camera.probe import probe_camera
 from station.devices.camera.twin import TwinCamera
+from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import GEL_FAULTS
 
 
@@ -113,6 +116,8 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
             with pytest.raises(NoFrameError, match=r"camera twin at 127\.0\.0\.1:\d+: no frame newer") as caught:
                 await fresh(one.camera, 0.5)
             assert time.monotonic() - began_s < 5
+            assert re.search(r"the newest is \d\.\d s old", str(caught.value))
+            assert "Error" not in str(caught.value)
             if fault == "garbage":
                 assert "header" in str(caught.value)
             one.server.faults.clear()
@@ -120,6 +125,37 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
                 await until(one.camera, lambda frame: not frame.faults)
 
     asyncio.run(play())
+
+
+@pytest.mark.parametrize(
+    ("fault", "amount"), [("dirt", 1e9), ("slow", 1e300), ("lens_fogged", 1e300), ("led_dead", 1e300)]
+)
+def test_no_amount_keeps_the_camera_from_coming_back_once_it_is_cleared(bench, fault, amount):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            one.server.faults.set(fault, amount)
+            with contextlib.suppress(NoFrameError):
+                await fresh(one.camera, 0.5)
+            one.server.faults.clear()
+            await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+
+
+def test_a_frame_that_cannot_be_drawn_is_logged_once_and_the_next_one_comes(bench, monkeypatch, caplog):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            with monkeypatch.context() as broken:
+                broken.setattr(DigitSensor, "frame", lambda *_: 1 / 0)
+                with pytest.raises(NoFrameError):
+                    await fresh(one.camera, 0.3)
+            await until(one.camera, lambda frame: not frame.faults)
+
+    asyncio.run(play())
+    [record] = [record for record in caplog.records if record.name == "station.twin.digit.server"]
+    assert "could not draw" in record.message
 
 
 def test_a_delayed_frame_is_not_fresh(bench):
@@ -186,8 +222,13 @@ def test_nobody_there_is_said_with_a_remedy(twin_settings):
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        (b"{", "no JSON"),
+        (b"{", "no JSON that can be read"),
+        (b"[" * 4000, "no JSON that can be read"),
         (b"[1]", "JSON object"),
+        (
+            b'{"kind": "frame", "height": 640, "width": 480, "sequence": 1, "age_s": 1' + b"0" * 400 + b"}",
+            "age_s is 1000.*less than 1e",
+        ),
         (b'{"kind": "cake"}', "'cake' came"),
         (b'{"kind": "frame", "height": 640, "width": 480, "sequence": 1, "age_s": -1}', "age_s is -1"),
         (b'{"kind": "frame", "height": 640, "width": true, "sequence": 1, "age_s": 0}', "width is True"),
@@ -224,6 +265,57 @@ def test_a_bad_request_is_refused_with_words(bench):
             await writer.wait_closed()
 
     asyncio.run(play())
+
+
+def test_a_request_nested_too_deep_is_refused_and_the_camera_goes_on(bench):
+    async def play():
+        async with bench() as one:
+            reader, writer = await asyncio.open_connection("127.0.0.1", one.server.port)
+            writer.write(struct.pack(">I", 4000) + b"[" * 4000)
+            (length,) = struct.unpack(">I", await reader.readexactly(4))
+            assert "nested too deep" in json.loads(await reader.readexactly(length))["message"]
+            writer.close()
+            await writer.wait_closed()
+            await one.camera.open()
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize(("hold_s", "said"), [(0.0, "the connection was closed"), (30.0, "nothing came for 0.2 s")])
+def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, monkeypatch, hold_s, said):
+    monkeypatch.setattr("station.devices.camera.twin._SILENCE_S", 0.2)
+
+    async def answer(reader, writer):
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(hold_s):
+                await reader.read()
+        writer.close()
+
+    async def play():
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server:
+            camera = TwinCamera(twin_settings(server.sockets[0].getsockname()[1], open_deadline_s=0.5))
+            with pytest.raises(NoCameraError, match=f"within 0.5 s; {said}. Start it"):
+                await camera.open()
+
+    asyncio.run(play())
+
+
+def test_the_probe_counts_the_time_between_frames(monkeypatch, twin_settings):
+    class Steady:
+        description = CameraDescription("steady", 480, 640, 0.03, 30.0)
+        frames = iter([Frame(np.zeros((1, 1, 3), np.uint8), number, number / 30) for number in range(1, 99)])
+
+        async def open(self): ...
+
+        async def close(self): ...
+
+        async def frame(self, *_):
+            return next(self.frames)
+
+    monkeypatch.setattr("station.devices.camera.probe.camera_from", lambda _: Steady())
+    [finding] = asyncio.run(probe_camera(twin_settings(1)))
+    assert "30.0 frames/s" in finding.found
 
 
 def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings):

@@ -13,10 +13,11 @@ class FrameFeed:
     Args:
         name: the camera's, for messages.
         health: judges the frames.
+        remedy: what to do where no frame comes.
     """
 
-    def __init__(self, name: str, health: FrameHealth) -> None:
-        self._name, self._health = name, health
+    def __init__(self, name: str, health: FrameHealth, remedy: str = "Check its cable and its light") -> None:
+        self._name, self._health, self._remedy = name, health, remedy
         self._changed = asyncio.Event()
         self._image: Image | None = None
         self._before: Image | None = None
@@ -25,7 +26,7 @@ class FrameFeed:
         self._sequence = 0
         self._given: Frame | None = None
         self.trouble = "it has sent nothing yet"
-        """What the driver last had to struggle with; said where no frame comes."""
+        """What the driver has had to struggle with since the last frame; said where no frame comes."""
 
     def publish(
         self, image: Image, captured_s: float, width_mm: float | None = None, sequence: int | None = None
@@ -41,6 +42,7 @@ class FrameFeed:
         self._before, self._image = self._image, image
         self._captured_s, self._width_mm = captured_s, width_mm
         self._sequence = self._sequence + 1 if sequence is None else sequence
+        self.trouble = ""
         self._changed.set()
 
     async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:
@@ -60,12 +62,16 @@ class FrameFeed:
                     await self._changed.wait()
         except TimeoutError:
             raise NoFrameError(
-                f"camera {self._name}: no frame newer than asked for within {deadline_s} s; {self.trouble}. "
-                "Check its cable and its light, then `station devices check`"
+                f"camera {self._name}: no frame newer than asked for within {deadline_s:g} s; {self._why()}. "
+                f"{self._remedy}, then `station devices check`"
             ) from None
         if self._given is None or self._given.sequence != self._sequence:
             self._given = self._judged(image)
         return self._given
+
+    def _why(self) -> str:
+        newest = f"the newest is {time.monotonic() - self._captured_s:.1f} s old" if self._image is not None else ""
+        return "; ".join(words for words in (newest, self.trouble) if words)
 
     def _judged(self, image: Image) -> Frame:
         faults: frozenset[FrameFault] = self._health.judge(image, self._before, time.monotonic() - self._captured_s)

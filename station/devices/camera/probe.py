@@ -31,9 +31,7 @@ async def probe_camera(settings: CameraSettings) -> list[Finding]:
     camera = camera_from(settings)
     try:
         await camera.open()
-        began_s = time.monotonic()
-        frames = await _some_frames(camera)
-        return [_judged(camera, frames, time.monotonic() - began_s)]
+        return [_judged(camera, await _some_frames(camera))]
     except CameraError as error:
         return [Finding("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
     finally:
@@ -48,9 +46,9 @@ async def _some_frames(camera: Camera) -> list[Frame]:
     return frames
 
 
-def _judged(camera: Camera, frames: list[Frame], taken_s: float) -> Finding:
+def _judged(camera: Camera, frames: list[Frame]) -> Finding:
     description = camera.description
-    rate = len(frames) / taken_s
+    rate = (len(frames) - 1) / (frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
     found = f"{description.name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
     if faults:

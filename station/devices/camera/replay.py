@@ -18,6 +18,7 @@ from station.settings.camera import CameraSettings
 
 _IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
 _ENDED = "the recording has ended"
+_REMEDY = "Start again to play it from its beginning, or name a longer one in camera.replay.source"
 
 
 class ReplayCamera:
@@ -62,7 +63,7 @@ class ReplayCamera:
             raise NoCameraError(f"replay: {self._source} holds no image; expected a folder of images or a video")
         self._size = (first[1].shape[0], first[1].shape[1])
         health = FrameHealth(self._settings.oldest_s, self._size)
-        self._feed = FrameFeed(f"replay of {self._source}", health)
+        self._feed = FrameFeed(f"replay of {self._source}", health, _REMEDY)
         self._publish(*first)
         if self._settings.replay.frames_per_s:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")

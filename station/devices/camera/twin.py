@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import json
 import math
+import os
 import struct
 import time
 from typing import Any
@@ -33,6 +34,7 @@ _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 _LONGEST_SIDE = 4096
 _SILENCE_S = 2.0
+_OLDEST_S = 1e6
 _RETRY_S = 0.1
 _SIZE = (640, 480)
 _FRAMES_PER_S = 30.0
@@ -105,7 +107,7 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the light could not be set ({error!r})") from error
+            raise CameraError(f"camera twin at {self._where}: the light could not be set; {_words(error)}") from error
         if answer.get("kind") != "leds":
             raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
 
@@ -135,7 +137,7 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the truth could not be read ({error!r})") from error
+            raise CameraError(f"camera twin at {self._where}: the truth could not be read; {_words(error)}") from error
         return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
 
     async def close(self) -> None:
@@ -152,7 +154,7 @@ class TwinCamera:
             except CameraProtocolError as error:
                 self._feed.trouble = str(error)
             except (OSError, EOFError, TimeoutError) as error:
-                self._feed.trouble = f"the connection failed ({error!r})"
+                self._feed.trouble = _words(error)
             await asyncio.sleep(_RETRY_S)
 
     async def _listen(self) -> None:
@@ -178,6 +180,16 @@ class TwinCamera:
         return reader, writer
 
 
+def _words(error: OSError | EOFError) -> str:
+    """What became of the connection."""
+    if isinstance(error, EOFError):
+        return "the connection was closed"
+    if isinstance(error, TimeoutError):
+        return f"nothing came for {_SILENCE_S:g} s"
+    known = error.errno is not None and error.errno > 0
+    return f"the connection failed: {os.strerror(error.errno) if known else error}"
+
+
 async def _close(writer: asyncio.StreamWriter) -> None:
     writer.close()
     with contextlib.suppress(OSError):
@@ -191,8 +203,8 @@ async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
     text = await reader.readexactly(length)
     try:
         header = json.loads(text)
-    except ValueError as error:
-        raise CameraProtocolError(f"a header is no JSON: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise CameraProtocolError(f"a header is no JSON that can be read: {error}") from error
     if not isinstance(header, dict):
         raise CameraProtocolError("a header must be a JSON object")
     return header
@@ -203,8 +215,8 @@ async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> t
         raise CameraProtocolError(f"a frame was expected, {header.get('kind')!r} came: {header.get('message')}")
     height, width, sequence = (_whole(header, key) for key in ("height", "width", "sequence"))
     age_s = header.get("age_s")
-    if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < math.inf:
-        raise CameraProtocolError(f"age_s is {age_s!r}; expected seconds, 0 or more")
+    if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < _OLDEST_S:
+        raise CameraProtocolError(f"age_s is {str(age_s):.40}; expected seconds, from 0 to less than {_OLDEST_S:g}")
     if not (0 < height <= _LONGEST_SIDE and 0 < width <= _LONGEST_SIDE):
         raise CameraProtocolError(f"a frame of {width}x{height} pixels; at most {_LONGEST_SIDE} a side are expected")
     if header.get("bytes") != height * width * 3:

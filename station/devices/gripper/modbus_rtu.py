@@ -4,6 +4,7 @@ Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on h
 """
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from typing import NoReturn
 
@@ -27,6 +28,10 @@ _ACTIVATE, _GO_TO, _RELEASE_OPENS = 0x0100, 0x0800, 0x2000
 _AMPERE_PER_COUNT = 0.01
 
 _Client = AsyncModbusTcpClient | AsyncModbusSerialClient
+
+# Every failure is told by an error of the gripper. Unhandled, pymodbus' own lines would go to stderr; a program that
+# sets up logging still gets them.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 class ModbusRtuLink:

@@ -21,7 +21,8 @@ async def probe_gripper(settings: GripperSettings) -> list[Finding]:
     try:
         reading = await gripper.read()
     except GripperError as error:
-        return [Finding("gripper", f"{place}: {error.cause}", "fault", error.remedy)]
+        found = error.cause if place in error.cause else f"{place}: {error.cause}"
+        return [Finding("gripper", found, "fault", error.remedy)]
     finally:
         await gripper.close()
     return [_judged(reading, place, settings.calibration)]

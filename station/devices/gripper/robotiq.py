@@ -44,6 +44,13 @@ _OBJECT_STATES = {
     2: ObjectState.CONTACT_CLOSING,
     3: ObjectState.AT_POSITION,
 }
+_STATE_WORDS = {
+    ObjectState.IDLE: "with no motion asked for",
+    ObjectState.MOVING: "and still says that it moves",
+    ObjectState.CONTACT_OPENING: "stopped by something outside the fingers",
+    ObjectState.CONTACT_CLOSING: "stopped by something between the fingers",
+    ObjectState.AT_POSITION: "and says that this is where it was sent",
+}
 
 
 class Robotiq2F85:
@@ -216,7 +223,7 @@ class Robotiq2F85:
     @staticmethod
     async def _wait_until(deadline_s: float, what: str, status: Status | None) -> None:
         if time.monotonic() > deadline_s:
-            seen = f": it reads {status}" if status else ""
+            seen = f": {_in_words(status)}" if status else ""
             raise GripperTimeoutError(
                 f"{what} did not end in time{seen}",
                 "look for what holds the fingers, and for a second master that commands the gripper",
@@ -245,6 +252,11 @@ class Robotiq2F85:
             current_a=status.current_a,
             at_s=at_s,
         )
+
+
+def _in_words(status: Status) -> str:
+    state = _OBJECT_STATES[status.object_] if status.go_to else ObjectState.IDLE
+    return f"it stands at count {status.position}, {_STATE_WORDS[state]}"
 
 
 def make_gripper(settings: GripperSettings) -> Robotiq2F85:

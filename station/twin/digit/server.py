@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,12 @@ _REMEMBERED = 90
 _BRIGHTEST = 15
 _DEAD: dict[int, Colour] = {1: "red", 2: "green", 3: "blue"}
 _SLOWEST = 10.0
+_LONGEST_PERIOD_S = 60.0
+_SLICE_S = 0.05
+"""How soon a fault that was cleared lets go of the drawing."""
+_MOST_CRUMBS = 200
 _REQUEST_DEADLINE_S = 5.0
+_LOG = logging.getLogger(__name__)
 
 
 def digit_faults() -> FaultBoard:
@@ -31,8 +37,8 @@ def digit_faults() -> FaultBoard:
 
     `off` cuts every connection at once; `stuck` sends the same pixels under new sequence numbers; `garbage` sends
     random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where
-    it is 1 or less); `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
-    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs), `lens_fogged` (amount: 0 to 1) and
+    it is 1 or less; a frame a minute comes at least); `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
+    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs, 200 at most), `lens_fogged` (amount: 0 to 1) and
     `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
@@ -121,22 +127,33 @@ class DigitCameraServer:
     async def _draw_for_ever(self) -> None:
         loop = asyncio.get_running_loop()
         due_s = loop.time()
+        failing = False
         while True:
             await self._watching.wait()
-            captured = await self._capture()
-            async with self._fresh:
-                self._frames[captured.sequence] = captured
-                while len(self._frames) > _REMEMBERED:
-                    self._frames.popitem(last=False)
-                self._fresh.notify_all()
-            due_s = max(due_s + self._period_s(), loop.time())
-            await asyncio.sleep(due_s - loop.time())
+            try:
+                await self._draw()
+                failing = False
+            except Exception:
+                if not failing:
+                    _LOG.exception("the twin's camera could not draw frame %d; it goes on", self._sequence)
+                failing = True
+            while (wait_s := due_s + self._period_s() - loop.time()) > 0:
+                await asyncio.sleep(min(wait_s, _SLICE_S))
+            due_s = max(due_s + self._period_s(), loop.time() - 1.0 / FRAMES_PER_S)
+
+    async def _draw(self) -> None:
+        captured = await self._capture()
+        async with self._fresh:
+            self._frames[captured.sequence] = captured
+            while len(self._frames) > _REMEMBERED:
+                self._frames.popitem(last=False)
+            self._fresh.notify_all()
 
     def _period_s(self) -> float:
         if not self.faults.active(CommonFault.SLOW):
             return 1.0 / FRAMES_PER_S
         amount = self.faults.amount(CommonFault.SLOW)
-        return (amount if amount > 1.0 else _SLOWEST) / FRAMES_PER_S
+        return min(_LONGEST_PERIOD_S, (amount if amount > 1.0 else _SLOWEST) / FRAMES_PER_S)
 
     async def _capture(self) -> _Captured:
         self._sequence += 1
@@ -157,10 +174,12 @@ class DigitCameraServer:
         faults = self.faults
         red, green, blue = self._leds
         return Condition(
-            dead_led=_DEAD.get(round(faults.amount("led_dead")), "red") if faults.active("led_dead") else None,
+            dead_led=_DEAD.get(round(_within(0.0, faults.amount("led_dead"), 9.0)), "red")
+            if faults.active("led_dead")
+            else None,
             torn=faults.active("gel_torn"),
-            fog=min(1.0, max(0.0, faults.amount("lens_fogged"))),
-            dirt=max(0, round(faults.amount("dirt"))),
+            fog=_within(0.0, faults.amount("lens_fogged"), 1.0),
+            dirt=round(_within(0.0, faults.amount("dirt"), _MOST_CRUMBS)),
             light=(blue / _BRIGHTEST, green / _BRIGHTEST, red / _BRIGHTEST),
         )
 
@@ -280,3 +299,8 @@ class DigitCameraServer:
             height=mask.shape[0],
             width=mask.shape[1],
         )
+
+
+def _within(low: float, amount: float, high: float) -> float:
+    """An amount inside its limits; the low one where it is no number."""
+    return min(high, max(low, amount))

@@ -46,7 +46,11 @@ async def read_request(reader: asyncio.StreamReader) -> dict[str, Any]:
     (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
     if length > _LONGEST_HEADER:
         raise ValueError(f"a header of {length} bytes; at most {_LONGEST_HEADER} are taken")
-    request = json.loads(await reader.readexactly(length))
+    text = await reader.readexactly(length)
+    try:
+        request = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("a header is nested too deep") from error
     if not isinstance(request, dict):
         raise ValueError("a header must be a JSON object")  # noqa: TRY004 (one error for all that is no request)
     return request

@@ -9,8 +9,8 @@ The common faults mean here, with the board's amount:
 | stuck | commands are acknowledged, nothing moves and no register changes | none |
 | garbage | every answer is bytes of no protocol | none |
 | wrong | position and echo of the request read too high | counts |
-| slow | every motion at its speed divided by (1 + amount) | times |
-| delayed | every answer comes late | s |
+| slow | every motion at its speed divided by (1 + amount) | times, at most 1000 |
+| delayed | every answer comes late | s, at most 60 |
 
 Codes: Robotiq 2F-85 manual, fault status register (gFLT).
 """

@@ -11,6 +11,7 @@ from station.twin.robotiq.faults import gone
 GARBAGE = bytes.fromhex("ff00a55a0df3c3e1fe0a")
 """What `garbage` answers: neither text nor a frame with a right CRC."""
 _WATCH_S = 0.02
+_LATEST_S = 60.0
 
 Session = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -22,7 +23,7 @@ async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
         answer: the bytes as they should be.
         faults: the gripper's board.
     """
-    await asyncio.sleep(faults.amount(CommonFault.DELAYED))
+    await asyncio.sleep(min(_LATEST_S, max(0.0, faults.amount(CommonFault.DELAYED))))
     return GARBAGE if faults.active(CommonFault.GARBAGE) else answer
 
 

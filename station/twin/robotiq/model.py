@@ -21,6 +21,7 @@ from station.twin.robotiq.fingers import (
 from station.twin.robotiq.load import Load, NoLoad
 from station.twin.robotiq.registers import COMMAND_ADDRESS, REGISTERS, STATUS_ADDRESS, Command, Status
 
+_SLOWEST = 1000.0
 _PROBE_MM = 0.1
 """The load is asked at least this often along the travel."""
 _CONTACT_MM = 0.001
@@ -86,7 +87,7 @@ class RobotiqGripper:
     def status(self) -> Status:
         """The status registers as they read now."""
         self._advance(self.clock.now_s())
-        offset = round(self.faults.amount(CommonFault.WRONG))
+        offset = round(min(255.0, max(-255.0, self.faults.amount(CommonFault.WRONG))))
         return Status(
             activate=self._command.activate,
             go_to=self._command.go_to,
@@ -221,7 +222,7 @@ class RobotiqGripper:
 
     def _travel(self, leg: _Leg, duration_s: float) -> float:
         """Move along a leg and return the time left, 0 where it is still under way; contact ends a leg."""
-        speed_mm_s = leg.speed_mm_s / (1.0 + self.faults.amount(CommonFault.SLOW))
+        speed_mm_s = leg.speed_mm_s / (1.0 + min(_SLOWEST, max(0.0, self.faults.amount(CommonFault.SLOW))))
         start_mm = self._opening_mm
         distance_mm = abs(leg.target_mm - start_mm)
         reach_mm = speed_mm_s * duration_s

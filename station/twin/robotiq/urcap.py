@@ -25,6 +25,7 @@ _WRITABLE = {
 }
 _READ_ONLY = {"STA": "state", "PRE": "echo", "OBJ": "object_", "FLT": "fault", "POS": "position"}
 _LARGEST = {field.name: 1 if field.type is bool else 255 for field in fields(Command)}
+_LONGEST_NUMBER = 3
 _NONSENSE = b"?\n"
 
 
@@ -78,7 +79,7 @@ class UrcapServer:
         changes: dict[str, bool | int] = {}
         for name, text in zip(words[::2], words[1::2], strict=False):
             field = _WRITABLE.get(name)
-            if field is None or not text.isdecimal() or int(text) > _LARGEST[field]:
+            if field is None or not text.isdecimal() or len(text) > _LONGEST_NUMBER or int(text) > _LARGEST[field]:
                 return _NONSENSE
             changes[field] = bool(int(text)) if _LARGEST[field] == 1 else int(text)
         if not changes or len(words) % 2:
