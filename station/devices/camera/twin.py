@@ -186,8 +186,8 @@ def _words(error: OSError | EOFError) -> str:
         return "the connection was closed"
     if isinstance(error, TimeoutError):
         return f"nothing came for {_SILENCE_S:g} s"
-    known = error.errno is not None and error.errno > 0
-    return f"the connection failed: {os.strerror(error.errno) if known else error}"
+    number = error.errno or 0
+    return f"the connection failed: {os.strerror(number) if number > 0 else error}"
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
@@ -216,7 +216,7 @@ async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> t
     height, width, sequence = (_whole(header, key) for key in ("height", "width", "sequence"))
     age_s = header.get("age_s")
     if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < _OLDEST_S:
-        raise CameraProtocolError(f"age_s is {str(age_s):.40}; expected seconds, from 0 to less than {_OLDEST_S:g}")
+        raise CameraProtocolError(f"age_s is {age_s!s:.40}; expected seconds, from 0 to less than {_OLDEST_S:g}")
     if not (0 < height <= _LONGEST_SIDE and 0 < width <= _LONGEST_SIDE):
         raise CameraProtocolError(f"a frame of {width}x{height} pixels; at most {_LONGEST_SIDE} a side are expected")
     if header.get("bytes") != height * width * 3:

@@ -37,8 +37,10 @@ def digit_faults() -> FaultBoard:
 
     `off` cuts every connection at once; `stuck` sends the same pixels under new sequence numbers; `garbage` sends
     random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where
-    it is 1 or less; a frame a minute comes at least); `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
-    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs, 200 at most), `lens_fogged` (amount: 0 to 1) and
+    it is 1 or less; a frame a minute comes at least);
+    `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
+    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs, 200 at most),
+    `lens_fogged` (amount: 0 to 1) and
     `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
@@ -133,7 +135,7 @@ class DigitCameraServer:
             try:
                 await self._draw()
                 failing = False
-            except Exception:
+            except Exception:  # noqa: BLE001 (whatever it is, the next frame is tried)
                 if not failing:
                     _LOG.exception("the twin's camera could not draw frame %d; it goes on", self._sequence)
                 failing = True
