@@ -25,7 +25,9 @@ def test_the_demonstration_shows_a_contact_that_grows(tmp_path):
     assert areas_px[2:] == sorted(areas_px[2:])
     assert min(areas_px[2:]) > 0
     with (report.parent / "results.csv").open(newline="") as file:
-        assert {row["flags"] for row in csv.DictReader(file)} == {"", "no_contact"}
+        flags = [row["flags"] for row in csv.DictReader(file)]
+    assert all("no_contact" in text for text in flags[:2])
+    assert set(flags[2:]) == {""}
 
 
 def test_a_drawing_that_takes_too_long_is_ended_with_a_remedy(monkeypatch, tmp_path):

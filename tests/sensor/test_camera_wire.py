@@ -14,6 +14,7 @@ from station.devices.camera.probe import probe_camera
 from station.devices.camera.twin import TwinCamera
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import GEL_FAULTS
+from station.twin.faults import LARGEST_AMOUNT
 
 
 async def fresh(camera, deadline_s=3.0):
@@ -97,7 +98,7 @@ def test_a_fault_in_the_frames_is_named_and_passes_with_the_fault(bench, fault, 
         async with bench() as one:
             await one.camera.open()
             await fresh(one.camera)
-            one.server.faults.set(fault, amount)
+            one.server.faults.set(fault, LARGEST_AMOUNT)
             await until(one.camera, lambda frame: named in frame.faults)
             one.server.faults.clear()
             await until(one.camera, lambda frame: not frame.faults)
@@ -110,7 +111,7 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
     async def play():
         async with bench() as one:
             await one.camera.open()
-            one.server.faults.set(fault, amount)
+            one.server.faults.set(fault, LARGEST_AMOUNT)
             await asyncio.sleep(0.3)
             began_s = time.monotonic()
             with pytest.raises(NoFrameError, match=r"camera twin at 127\.0\.0\.1:\d+: no frame newer") as caught:
@@ -127,14 +128,12 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
     asyncio.run(play())
 
 
-@pytest.mark.parametrize(
-    ("fault", "amount"), [("dirt", 1e9), ("slow", 1e300), ("lens_fogged", 1e300), ("led_dead", 1e300)]
-)
-def test_no_amount_keeps_the_camera_from_coming_back_once_it_is_cleared(bench, fault, amount):
+@pytest.mark.parametrize("fault", ["dirt", "slow", "lens_fogged", "led_dead"])
+def test_no_amount_keeps_the_camera_from_coming_back_once_it_is_cleared(bench, fault):
     async def play():
         async with bench() as one:
             await one.camera.open()
-            one.server.faults.set(fault, amount)
+            one.server.faults.set(fault, LARGEST_AMOUNT)
             with contextlib.suppress(NoFrameError):
                 await fresh(one.camera, 0.5)
             one.server.faults.clear()
