@@ -53,10 +53,7 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
 
 
 async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
-    this = asyncio.current_task()
-    if this is not None:  # what ends a service must let go of the fruit as Ctrl-C does
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            asyncio.get_running_loop().add_signal_handler(number, this.cancel)
+    called_off = _call_off_by_signal()
     camera = camera_from(configuration.camera)
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(camera.close)
@@ -78,6 +75,23 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
             return make_method(references, recipe.segmentation)
 
         await BareGrip(Cell(camera, gripper, arm), recipe, method, recording.add_references, keep).run()
+    if called_off.is_set():  # too late to be cut short
+        raise asyncio.CancelledError
+
+
+def _call_off_by_signal() -> asyncio.Event:
+    """Let Ctrl-C, and what ends a service, cancel the task that calls this; the event tells that one came."""
+    called_off = asyncio.Event()
+    task = asyncio.current_task()
+
+    def call_off() -> None:
+        called_off.set()
+        if task is not None:
+            task.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, call_off)
+    return called_off
 
 
 class _Recording:
