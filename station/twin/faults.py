@@ -31,6 +31,7 @@ class FaultBoard:
         self.device = device
         self.known: tuple[str, ...] = (*CommonFault, *own)
         self._active: dict[str, float] = {}
+        self._begun: set[str] = set()
 
     def set(self, fault: str, amount: float = 1.0) -> None:
         """Switch a fault on.
@@ -45,6 +46,8 @@ class FaultBoard:
         self._check(fault)
         if not 0 <= amount <= LARGEST_AMOUNT:
             raise ValueError(f"amount: expected a number from 0 to {LARGEST_AMOUNT:g}, found {amount!r}")
+        if fault not in self._active:
+            self._begun.add(fault)
         self._active[fault] = amount
 
     def clear(self, fault: str | None = None) -> None:
@@ -81,6 +84,12 @@ class FaultBoard:
             fault: the fault's name.
         """
         return self._active.get(fault, 0.0)
+
+    def take_begun(self) -> frozenset[str]:
+        """The faults switched on since the last call, also those that are off again."""
+        begun = frozenset(self._begun)
+        self._begun.clear()
+        return begun
 
     def snapshot(self) -> dict[str, float]:
         """All faults that are on, with their strengths."""

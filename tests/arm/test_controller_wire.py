@@ -369,6 +369,7 @@ def test_the_dashboard_answers_line_by_line(bench, until):
             assert await ask("ROBOTMODE ") == "Robotmode: RUNNING"
             assert (await ask("dance")).startswith("could not understand")
             made.faults.set("protective_stop")
+            made.faults.clear("protective_stop")
 
             async def stopped() -> bool:
                 return await ask("safetystatus") == "Safetystatus: PROTECTIVE_STOP"

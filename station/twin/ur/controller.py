@@ -96,7 +96,7 @@ class UrController:
         self._tick = 0
         self._timer: asyncio.Handle | None = None
         self._due_s = 0.0
-        self._known_faults: dict[str, float] = {}
+        self._known_faults: set[str] = set()
         self._cut_at_s = 0.0
         self._switching: asyncio.Task[None] | None = None
         self._joint_range_rad = joint_range_rad
@@ -201,11 +201,13 @@ class UrController:
             self.network.cut()
         if self._switching is not None and self._switching.done():
             self._switching = None
-        faults = self.faults.snapshot()
-        if faults.keys() == self._known_faults.keys() or self._switching is not None:
+        if self._switching is not None:
             return
-        begun, ended = faults.keys() - self._known_faults.keys(), self._known_faults.keys() - faults.keys()
-        self._known_faults = faults
+        faults, begun = self.faults.snapshot().keys(), self.faults.take_begun()
+        ended = (self._known_faults | begun) - faults
+        if not begun and not ended:
+            return
+        self._known_faults = set(faults)
         self._begin_faults(begun, now_s)
         if "emergency_stop" in ended:
             self.safety.release_emergency_stop()
@@ -214,7 +216,7 @@ class UrController:
             self.network.cut_programmers()
         reachable = {CommonFault.OFF, "link_cut"}
         if (begun | ended) & reachable:
-            self._switching = asyncio.create_task(self._switch_network(on=not faults.keys() & reachable))
+            self._switching = asyncio.create_task(self._switch_network(on=not faults & reachable))
         if CommonFault.OFF in ended:
             self._boot(self.body.joints_rad, running=False)
 
