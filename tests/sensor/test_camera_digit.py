@@ -99,7 +99,8 @@ def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_
         while len(opened) < 2:
             assert (await camera.frame(time.monotonic(), 5.0)).image.shape == (640, 480, 3)
         await camera.set_leds(Leds(1, 2, 3))
-        await camera.frame(time.monotonic(), 5.0)
+        for _ in range(2):
+            await camera.frame(time.monotonic(), 5.0)
         await camera.close()
         await camera.close()
 

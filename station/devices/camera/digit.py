@@ -200,7 +200,7 @@ class DigitCamera:
         return await self._feed.newer(newer_than_s, deadline_s)
 
     async def set_leds(self, leds: Leds) -> None:
-        """Set the light before the next frame. Idempotent.
+        """Set the light as soon as the frame under way is read, which still has the old one. Idempotent.
 
         Args:
             leds: brightness of each colour.
