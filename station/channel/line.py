@@ -1,0 +1,247 @@
+"""What the PLC interface asks the station. The interface is the client; the station answers.
+
+The life of one trigger: `Begin` (durable when it is answered, so that an accepted trigger survives a crash of either
+side) → `AwaitOutcome` → the PLC sees it → `Published` → the PLC acknowledges → `Acknowledged`. After a restart of
+either side `Resume` tells the interface what was begun and not yet acknowledged.
+"""
+
+from enum import StrEnum
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from station.channel.messages import Message
+
+OutcomeName = Literal["PASS", "FAIL", "NO_RESULT"]
+
+
+class Reason(StrEnum):
+    """Why an outcome is not PASS. The order is the bits' order in the register map, bit 0 first."""
+
+    AREA_OVER_LIMIT = "area_over_limit"
+    GROWTH_OVER_LIMIT = "growth_over_limit"
+    EARLY_STOP = "early_stop"
+    NO_CONTACT = "no_contact"
+    CONTACT_LOST = "contact_lost"
+    AREA_NOT_RISING = "area_not_rising"
+    CUT_BY_BORDER = "cut_by_border"
+    SATURATED = "saturated"
+    LOW_CONFIDENCE = "low_confidence"
+    REFERENCE_BAD = "reference_bad"
+    IMAGE_STALE = "image_stale"
+    OUT_OF_RANGE = "out_of_range"
+    """The fruit's width is not one of the recipe's."""
+    LATE = "late"
+    CALLED_OFF = "called_off"
+    ARM_FAULT = "arm_fault"
+    GRIPPER_FAULT = "gripper_fault"
+    CAMERA_FAULT = "camera_fault"
+    RECORDS_FAULT = "records_fault"
+    STATION_LOST = "station_lost"
+    """The station stopped answering, or was restarted, before the outcome was the PLC's."""
+    INTERNAL_FAULT = "internal_fault"
+
+
+class Refusal(StrEnum):
+    """Why a trigger was not accepted. The order is the codes' order in the register map, from 1."""
+
+    NOT_ENABLED = "not_enabled"
+    NOT_READY = "not_ready"
+    BUSY = "busy"
+    QUEUE_FULL = "queue_full"
+    BAD_TRIGGER_ID = "bad_trigger_id"
+    """The id is 0 or the one of the trigger before."""
+    OFFLINE = "offline"
+    STATION_LOST = "station_lost"
+    RECIPE_CHANGING = "recipe_changing"
+    NOT_WRITER = "not_writer"
+    RECORDS_FULL = "records_full"
+    """The station could not make the trigger durable."""
+
+
+class CommandName(StrEnum):
+    """What the PLC may order. The order is the codes' order in the register map, from 1."""
+
+    CHANGE_RECIPE = "change_recipe"
+    """Argument: the recipe's PLC number. Takes effect between fruits."""
+    RESET = "reset"
+    """Leave a stop whose cause is gone; never a protective or emergency stop, which are a person's."""
+    CALL_OFF = "call_off"
+    """End the running inspection with NO_RESULT."""
+    SET_MODE = "set_mode"
+    """Argument: PackML mode, 1 production, 2 maintenance, 3 manual (ISA-TR88.00.02)."""
+    CLEAR_ALARMS = "clear_alarms"
+    """Acknowledge every alarm whose cause is gone."""
+
+
+class Outcome(Message):
+    """The one outcome of an accepted trigger."""
+
+    sequence: int = Field(ge=1, lt=2**32)
+    """The inspection's number, given at `Begun`; never given twice, also over restarts and new databases."""
+    trigger_id: int = Field(ge=1, le=65_535)
+    outcome: OutcomeName
+    reasons: tuple[Reason, ...]
+    """Empty only for PASS."""
+    late: bool
+    partial: bool
+    """Ended before the recipe's last step."""
+    simulated: bool
+    """A twin's device took part."""
+    area_mm2: float | None = Field(ge=0, allow_inf_nan=False)
+    """The contact area that decided, or at the last closing with a result; None where nothing valid was measured."""
+    area_px: int | None = Field(ge=0)
+    closing_mm: float | None = Field(allow_inf_nan=False)
+    """Where that area was measured."""
+    confidence: float | None = Field(ge=0, le=1)
+    recipe_number: int = Field(ge=0, le=65_535)
+    recipe_checksum: int = Field(ge=0, lt=2**32)
+    """CRC-32 of the recipe's canonical JSON; 0 with number 0 where none was active."""
+    began_utc_ms: int = Field(ge=0, lt=2**63)
+    ended_utc_ms: int = Field(ge=0, lt=2**63)
+    duration_ms: int = Field(ge=0, lt=2**32)
+    """By the monotonic clock."""
+    encoder: int = Field(ge=0, lt=2**32)
+    """The line's encoder at the trigger, as given with `Begin`."""
+    lot: str = Field(max_length=32)
+
+
+class Begin(Message):
+    """Inspect one fruit. Answered once the trigger is durable, before anything moves."""
+
+    asked: ClassVar[str] = "to begin an inspection"
+    trigger_id: int = Field(ge=1, le=65_535)
+    encoder: int = Field(ge=0, lt=2**32)
+    lot: str = Field(max_length=32)
+
+
+class Begun(Message):
+    """The trigger is accepted, or refused and nothing was begun."""
+
+    sequence: int | None = Field(default=None, ge=1, lt=2**32)
+    """None where refused."""
+    refusal: Refusal | None = None
+    deadline_s: float = Field(default=0.0, ge=0, le=600, allow_inf_nan=False)
+    """From now: the latest time at which the station itself ends this inspection, if need be with NO_RESULT."""
+
+
+class AwaitOutcome(Message):
+    """Wait for the outcome of a begun inspection."""
+
+    asked: ClassVar[str] = "for an inspection's outcome"
+    sequence: int = Field(ge=1, lt=2**32)
+
+
+class Published(Message):
+    """The PLC can read this outcome now. It stands, also against another one that the station holds."""
+
+    asked: ClassVar[str] = "to note what the PLC was told"
+    outcome: Outcome
+
+
+class Acknowledged(Message):
+    """The PLC has taken the outcomes up to this sequence."""
+
+    asked: ClassVar[str] = "to note an acknowledgement"
+    sequence: int = Field(ge=0, lt=2**32)
+
+
+class Resume(Message):
+    """Ask what is open, after a start or a lost connection."""
+
+    asked: ClassVar[str] = "what is open"
+
+
+class Open(Message):
+    """What was begun and not acknowledged."""
+
+    running: tuple[int, int] | None
+    """Sequence and trigger id of the inspection under way."""
+    outcomes: tuple[Outcome, ...]
+    """Ended and not acknowledged, in order of sequence."""
+
+
+class Line(Message):
+    """The line as the interface sees it, told with every beat, for the station's alarms, metrics and pages."""
+
+    asked: ClassVar[str] = "for the station's state"
+    plc_connected: bool
+    plc_alive: bool
+    """The PLC's heartbeat changes in time."""
+    enabled: bool
+    waiting: int = Field(ge=0)
+    """Outcomes that the PLC has not acknowledged."""
+    counters: dict[str, int]
+    """By name, as in the register map."""
+    faults: tuple[str, ...]
+    """Of the interface and the CAN node, one sentence each."""
+
+
+class PackmlState(StrEnum):
+    """ISA-TR88.00.02-2022, table 1. `PACKML_STATE_NUMBERS` has their numbers."""
+
+    CLEARING = "clearing"
+    STOPPED = "stopped"
+    STARTING = "starting"
+    IDLE = "idle"
+    SUSPENDED = "suspended"
+    EXECUTE = "execute"
+    STOPPING = "stopping"
+    ABORTING = "aborting"
+    ABORTED = "aborted"
+    HOLDING = "holding"
+    HELD = "held"
+    UNHOLDING = "unholding"
+    SUSPENDING = "suspending"
+    UNSUSPENDING = "unsuspending"
+    RESETTING = "resetting"
+    COMPLETING = "completing"
+    COMPLETED = "completed"
+
+
+PACKML_STATE_NUMBERS = {state: number for number, state in enumerate(PackmlState, start=1)}
+
+
+class StationState(Message):
+    """The station's state, the reply to `Line`."""
+
+    boot: str = Field(min_length=1, max_length=64)
+    """Another one after each start of the station."""
+    healthy: bool
+    """False while anything that inspecting needs makes no progress; the heartbeat to the PLC stops."""
+    ready: bool
+    """A trigger would be accepted now."""
+    why_not_ready: str
+    """One sentence with the remedy; empty where ready."""
+    packml_state: PackmlState | None
+    """None while it is unknown, as after a start; 0 in the register map."""
+    mode: int = Field(ge=1, le=3)
+    """PackML: 1 production, 2 maintenance, 3 manual."""
+    recipe_number: int = Field(ge=0, le=65_535)
+    """0 where no recipe is active."""
+    recipe_checksum: int = Field(ge=0, lt=2**32)
+    error_code: int = Field(ge=0, le=65_535)
+    """The number of the active alarm of the highest priority, 0 for none."""
+    alarms: int = Field(ge=0, lt=2**32)
+    """Bit n is set while the alarm with number n + 1 is active."""
+    simulated: bool
+
+
+class Command(Message):
+    """Carry out an order of the PLC; answered when it is done."""
+
+    asked: ClassVar[str] = "to carry out a command"
+    command: CommandName
+    argument: int = Field(ge=0, le=65_535)
+
+
+class CommandDone(Message):
+    """How it went."""
+
+    done: bool
+    why: str
+    """Empty where done."""
+
+
+class Noted(Message):
+    """The station has it, durably."""
