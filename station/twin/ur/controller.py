@@ -220,7 +220,7 @@ class UrController:
         if CommonFault.OFF in ended:
             self._boot(self.body.joints_rad, running=False)
 
-    def _begin_faults(self, begun: set[str], now_s: float) -> None:
+    def _begin_faults(self, begun: frozenset[str], now_s: float) -> None:
         if "protective_stop" in begun:
             self.safety.stop_protectively(now_s)
         if "emergency_stop" in begun:
