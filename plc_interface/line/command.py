@@ -1,0 +1,93 @@
+"""`station line`: the line's PLC, simulated, against a station in the demonstration or on the floor."""
+
+import asyncio
+import signal
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from plc_interface.line.display import LineDisplay, summary_line
+from plc_interface.line.faults import FaultPlan, LineFault
+from plc_interface.line.nest import Nest, RealNest, TwinNest
+from plc_interface.line.program import LineProgram
+from plc_interface.line.scan import Scanner
+from plc_interface.line.simulator import LineSimulator, Pace
+from station.errors import BadInputError
+from station.settings.configuration import load_configuration
+from station.settings.recipe import load_recipes
+
+
+@click.command("line")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@click.option("--count", type=click.IntRange(min=1), help="End after so many fruits; else Ctrl-C ends it.")
+@click.option("--every", "every_s", type=click.FloatRange(0, 3600), default=0.0, show_default=True, metavar="S",
+              help="Seconds from fruit to fruit at least.")
+@click.option("--scan", "scan_ms", type=click.IntRange(1, 1000), default=10, show_default=True, metavar="MS",
+              help="Milliseconds from scan to scan.")
+@click.option("--lot", default="", help="Lot to latch, at most 32 ASCII characters.")
+@click.option("--separate", is_flag=True, help="Write and read by function codes 16 and 3 in place of 23.")
+@click.option("--twin", "console_port", type=click.IntRange(1, 65_535), metavar="PORT",
+              help="Lay fruit into the nest of the twin with this console; else somebody lays them.")
+@click.option("--fruit", "kinds", multiple=True, metavar="NAME", help="Recipes to draw fruit for; may be repeated.")
+@click.option("--damaged", "damaged_share", type=click.FloatRange(0, 1), default=0.2, show_default=True,
+              help="Share of damaged fruit in the twin.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
+@click.option("--fault", "faults", multiple=True, type=click.Choice([fault.value for fault in LineFault]),
+              help="What the PLC does wrong; may be repeated.")
+@click.option("--fault-every", type=click.IntRange(min=1), default=3, show_default=True, help="One fruit in so many.")
+def line(
+    config: Path | None,
+    count: int | None,
+    every_s: float,
+    scan_ms: int,
+    lot: str,
+    separate: bool,  # noqa: FBT001 (click passes arguments by name)
+    console_port: int | None,
+    kinds: tuple[str, ...],
+    damaged_share: float,
+    seed: int,
+    faults: tuple[str, ...],
+    fault_every: int,
+) -> None:  # fmt: skip
+    """Play the line's PLC: trigger, read and acknowledge inspections, and show what became of each fruit.
+
+    Takes the right to write, so no other PLC may hold it. Exits 0 when all fruits were decided.
+    """
+    site = load_configuration(config)
+    if not (lot.isascii() and len(lot) <= 32 and (lot.isprintable() or not lot)):
+        raise BadInputError(f"--lot: expected at most 32 printable ASCII characters, got {lot!r}")
+    nest: Nest = RealNest()
+    if console_port is not None:
+        nest = TwinNest(console_port, _numbers(kinds, site.recipes_folder), damaged_share, seed)
+    elif kinds:
+        raise BadInputError("--fruit: only the twin can lay fruit of a kind; give its console with --twin")
+    program = LineProgram(FaultPlan([LineFault(fault) for fault in faults], fault_every), lot)
+    scanner = Scanner(
+        site.modbus.host, site.modbus.port, site.modbus.unit, site.modbus.word_order, one_round_trip=not separate
+    )
+    asyncio.run(_run(program, scanner, nest, Pace(scan_ms / 1000, every_s), count))
+
+
+def _numbers(kinds: tuple[str, ...], folder: Path | None) -> dict[str, int]:
+    recipes = load_recipes(folder)
+    wanted = kinds or ("strawberry", "raspberry", "blueberry")
+    unknown = [kind for kind in wanted if kind not in recipes]
+    if unknown:
+        raise BadInputError(f"--fruit: there is no recipe {', '.join(unknown)}; there are: {', '.join(recipes)}")
+    return {kind: recipes[kind].plc_number for kind in wanted}
+
+
+async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, count: int | None) -> None:
+    console = Console()
+    async with scanner:
+        simulator = LineSimulator(program, scanner, nest, pace)
+        running = asyncio.ensure_future(simulator.run(count))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, running.cancel)
+        with LineDisplay(console, simulator.summary) as display:
+            simulator.on_passage, simulator.on_scan = display.passed, display.doing
+            await asyncio.wait([running])
+        console.print(summary_line(simulator.summary))
+        if not running.cancelled():
+            running.result()

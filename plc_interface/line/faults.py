@@ -1,0 +1,46 @@
+"""What a PLC's program may do wrong, to be played against the station."""
+
+from collections.abc import Sequence
+from enum import StrEnum
+
+
+class LineFault(StrEnum):
+    """One misbehaviour, played while one fruit is in the nest."""
+
+    LATE_ACKNOWLEDGE = "late_acknowledge"
+    """The result is left waiting for a while."""
+    FORGOTTEN_TRIGGER = "forgotten_trigger"
+    """The trigger bit stays up until the result is acknowledged."""
+    FORGOTTEN_ACKNOWLEDGE = "forgotten_acknowledge"
+    """The acknowledge bit stays up until the next fruit is triggered."""
+    REPEATED_ID = "repeated_id"
+    """A second trigger has the id of the one before."""
+    SKIPPED_ID = "skipped_id"
+    """Ids are left out."""
+    FROZEN_HEARTBEAT = "frozen_heartbeat"
+    """The PLC's heartbeat stands still until the station has noticed."""
+    SWAPPED_WORDS = "swapped_words"
+    """The sequence is first acknowledged in the other word order."""
+    RECONNECT = "reconnect"
+    """The connection is cut and made again while the fruit is inspected."""
+
+
+class FaultPlan:
+    """Which fruit gets which fault: one in so many, in turn.
+
+    Args:
+        faults: what is played, in this order; none at all where empty.
+        every: one fruit in so many has a fault.
+    """
+
+    def __init__(self, faults: Sequence[LineFault] = (), every: int = 3) -> None:
+        self._faults, self._every = tuple(faults), every
+
+    def of_fruit(self, number: int) -> LineFault | None:
+        """The fault of a fruit.
+
+        Args:
+            number: counted from 1.
+        """
+        turn, rest = divmod(number, self._every)
+        return self._faults[(turn - 1) % len(self._faults)] if self._faults and rest == 0 else None

@@ -1,0 +1,101 @@
+"""Where the fruit lies while it is inspected, and how it gets there."""
+
+import asyncio
+import json
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from station.errors import StationError
+
+_ANSWER_LIMIT_S = 5.0
+_LOOPBACK = "127.0.0.1"
+_SEEDS = 2**31
+
+
+@dataclass(frozen=True, slots=True)
+class LaidFruit:
+    """What lies in the nest, as far as it is known."""
+
+    kind: str
+    """Empty where nobody knows."""
+    damaged: bool | None
+    """The truth, None where nobody knows."""
+    recipe: int
+    """The number of its recipe; 0 for the active one."""
+
+
+class Nest(Protocol):
+    """Brings fruit and takes it away."""
+
+    async def arrive(self) -> LaidFruit:
+        """Lay the next fruit."""
+        ...
+
+    async def leave(self) -> None:
+        """Take the fruit away."""
+        ...
+
+
+class RealNest:
+    """A nest that people or a line fill: nothing is known of its fruit."""
+
+    async def arrive(self) -> LaidFruit:
+        """Take for granted that a fruit is there."""
+        return LaidFruit("", None, 0)
+
+    async def leave(self) -> None:
+        """Do nothing: whoever laid the fruit takes it away."""
+
+
+class TwinNest:
+    """The nest of the simulated world, filled through its console.
+
+    Args:
+        console_port: of the twin, on the loopback.
+        recipes: the recipe's number of each kind of fruit, which is drawn from at random.
+        damaged_share: of the fruit, from 0 to 1.
+        seed: the same gives the same fruits.
+    """
+
+    def __init__(self, console_port: int, recipes: Mapping[str, int], damaged_share: float, seed: int) -> None:
+        self._port, self._recipes, self._damaged_share = console_port, dict(recipes), damaged_share
+        self._random = random.Random(seed)  # noqa: S311 (a simulation)
+
+    async def arrive(self) -> LaidFruit:
+        """Lay the next fruit.
+
+        Raises:
+            StationError: the twin does not answer, or refuses.
+        """
+        kind = self._random.choice(list(self._recipes))
+        damaged = self._random.random() < self._damaged_share
+        seed = self._random.randrange(_SEEDS)
+        await self._ask({"do": "fruit", "kind": kind, "seed": seed, "bruised": damaged})
+        return LaidFruit(kind, damaged, self._recipes[kind])
+
+    async def leave(self) -> None:
+        """Empty the nest.
+
+        Raises:
+            StationError: the twin does not answer.
+        """
+        await self._ask({"do": "remove"})
+
+    async def _ask(self, request: dict[str, Any]) -> None:
+        try:
+            async with asyncio.timeout(_ANSWER_LIMIT_S):
+                reader, writer = await asyncio.open_connection(_LOOPBACK, self._port)
+                try:
+                    writer.write(json.dumps(request).encode() + b"\n")
+                    answer = json.loads(await reader.readline())
+                finally:
+                    writer.close()
+                    await writer.wait_closed()
+        except (OSError, ValueError) as error:
+            raise StationError(
+                f"the twin's console at {_LOOPBACK}:{self._port} does not answer: {error}; is `station twin` running?"
+            ) from error
+        if not answer.get("ok"):
+            raise StationError(f"the twin refused {request['do']}: {answer.get('error')}")

@@ -1,0 +1,99 @@
+"""The line: fruit arriving at the nest, the PLC's program scanning, and what became of each fruit."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from plc_interface.line.nest import LaidFruit, Nest
+from plc_interface.line.program import Decision, LineProgram, Passage
+from plc_interface.line.scan import Scanner
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How fast the line runs."""
+
+    scan_s: float = 0.01
+    every_s: float = 0.0
+    """The least time from one fruit's arrival to the next; the line waits for the station all the same."""
+    encoder_counts_per_s: float = 1000.0
+
+
+@dataclass(slots=True)
+class Summary:
+    """What the line saw, and where the truth is known, how right it was."""
+
+    decided: dict[Decision, int] = field(default_factory=lambda: dict.fromkeys(Decision, 0))
+    damaged_passed: int = 0
+    sound_diverted: int = 0
+
+    @property
+    def fruits(self) -> int:
+        """How many were decided."""
+        return sum(self.decided.values())
+
+    def add(self, passage: Passage, fruit: LaidFruit) -> None:
+        """Count one fruit.
+
+        Args:
+            passage: what the line decided.
+            fruit: what it was.
+        """
+        self.decided[passage.decision] += 1
+        self.damaged_passed += fruit.damaged is True and not passage.diverted
+        self.sound_diverted += fruit.damaged is False and passage.diverted
+
+
+class LineSimulator:
+    """Runs a line against a station.
+
+    Args:
+        program: the PLC's.
+        scanner: its connection.
+        nest: where the fruit lies.
+        pace: how fast it runs.
+    """
+
+    def __init__(self, program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace) -> None:
+        self._program, self._scanner, self._nest, self._pace = program, scanner, nest, pace
+        self.on_passage: Callable[[Passage, LaidFruit], None] = lambda _passage, _fruit: None
+        """Gets each fruit when it is decided."""
+        self.on_scan: Callable[[str], None] = lambda _doing: None
+        """Gets after each scan what the line is doing, or what keeps it from it."""
+        self.summary = Summary()
+
+    async def run(self, count: int | None) -> Summary:
+        """Run until so many fruits are decided and the last result is acknowledged.
+
+        Args:
+            count: of fruits; None for until cancelled.
+
+        Raises:
+            StationError: the nest cannot be filled.
+        """
+        inputs = None
+        fruit: LaidFruit | None = None
+        next_arrival_s = due_s = time.monotonic()
+        while count is None or self.summary.fruits < count or not self._program.free:
+            now_s = time.monotonic()
+            wanted = count is None or self.summary.fruits < count
+            if fruit is None and wanted and self._program.free and now_s >= next_arrival_s:
+                fruit = await self._nest.arrive()
+                next_arrival_s = now_s + self._pace.every_s
+            encoder = int(now_s * self._pace.encoder_counts_per_s) % 2**32
+            recipe = fruit.recipe if fruit else 0
+            outputs = self._program.scan(inputs, now_s, fruit_in_nest=fruit is not None, recipe=recipe, encoder=encoder)
+            if self._program.cut_wanted:
+                self._scanner.cut()
+            inputs = await self._scanner.exchange(outputs)
+            self.on_scan(self._scanner.trouble or self._program.stage.value)
+            for passage in self._program.take_passages():
+                if fruit is not None:
+                    self.summary.add(passage, fruit)
+                    self.on_passage(passage, fruit)
+                    fruit = None
+                    await self._nest.leave()
+            due_s = max(due_s + self._pace.scan_s, time.monotonic())
+            await asyncio.sleep(max(0.0, due_s - time.monotonic()))
+        return self.summary
