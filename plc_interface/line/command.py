@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from plc_interface.codec import WordOrder
 from plc_interface.line.display import LineDisplay, summary_line
 from plc_interface.line.faults import FaultPlan, LineFault
 from plc_interface.line.nest import Nest, RealNest, TwinNest
@@ -21,20 +22,50 @@ from station.settings.recipe import load_recipes
 @click.command("line")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 @click.option("--count", type=click.IntRange(min=1), help="End after so many fruits; else Ctrl-C ends it.")
-@click.option("--every", "every_s", type=click.FloatRange(0, 3600), default=0.0, show_default=True, metavar="S",
-              help="Seconds from fruit to fruit at least.")
-@click.option("--scan", "scan_ms", type=click.IntRange(1, 1000), default=10, show_default=True, metavar="MS",
-              help="Milliseconds from scan to scan.")
+@click.option(
+    "--every",
+    "every_s",
+    type=click.FloatRange(0, 3600),
+    default=0.0,
+    show_default=True,
+    metavar="S",
+    help="Seconds from fruit to fruit at least.",
+)
+@click.option(
+    "--scan",
+    "scan_ms",
+    type=click.IntRange(1, 1000),
+    default=10,
+    show_default=True,
+    metavar="MS",
+    help="Milliseconds from scan to scan.",
+)
 @click.option("--lot", default="", help="Lot to latch, at most 32 ASCII characters.")
 @click.option("--separate", is_flag=True, help="Write and read by function codes 16 and 3 in place of 23.")
-@click.option("--twin", "console_port", type=click.IntRange(1, 65_535), metavar="PORT",
-              help="Lay fruit into the nest of the twin with this console; else somebody lays them.")
+@click.option(
+    "--twin",
+    "console_port",
+    type=click.IntRange(1, 65_535),
+    metavar="PORT",
+    help="Lay fruit into the nest of the twin with this console; else somebody lays them.",
+)
 @click.option("--fruit", "kinds", multiple=True, metavar="NAME", help="Recipes to draw fruit for; may be repeated.")
-@click.option("--damaged", "damaged_share", type=click.FloatRange(0, 1), default=0.2, show_default=True,
-              help="Share of damaged fruit in the twin.")
+@click.option(
+    "--damaged",
+    "damaged_share",
+    type=click.FloatRange(0, 1),
+    default=0.2,
+    show_default=True,
+    help="Share of damaged fruit in the twin.",
+)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
-@click.option("--fault", "faults", multiple=True, type=click.Choice([fault.value for fault in LineFault]),
-              help="What the PLC does wrong; may be repeated.")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    type=click.Choice([fault.value for fault in LineFault]),
+    help="What the PLC does wrong; may be repeated.",
+)
 @click.option("--fault-every", type=click.IntRange(min=1), default=3, show_default=True, help="One fruit in so many.")
 def line(
     config: Path | None,
@@ -64,7 +95,11 @@ def line(
         raise BadInputError("--fruit: only the twin can lay fruit of a kind; give its console with --twin")
     program = LineProgram(FaultPlan([LineFault(fault) for fault in faults], fault_every), lot)
     scanner = Scanner(
-        site.modbus.host, site.modbus.port, site.modbus.unit, site.modbus.word_order, one_round_trip=not separate
+        site.modbus.host,
+        site.modbus.port,
+        site.modbus.unit,
+        WordOrder(site.modbus.word_order),
+        one_round_trip=not separate,
     )
     asyncio.run(_run(program, scanner, nest, Pace(scan_ms / 1000, every_s), count))
 
