@@ -1,0 +1,54 @@
+"""What a process tells whoever supervises it: that it is ready, and that it makes progress.
+
+The protocol is the one of sd_notify(3), so the same process runs below systemd and below `station run`.
+"""
+
+import asyncio
+import os
+import signal
+import socket
+from collections.abc import Callable
+
+SOCKET_VARIABLE = "NOTIFY_SOCKET"
+WATCHDOG_VARIABLE = "WATCHDOG_USEC"
+PARENT_VARIABLE = "STATION_SUPERVISOR_PID"
+_FEEDS_PER_TIMEOUT = 4
+_LOOK_S = 0.5
+
+
+def notify(message: str) -> None:
+    """Tell the supervisor; nothing happens where there is none, or where it does not listen any more.
+
+    Args:
+        message: `READY=1`, `WATCHDOG=1`, `STOPPING=1` or `STATUS=…`.
+    """
+    address = os.environ.get(SOCKET_VARIABLE, "")
+    if not address:
+        return
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.settimeout(0.0)
+        try:
+            sender.sendto(message.encode(), "\0" + address[1:] if address.startswith("@") else address)
+        except OSError:
+            return
+
+
+async def feed_watchdog(progressing: Callable[[], bool]) -> None:
+    """Feed the supervisor's watchdog for as long as there is progress, and end this process when it is orphaned.
+
+    Runs until cancelled. A supervisor that was killed cannot end its processes, so they end themselves, by the same
+    SIGTERM that it would have sent.
+
+    Args:
+        progressing: whether the process does what it is there for; asked several times in each time-out.
+    """
+    timeout_s = int(os.environ.get(WATCHDOG_VARIABLE, "0")) / 1e6
+    parent = int(os.environ.get(PARENT_VARIABLE, "0"))
+    pause_s = min(_LOOK_S, timeout_s / _FEEDS_PER_TIMEOUT) if timeout_s else _LOOK_S
+    while True:
+        if timeout_s and progressing():
+            notify("WATCHDOG=1")
+        if parent and os.getppid() != parent:
+            os.kill(os.getpid(), signal.SIGTERM)
+            return
+        await asyncio.sleep(pause_s)

@@ -1,0 +1,223 @@
+"""Starts the station's processes, restarts what dies or hangs, and gives up when that happens too often.
+
+What is given up stays down while the rest goes on: without the station's process the PLC interface still tells the PLC
+that the station is lost, which is the safe output, and a person has to mend the cause and start again.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import socket
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from station.errors import StationError
+from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE
+
+RESTARTS = 5
+RESTARTS_WITHIN_S = 60.0
+_LONGEST_MESSAGE_BYTES = 4096
+_LOOK_S = 0.1
+
+log = logging.getLogger(__name__)
+
+
+class SupervisionError(StationError):
+    """A process cannot be kept running."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """One process to keep running. It says READY=1 when it serves, and WATCHDOG=1 while it makes progress."""
+
+    name: str
+    command: tuple[str, ...]
+    start_limit_s: float = 30.0
+    watchdog_s: float = 10.0
+    stop_limit_s: float = 30.0
+    """From SIGTERM to SIGKILL."""
+
+
+class _Child:
+    """A program's process of the moment."""
+
+    def __init__(self, program: Program, folder: Path, environment: Mapping[str, str]) -> None:
+        self.program = program
+        self.restarts: deque[float] = deque()
+        self.process: asyncio.subprocess.Process | None = None
+        self._address = folder / f"{program.name}.sock"
+        self._environment = environment
+        self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._listening.settimeout(0.0)
+        self._listening.bind(str(self._address))
+        self.ready = self.given_up = False
+        self._heard_s = 0.0
+
+    async def start(self) -> None:
+        self.ready = False
+        environment = {
+            **self._environment,
+            SOCKET_VARIABLE: str(self._address),
+            WATCHDOG_VARIABLE: str(int(self.program.watchdog_s * 1e6)),
+            PARENT_VARIABLE: str(os.getpid()),
+        }
+        # A session of its own: Ctrl-C on the terminal is the supervisor's, which ends the processes in their order.
+        self.process = await asyncio.create_subprocess_exec(
+            *self.program.command, env=environment, stdin=asyncio.subprocess.DEVNULL, start_new_session=True
+        )
+        self._heard_s = time.monotonic()
+
+    def listen(self) -> None:
+        """Take what the process has said since the last call."""
+        while True:
+            try:
+                message = self._listening.recv(_LONGEST_MESSAGE_BYTES)
+            except BlockingIOError:
+                return
+            lines = message.split(b"\n")
+            self.ready |= b"READY=1" in lines
+            if self.ready and not {b"READY=1", b"WATCHDOG=1"}.isdisjoint(lines):
+                self._heard_s = time.monotonic()
+
+    def trouble(self) -> str:
+        """What is wrong with the process, empty where nothing is."""
+        if self.process is None:
+            return "is not running"
+        if self.process.returncode is not None:
+            return f"ended with {_named(self.process.returncode)}"
+        silent_s = time.monotonic() - self._heard_s
+        if not self.ready and silent_s > self.program.start_limit_s:
+            return f"was not ready after {self.program.start_limit_s:g} s"
+        if self.ready and silent_s > self.program.watchdog_s:
+            return f"made no progress for {self.program.watchdog_s:g} s"
+        return ""
+
+    async def stop(self, limit_s: float) -> None:
+        """End the process by SIGTERM, after the limit by SIGKILL, with all that it has started."""
+        process = self.process
+        if process is None:
+            return
+        if process.returncode is None:
+            process.terminate()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(limit_s):
+                    await process.wait()
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        await process.wait()
+
+    def close(self) -> None:
+        self._listening.close()
+
+
+class Supervisor:
+    """Keeps programs running.
+
+    Args:
+        programs: in the order in which they are started, each when the one before is ready; ended in reverse.
+        environment: theirs.
+    """
+
+    def __init__(self, programs: Sequence[Program], environment: Mapping[str, str] | None = None) -> None:
+        self._programs = programs
+        self._environment = dict(os.environ if environment is None else environment)
+        self._children: list[_Child] = []
+
+    @property
+    def restarts(self) -> dict[str, int]:
+        """Of each program, within the budget's time."""
+        return {child.program.name: len(child.restarts) for child in self._children}
+
+    def ready(self, name: str) -> bool:
+        """Whether a program's process of the moment has said that it serves.
+
+        Args:
+            name: the program's.
+        """
+        return any(child.ready for child in self._children if child.program.name == name)
+
+    async def run(self, on_ready: Callable[[], None], ended: asyncio.Event) -> None:
+        """Start everything, keep it running, and end it.
+
+        Args:
+            on_ready: called once all are ready for the first time.
+            ended: set by the caller when everything is to end.
+
+        Raises:
+            SupervisionError: a program did not become ready at first, or one was given up; in this case when everything
+                has ended.
+        """
+        with tempfile.TemporaryDirectory(prefix="station-") as folder:
+            self._children = [_Child(program, Path(folder), self._environment) for program in self._programs]
+            try:
+                for child in self._children:
+                    await child.start()
+                    await self._until(child, ended)
+                if not ended.is_set():
+                    on_ready()
+                await self._keep(ended)
+            finally:
+                await asyncio.shield(self._stop())
+        if given_up := [child.program.name for child in self._children if child.given_up]:
+            raise SupervisionError(f"given up: {', '.join(given_up)}; mend the cause and start the station again")
+
+    async def _until(self, child: _Child, ended: asyncio.Event) -> None:
+        while not child.ready and not ended.is_set():
+            child.listen()
+            if child.process is not None and child.process.returncode is not None:
+                raise SupervisionError(
+                    f"the process {child.program.name} {child.trouble()} before it was ready: see its message above"
+                )
+            if trouble := child.trouble():
+                raise SupervisionError(f"the process {child.program.name} {trouble}: see its messages above")
+            await self._look(self._children, ended)
+
+    async def _keep(self, ended: asyncio.Event) -> None:
+        while not ended.is_set() and not all(child.given_up for child in self._children):
+            for child in self._children:
+                child.listen()
+                if not child.given_up and (trouble := child.trouble()):
+                    await self._restart(child, trouble)
+            await self._look((), ended)
+
+    async def _look(self, children: Iterable[_Child], ended: asyncio.Event) -> None:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LOOK_S):
+                await ended.wait()
+        for child in children:
+            child.listen()
+
+    async def _restart(self, child: _Child, trouble: str) -> None:
+        now_s = time.monotonic()
+        while child.restarts and now_s - child.restarts[0] > RESTARTS_WITHIN_S:
+            child.restarts.popleft()
+        await child.stop(0.0)
+        if len(child.restarts) >= RESTARTS:
+            child.given_up = True
+            log.critical(
+                "the process %s %s, after %d restarts within %g s: it is given up; mend the cause and start again",
+                child.program.name, trouble, RESTARTS, RESTARTS_WITHIN_S,
+            )  # fmt: skip
+            return
+        log.error("the process %s %s: it is started again", child.program.name, trouble)
+        child.restarts.append(now_s)
+        await child.start()
+
+    async def _stop(self) -> None:
+        for child in reversed(self._children):
+            await child.stop(child.program.stop_limit_s)
+            child.close()
+
+
+def _named(returncode: int) -> str:
+    if returncode >= 0:
+        return f"exit code {returncode}"
+    with contextlib.suppress(ValueError):
+        return signal.Signals(-returncode).name
+    return f"signal {-returncode}"

@@ -1,0 +1,93 @@
+"""Small programs to supervise, each told by a word what to do wrong."""
+
+import asyncio
+import logging
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from station.supervision.supervisor import Program, Supervisor
+
+CHILD = """
+import asyncio, os, signal, sys, time
+from pathlib import Path
+from station.supervision.notify import feed_watchdog, notify
+
+folder, name, *how = sys.argv[1:]
+folder = Path(folder)
+with (folder / "log").open("a") as log:
+    log.write(f"start {name} {os.getpid()}\\n")
+if "dies" in how:
+    sys.exit(3)
+if "deaf" in how:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+async def main():
+    ended = asyncio.Event()
+    if "deaf" not in how:
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+    feeding = asyncio.create_task(feed_watchdog(lambda: not (folder / f"{name}.hang").exists()))
+    if "mute" not in how:
+        notify("READY=1")
+    await ended.wait()
+    feeding.cancel()
+    with (folder / "log").open("a") as log:
+        log.write(f"end {name}\\n")
+
+asyncio.run(main())
+"""
+
+
+class Bench:
+    """A supervisor with its programs, run in a loop of its own."""
+
+    def __init__(self, folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+        self.folder, self.caplog, self.ready = folder, caplog, False
+        (folder / "child.py").write_text(CHILD, encoding="utf-8")
+
+    def program(self, name: str, *how: str, **limits: float) -> Program:
+        limits = {"start_limit_s": 20.0, "watchdog_s": 5.0, "stop_limit_s": 20.0} | limits
+        return Program(name, (sys.executable, str(self.folder / "child.py"), str(self.folder), name, *how), **limits)
+
+    def log(self) -> list[str]:
+        path = self.folder / "log"
+        return [line.rsplit(" ", 1)[0] if line.startswith("start") else line for line in path.read_text().splitlines()]
+
+    def pids(self, name: str) -> list[int]:
+        lines = (self.folder / "log").read_text().splitlines()
+        return [int(line.split()[2]) for line in lines if line.startswith(f"start {name} ")]
+
+    def run(self, programs: list[Program], play: Callable[[Supervisor, asyncio.Event], object]) -> None:
+        """Supervise until `play`, which begins when all are ready, sets the event or the supervisor gives up."""
+
+        async def supervise() -> None:
+            supervisor, ended, ready = Supervisor(programs), asyncio.Event(), asyncio.Event()
+            running = asyncio.create_task(supervisor.run(ready.set, ended))
+            waiting = asyncio.create_task(ready.wait())
+            await asyncio.wait([running, waiting], return_when=asyncio.FIRST_COMPLETED)
+            if ready.is_set():
+                self.ready = True
+                await play(supervisor, ended)  # pyright: ignore[reportGeneralTypeIssues]
+            waiting.cancel()
+            await running
+
+        with self.caplog.at_level(logging.ERROR):
+            asyncio.run(supervise())
+
+
+@pytest.fixture
+def bench(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> Bench:
+    return Bench(tmp_path, caplog)
+
+
+async def until(condition: Callable[[], object], limit_s: float = 30.0) -> None:
+    async with asyncio.timeout(limit_s):
+        while not condition():
+            await asyncio.sleep(0.02)
+
+
+@pytest.fixture(name="until")
+def until_fixture() -> Callable[..., object]:
+    return until

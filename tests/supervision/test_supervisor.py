@@ -1,0 +1,102 @@
+"""Real processes under the supervisor: started in order, restarted, given up, ended."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+
+import psutil
+import pytest
+
+from station.supervision.notify import notify
+from station.supervision.supervisor import RESTARTS, SupervisionError
+
+
+async def end(_supervisor, ended):
+    ended.set()
+
+
+def test_programs_start_in_order_and_end_in_reverse(bench):
+    bench.run([bench.program("first"), bench.program("second")], end)
+    assert bench.log() == ["start first", "start second", "end second", "end first"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
+def test_what_dies_is_started_again_and_the_others_go_on(bench, until, number):
+    async def kill(supervisor, ended):
+        os.kill(bench.pids("second")[0], number)
+        await until(lambda: len(bench.pids("second")) == 2)
+        assert supervisor.restarts == {"first": 0, "second": 1}
+        await until(lambda: supervisor.ready("second"))
+        ended.set()
+
+    bench.run([bench.program("first"), bench.program("second")], kill)
+    assert len(bench.pids("first")) == 1
+    assert f"the process second ended with {number.name}" in bench.caplog.text
+    assert bench.log()[-2:] == ["end second", "end first"]
+
+
+def test_what_makes_no_progress_is_killed_and_started_again(bench, until):
+    hang = bench.folder / "only.hang"
+
+    async def stall(supervisor, ended):
+        hang.touch()
+        await until(lambda: len(bench.pids("only")) == 2)
+        hang.unlink()
+        await until(lambda: supervisor.ready("only"))
+        ended.set()
+
+    bench.run([bench.program("only", watchdog_s=1.0)], stall)
+    assert "made no progress for 1 s" in bench.caplog.text
+    assert not psutil.pid_exists(bench.pids("only")[0])
+
+
+def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until):
+    async def let_it_die(supervisor, ended):
+        for restart in range(RESTARTS + 1):
+            await until(lambda count=restart + 1: len(bench.pids("second")) == count and supervisor.ready("second"))
+            os.kill(bench.pids("second")[-1], signal.SIGKILL)
+        await until(lambda: "given up" in bench.caplog.text)
+        assert psutil.pid_exists(bench.pids("first")[0])
+        ended.set()
+
+    with pytest.raises(SupervisionError, match="given up: second; mend the cause"):
+        bench.run([bench.program("first"), bench.program("second")], let_it_die)
+    assert len(bench.pids("second")) == RESTARTS + 1
+    assert bench.log()[-1] == "end first"
+
+
+@pytest.mark.parametrize(
+    ("how", "words"), [("dies", "ended with exit code 3 before it was ready"), ("mute", "was not ready after 2 s")]
+)
+def test_what_does_not_become_ready_ends_everything_with_its_name(bench, how, words):
+    with pytest.raises(SupervisionError, match=f"the process second {words}"):
+        bench.run([bench.program("first"), bench.program("second", how, start_limit_s=2.0)], end)
+    assert not bench.ready
+    assert not psutil.pid_exists(bench.pids("second")[0])
+
+
+def test_what_does_not_hear_sigterm_is_killed(bench):
+    bench.run([bench.program("only", "deaf", stop_limit_s=0.5)], end)
+    assert bench.log() == ["start only"]
+    assert not psutil.pid_exists(bench.pids("only")[0])
+
+
+def test_an_orphan_ends_itself(bench, until):
+    script = f"""
+import asyncio
+from station.supervision.supervisor import Program, Supervisor
+asyncio.run(Supervisor([{bench.program("only")!r}]).run(lambda: None, asyncio.Event()))
+"""
+    with subprocess.Popen([sys.executable, "-c", script]) as supervisor:
+        asyncio.run(until(lambda: (bench.folder / "log").exists() and bench.pids("only")))
+        supervisor.kill()
+    asyncio.run(until(lambda: "end only" in bench.log()))
+
+
+def test_without_a_supervisor_nothing_is_told(monkeypatch):
+    monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
+    notify("READY=1")
+    monkeypatch.setenv("NOTIFY_SOCKET", "/nowhere/at/all")
+    notify("READY=1")
