@@ -17,6 +17,7 @@ from station.settings.gripper import GripperSettings
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
+from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
 from station.settings.validation import validated
 from station.settings.yaml_loader import Document, read_document
@@ -130,6 +131,9 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    records: RecordsSettings = setting(
+        RecordsSettings(), title="Records", description="What the station keeps of its inspections."
+    )
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:

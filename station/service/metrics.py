@@ -1,0 +1,118 @@
+"""The station's metrics: what is counted and shown, in a registry of its own.
+
+Counters begin at 0 with each start of the station, as Prometheus expects; what has to last is in the records. An
+inspection is counted when the PLC is given its outcome, once, so that the counts of one start equal its records'.
+"""
+
+import platform
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, cast
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from station.channel.line import Outcome
+from station.records.records import Status
+from station.service.metrics_table import LABELS, OTHER, TABLE, Row
+
+DEADLINE_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25, 1.5, 2.0)
+
+_COLLECTED = frozenset(key for key in TABLE if key.startswith("records_")) | {"link_age"}
+"""What is asked for at each scrape instead of being set."""
+
+
+class Metrics:
+    """What the station counts; every method is cheap and never raises for a value."""
+
+    def __init__(self, version: str, deadline_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        """Register everything in the table.
+
+        Args:
+            version: the program's.
+            deadline_s: of one inspection; the durations' buckets lie around it.
+            clock: monotonic, s.
+        """
+        self.registry = CollectorRegistry(auto_describe=False)
+        ProcessCollector(registry=self.registry)
+        self._clock = clock
+        self._seen: dict[str, set[str]] = {}
+        self._heard_s: dict[str, float] = {}
+        self._status: Callable[[], Status] | None = None
+        buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
+        self._made = {key: self._make(row, buckets) for key, row in TABLE.items() if key not in _COLLECTED}
+        self.registry.register(_AtScrape(self._at_scrape))
+        self._made["build"].info(self._labels({"version": version, "python": platform.python_version()}))
+
+    def inspection(self, fruit: str, outcome: Outcome, phases_s: Mapping[str, float] | None = None) -> None:
+        """Count one inspection; call it when `Records.published` says that it is the first time.
+
+        Args:
+            fruit: the recipe's name, empty for none.
+            outcome: what the PLC was given.
+            phases_s: how long each phase took.
+        """
+        fruit = fruit or "none"
+        reason = outcome.reasons[0] if outcome.reasons else "none"
+        self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
+        self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
+        if outcome.late:
+            self._of("late", fruit=fruit).inc()
+        if outcome.area_mm2 is not None:
+            self._of("area", fruit=fruit).observe(outcome.area_mm2)
+        if outcome.closing_mm is not None:
+            self._of("closing", fruit=fruit).observe(outcome.closing_mm)
+        for phase, seconds in (phases_s or {}).items():
+            self._of("phase", phase=phase).observe(seconds)
+
+    def frame(self, state: str = "good", number: int = 1) -> None:
+        """Count frames: `good`, `dropped`, or the name of a `FrameFault`."""
+        self._of("frames", state=state).inc(number)
+
+    def reference(self, age_s: float, drift_grey_levels: float) -> None:
+        """Set what is known of the reference in use."""
+        self._of("reference_age").set(age_s)
+        self._of("reference_drift").set(drift_grey_levels)
+
+    def refused(self, reason: str) -> None:
+        """Count a trigger that was not accepted, by its `Refusal`."""
+        self._of("refused", reason=reason).inc()
+
+    def unexpected(self) -> None:
+        """Count an event that the cycle's table does not list."""
+        self._of("unexpected").inc()
+
+    def heard(self, link: str) -> None:
+        """Note a sign of life of a device, process or heartbeat; its age is shown from now on."""
+        self._heard_s[self._label("link", link)] = self._clock()
+
+    def alarms(self, active: Iterable[tuple[str, str]]) -> None:
+        """Show these alarms, as id and priority, and no other, as active."""
+        shown = {(self._label("id", name), self._label("priority", priority)) for name, priority in active}
+        gauge = self._made["alarms"]
+        for name, priority in self._seen_alarms - shown:
+            gauge.labels(name, priority).set(0)
+        for name, priority in shown:
+            gauge.labels(name, priority).set(1)
+        self._seen_alarms |= shown
+
+    def waiting(self, outcomes: int) -> None:
+        """Set how many outcomes the PLC has not acknowledged."""
+        self._of("waiting").set(outcomes)
+
+    def restarted(self, process: str) -> None:
+        """Count a process that was started again."""
+        self._of("restarts", process=process).inc()
+
+    def ready(self, *, ready: bool) -> None:
+        """Set whether a trigger would be accepted."""
+        self._of("ready").set(ready)
+
+    def watch_records(self, status: Callable[[], Status]) -> None:
+        """Ask the records at each scrape: `Records.status`."""
+        self._status = status
+
+    def exposition(self) -> bytes:
+        """Everything in Prometheus' text format 0.0.4."""
+        return generate_latest(self.registry)
