@@ -19,6 +19,7 @@ from station.settings.problems import Contradiction, Problem, SettingsError, dot
 from station.settings.problems import Path as Where
 from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
+from station.settings.service import ServiceSettings
 from station.settings.validation import validated
 from station.settings.yaml_loader import Document, read_document
 
@@ -133,6 +134,9 @@ class Configuration(Settings):
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
     records: RecordsSettings = setting(
         RecordsSettings(), title="Records", description="What the station keeps of its inspections."
+    )
+    service: ServiceSettings = setting(
+        ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."
     )
 
     @model_validator(mode="after")

@@ -1,0 +1,108 @@
+"""How the station inspects: where its processes meet, its deadlines, and what it makes of the gel's reference."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator
+
+from station.settings.model import Settings, setting
+
+
+def _local(endpoint: str) -> str:
+    """Refuse what another machine could reach, and what the machine cannot bind."""
+    if not endpoint.startswith(("ipc:///", "tcp://127.")):
+        raise ValueError("expected tcp://127.0.0.1:PORT or ipc:///PATH")
+    return endpoint
+
+
+Endpoint = Annotated[str, AfterValidator(_local)]
+
+
+class ReferenceSettings(Settings):
+    """When a picture of the untouched gel is good enough to measure against."""
+
+    oldest_s: float = setting(
+        30.0,
+        title="Oldest reference",
+        description="Between the reference and the last step's frame; light and gel drift, so an older one misleads.",
+        unit="s",
+        ge=1.0,
+        le=3600.0,
+    )
+    saturated_share: float = setting(
+        0.05,
+        title="Saturated share",
+        description="Largest share of pixels at the end of the grey scale.",
+        gt=0.0,
+        le=1.0,
+    )
+    least_sharpness: float = setting(
+        0.5,
+        title="Least sharpness",
+        description="Fine detail as a share of the golden reference's; less is a fogged or dirty lens.",
+        gt=0.0,
+        le=1.0,
+    )
+    most_drift_levels: float = setting(
+        25.0,
+        title="Most drift",
+        description="Root mean square of the light's change since the golden reference; more asks for a look at the "
+        "LEDs and a new golden reference.",
+        unit="grey levels",
+        gt=0.0,
+        le=255.0,
+    )
+
+
+class ServiceSettings(Settings):
+    """The station's own process."""
+
+    channel: Endpoint = setting(
+        "tcp://127.0.0.1:5021",
+        title="Channel",
+        description="Where the PLC interface and the pages reach the station; loopback or a socket file only.",
+        max_length=100,
+    )
+    bench: bool = setting(
+        False, title="Bench", description="No arm: the gripper is fixed and the fruit lies between its fingers."
+    )
+    placing: Literal["nest", "arm"] = setting(
+        "nest",
+        title="Placing",
+        description="`nest` lets the fruit go where it lay, for the line to divert; `arm` carries it to the accept or "
+        "reject pose by its outcome.",
+    )
+    inspection_deadline_s: float = setting(
+        45.0,
+        title="Inspection's deadline",
+        description="From trigger to outcome; what is not judged by then is NO_RESULT with the reason late.",
+        unit="s",
+        ge=1.0,
+        le=600.0,
+    )
+    clean_up_deadline_s: float = setting(
+        20.0,
+        title="Clean-up's deadline",
+        description="After the outcome: longest wait until the jaws are open and the arm is home.",
+        unit="s",
+        ge=1.0,
+        le=120.0,
+    )
+    retry_longest_s: float = setting(
+        10.0,
+        title="Longest pause",
+        description="Between two tries to reach a device again; the first comes after a quarter of a second.",
+        unit="s",
+        ge=0.25,
+        le=300.0,
+    )
+    progress_s: float = setting(
+        5.0,
+        title="Progress",
+        description="Without progress of the cycle or of a device for so long, the heartbeat to the PLC stops.",
+        unit="s",
+        ge=1.0,
+        le=60.0,
+    )
+    reference: ReferenceSettings = setting(
+        ReferenceSettings(), title="Reference", description="When a picture of the untouched gel is good enough."
+    )
