@@ -86,7 +86,8 @@ class RecipeBook:
     def last_active(self) -> Active | None:
         """The recipe that was chosen last, in its present form; None where none was, or it is gone."""
         recipe = _parsed(self._kept.read(_ACTIVE))
-        return None if recipe is None else self.find(recipe.plc_number)
+        found = None if recipe is None else self.find(recipe.plc_number)
+        return found if found is not None and recipe is not None and found.recipe.name == recipe.name else None
 
     def remember(self, active: Active) -> bool:
         """Keep the choice over a restart.
