@@ -51,13 +51,13 @@ class Golden:
         picture = None if data is None else cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         return None if picture is None else np.asarray(picture, np.uint8)
 
-    def keep(self, image: Image) -> None:
-        """Make a picture the golden reference.
+    def keep(self, images: Sequence[Image]) -> None:
+        """Make frames of the untouched gel the golden reference.
 
         Args:
-            image: shape (height, width, 3), dtype uint8, BGR.
+            images: of one shape (height, width, 3), dtype uint8, BGR.
         """
-        self._kept.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+        self._kept.write(GOLDEN, cv2.imencode(".png", median_image(images))[1].tobytes())
 
 
 def examine(
