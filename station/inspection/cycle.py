@@ -65,13 +65,13 @@ class Event(StrEnum):
 
 
 class Action(StrEnum):
-    """What the service has to do; the comment names the events that it ends with beside the faults."""
+    """What the service has to do, and the events that it ends with beside the faults."""
 
     READ_DEVICES = "read_devices"
     """Read every device until all answer: READY, or the stop that stands."""
     CLOSE_UNFINISHED = "close_unfinished"
-    """Give every accepted trigger without an outcome its NO_RESULT, durable, then published. Idempotent.
-    UNFINISHED_CLOSED."""
+    """Give every accepted trigger that has no durable outcome its NO_RESULT, durable, and publish every outcome that
+    was not: UNFINISHED_CLOSED. Idempotent."""
     OPEN_JAWS = "open_jaws"
     """JAWS_OPEN. Idempotent."""
     GO_HOME = "go_home"
