@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from typing import Literal
 
 import uvicorn
-from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
@@ -165,8 +164,9 @@ class HealthServer:
         finally:
             self._server = self._task = None
 
-    async def _metrics_page(self, _request: Request) -> Response:
-        return Response(self._metrics.exposition(), media_type=CONTENT_TYPE_LATEST)
+    async def _metrics_page(self, request: Request) -> Response:
+        content, kind = self._metrics.exposition(request.headers.get("accept", ""))
+        return Response(content, headers={"content-type": kind})
 
     async def _livez(self, _request: Request) -> Response:
         stuck = self._liveness.stuck()

@@ -33,8 +33,8 @@ def configure_logging(
         level: the least that is logged.
         stream: standard error by default.
     """
-    stream = stream or sys.stderr
-    terminal = stream.isatty()
+    output: TextIO = stream or sys.stderr
+    terminal = output.isatty()
     human = style == "human" or (style == "auto" and terminal)
 
     def name_process(_logger: Any, _method: str, event: EventDict) -> EventDict:
@@ -50,19 +50,19 @@ def configure_logging(
         _hide_secrets,
         structlog.processors.StackInfoRenderer(),
     ]
-    last: list[Processor]
+    render: Processor = structlog.processors.JSONRenderer(ensure_ascii=False, default=str)
     if human:
-        last = [structlog.dev.ConsoleRenderer(colors=terminal, timestamp_key="time", pad_event_to=0)]
-    else:
-        last = [
-            structlog.processors.dict_tracebacks,
-            structlog.processors.JSONRenderer(ensure_ascii=False, default=str),
-        ]
-    handler = logging.StreamHandler(stream)
+        render = structlog.dev.ConsoleRenderer(colors=terminal, timestamp_key="time", pad_event_to=0)
+    handler = logging.StreamHandler(output)
     handler.setFormatter(
         structlog.stdlib.ProcessorFormatter(
             foreign_pre_chain=[*shared, structlog.stdlib.ExtraAdder()],
-            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, _hide_secrets, *last],
+            processors=[
+                structlog.stdlib.ProcessorFormatter.remove_processors_meta,
+                _hide_secrets,
+                structlog.processors.format_exc_info,  # without local variables, which may be secrets
+                render,
+            ],
         )
     )
     root = logging.getLogger()
@@ -71,7 +71,8 @@ def configure_logging(
     handler.of_the_station = True  # type: ignore[attr-defined]
     root.addHandler(handler)
     root.setLevel(level)
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    for chatty in ("alembic", "uvicorn"):
+        logging.getLogger(chatty).setLevel(logging.WARNING)
     structlog.configure(
         processors=[
             structlog.stdlib.filter_by_level,

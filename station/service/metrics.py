@@ -9,8 +9,17 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector, generate_latest
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    Info,
+    ProcessCollector,
+    disable_created_metrics,
+)
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
 from station.channel.line import Outcome
@@ -31,12 +40,14 @@ class Metrics:
             deadline_s: of one inspection; the durations' buckets lie around it.
             clock: monotonic, s.
         """
+        disable_created_metrics()  # a series more for each counter, which nobody asks for
         self.registry = CollectorRegistry(auto_describe=False)
         ProcessCollector(registry=self.registry)
         self._clock = clock
         self._values: dict[str, set[str]] = {}
         self._heard_s: dict[str, float] = {}
         self._active: set[tuple[str, str]] = set()
+        self._reference: tuple[float, float] | None = None
         self._status: Callable[[], Status] | None = None
         buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
         self._made: dict[str, Any] = {
@@ -73,9 +84,8 @@ class Metrics:
         self._of("frames", state=state).inc(number)
 
     def reference(self, age_s: float, drift_grey_levels: float) -> None:
-        """Set what is known of the reference in use."""
-        self._of("reference_age").set(age_s)
-        self._of("reference_drift").set(drift_grey_levels)
+        """Tell the age of the reference in use, which grows from now on, and its distance from the golden one."""
+        self._reference = (self._clock() - age_s, drift_grey_levels)
 
     def refused(self, reason: str) -> None:
         """Count a trigger that was not accepted, by its `Refusal`."""
@@ -112,9 +122,14 @@ class Metrics:
         """Ask the records at each scrape: `Records.status`."""
         self._status = status
 
-    def exposition(self) -> bytes:
-        """Everything in Prometheus' text format 0.0.4."""
-        return generate_latest(self.registry)
+    def exposition(self, accept: str = "") -> tuple[bytes, str]:
+        """Everything, and the content type.
+
+        Args:
+            accept: the client's header of that name; empty for Prometheus' text format.
+        """
+        encode, content_type = choose_encoder(accept)
+        return encode(self.registry), content_type
 
     def _of(self, key: str, **labels: str) -> Any:
         metric = self._made[key]
@@ -138,6 +153,10 @@ class Metrics:
         for link, heard_s in tuple(self._heard_s.items()):
             ages.add_metric([link], now_s - heard_s)
         yield ages
+        if self._reference is not None:
+            taken_s, drift_grey_levels = self._reference
+            yield GaugeMetricFamily(TABLE["reference_age"].name, TABLE["reference_age"].help, now_s - taken_s)
+            yield GaugeMetricFamily(TABLE["reference_drift"].name, TABLE["reference_drift"].help, drift_grey_levels)
         if self._status is not None:
             yield from _of_records(self._status())
 

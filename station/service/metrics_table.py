@@ -67,12 +67,14 @@ TABLE: dict[str, Row] = {
     ),
     "area": Row("station_contact_area_mm2", "histogram", ("fruit",), "Contact area that decided", _MM2),
     "closing": Row("station_closing_mm", "histogram", ("fruit",), "Closing at which the area decided", _MM),
-    "frames": Row(
-        "station_frames", "counter", ("state",), "Frames by what was found wrong with them; good where nothing"
-    ),
-    "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use"),
+    "frames": Row("station_frames", "counter", ("state",), "Frames by what is wrong with them; good where nothing"),
+    "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use", at_scrape=True),
     "reference_drift": Row(
-        "station_reference_drift_grey_levels", "gauge", (), "Difference of the reference from the golden reference"
+        "station_reference_drift_grey_levels",
+        "gauge",
+        (),
+        "Difference of the reference from the golden reference",
+        at_scrape=True,
     ),
     "refused": Row("station_triggers_refused", "counter", ("reason",), "Triggers that were not accepted"),
     "unexpected": Row("station_unexpected_events", "counter", (), "Events that the cycle's table does not list"),
