@@ -72,3 +72,9 @@ class RecordsClosedError(RecordsError):
     """The records are closed."""
 
     code = "closed"
+
+
+class BadRecordError(RecordsError):
+    """What was to be recorded is malformed: a fault of the program."""
+
+    code = "bad_record"

@@ -40,6 +40,8 @@ class Row(NamedTuple):
     help: str
     buckets: tuple[float, ...] = ()
     """A histogram's upper bounds; empty where they follow the inspection's deadline."""
+    at_scrape: bool = False
+    """Asked for when it is scraped instead of being set."""
 
 
 _MM2 = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0, 130.0, 160.0, 200.0, 260.0)
@@ -65,29 +67,48 @@ TABLE: dict[str, Row] = {
     ),
     "area": Row("station_contact_area_mm2", "histogram", ("fruit",), "Contact area that decided", _MM2),
     "closing": Row("station_closing_mm", "histogram", ("fruit",), "Closing at which the area decided", _MM),
-    "frames": Row("station_frames", "counter", ("state",), "Frames by what was found wrong with them; good where nothing"),
-    "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use"),
+    "frames": Row("station_frames", "counter", ("state",), "Frames by what is wrong with them; good where nothing"),
+    "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use", at_scrape=True),
     "reference_drift": Row(
-        "station_reference_drift_grey_levels", "gauge", (), "Difference of the reference from the golden reference"
+        "station_reference_drift_grey_levels",
+        "gauge",
+        (),
+        "Difference of the reference from the golden reference",
+        at_scrape=True,
     ),
     "refused": Row("station_triggers_refused", "counter", ("reason",), "Triggers that were not accepted"),
     "unexpected": Row("station_unexpected_events", "counter", (), "Events that the cycle's table does not list"),
     "link_age": Row(
-        "station_link_age_seconds", "gauge", ("link",), "Time since a device, process or heartbeat was last heard"
+        "station_link_age_seconds",
+        "gauge",
+        ("link",),
+        "Time since a device, process or heartbeat was last heard",
+        at_scrape=True,
     ),
     "alarms": Row("station_alarms_active", "gauge", ("id", "priority"), "1 while an alarm's cause is there"),
     "waiting": Row("station_outcomes_waiting", "gauge", (), "Outcomes that the PLC has not acknowledged"),
     "restarts": Row("station_process_restarts", "counter", ("process",), "Times a process was started again"),
     "ready": Row("station_ready", "gauge", (), "1 while a trigger would be accepted"),
     "build": Row("station_build", "info", ("version", "python"), "What runs"),
-    "records_writes": Row("station_records_writes", "counter", (), "Transactions made durable"),
-    "records_failures": Row("station_records_failures", "counter", ("code",), "Requests to the records that failed"),
-    "records_queue": Row("station_records_queue", "gauge", (), "Requests that wait for the database"),
-    "records_bytes": Row("station_records_bytes", "gauge", ("kind",), "Space that the records take"),
-    "records_free": Row("station_records_free_bytes", "gauge", (), "Space left on the records' disk"),
-    "records_images": Row("station_records_images", "counter", ("result",), "Images by what became of them"),
+    "records_writes": Row("station_records_writes", "counter", (), "Transactions made durable", at_scrape=True),
+    "records_failures": Row(
+        "station_records_failures", "counter", ("code",), "Requests to the records that failed", at_scrape=True
+    ),
+    "records_queue": Row("station_records_queue", "gauge", (), "Requests that wait for the database", at_scrape=True),
+    "records_images_queue": Row(
+        "station_records_images_queue", "gauge", (), "Inspections whose images wait for the disk", at_scrape=True
+    ),
+    "records_bytes": Row("station_records_bytes", "gauge", ("kind",), "Space that the records take", at_scrape=True),
+    "records_free": Row("station_records_free_bytes", "gauge", (), "Space left on the records' disk", at_scrape=True),
+    "records_images": Row(
+        "station_records_images", "counter", ("result",), "Images by what became of them", at_scrape=True
+    ),
     "records_write_age": Row(
-        "station_records_last_write_age_seconds", "gauge", (), "Time since the last transaction; absent before it"
+        "station_records_last_write_age_seconds",
+        "gauge",
+        (),
+        "Time since the last transaction; absent before it",
+        at_scrape=True,
     ),
 }
 

@@ -17,7 +17,10 @@ class RecordsSettings(Settings):
     free_reserve_mb: int = setting(
         200,
         title="Free reserve",
-        description="With less space than this (megabytes) left on the disk no inspection is begun and no image kept.",
+        description=(
+            "With less space than this (megabytes) left on the disk no inspection is begun; with less than twice as "
+            "much, images are removed as beyond their quota."
+        ),
         unit="MB",
         ge=1,
         le=1_000_000,
