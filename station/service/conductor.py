@@ -45,7 +45,7 @@ def event_of(fault: BaseException) -> Event:
     return Event.INTERNAL_FAULT
 
 
-_ON_THE_DISK = {Action.RECORD, Action.RECORD_TRIGGER}
+_ON_THE_DISK = {Action.RECORD}
 """What HALT does not touch: it is no motion, and what follows waits for it."""
 
 

@@ -44,7 +44,7 @@ class Crew:
         on_progress: Callable[[str], None],
     ) -> None:
         arm = None if configuration.service.bench else UrArm(configuration.arm)
-        self._arm = arm
+        self._arm, self._configuration = arm, configuration
         self.cell = Cell(camera_from(configuration.camera), make_gripper(configuration.gripper), arm)
         self.simulated = (
             configuration.camera.driver != "digit"
@@ -87,6 +87,12 @@ class Crew:
             await self.cell.gripper.close()
         if self._arm is not None:
             await self._arm.close()
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Who takes part, for the records."""
+        names = {CAMERA: self.cell.camera.description.name, GRIPPER: f"Robotiq 2F-85 by {self._configuration.gripper.driver}"}
+        return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
 
     @property
     def faults(self) -> dict[str, StationError]:

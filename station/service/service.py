@@ -3,13 +3,15 @@
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable
-from functools import partial
+from collections.abc import Awaitable, Mapping
+from dataclasses import replace
+from itertools import combinations
 
 from station.channel.line import Begin, Begun, Open, Outcome
+from station.devices.arm.ur import POSES
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.cycle import UNJUDGED, Action, Event, Raise
+from station.inspection.cycle import REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.deadlines import Pace, deadlines, late
 from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
@@ -25,6 +27,7 @@ from station.service.logs import fruit_line, inspecting
 from station.service.metrics import Metrics
 from station.service.recipe_book import Active
 from station.service.triggers import Pending, Triggers
+from station.settings.arm import ArmSettings
 from station.settings.configuration import Configuration
 from station.vocabulary import Reason, Refusal
 
@@ -60,6 +63,7 @@ class Service:
         alarms: the desk.
         metrics: counts.
         liveness: fed with the cycle's progress.
+        versions: of the programs, for the records.
     """
 
     def __init__(
@@ -71,10 +75,12 @@ class Service:
         alarms: AlarmDesk,
         metrics: Metrics,
         liveness: Liveness,
+        versions: Mapping[str, str],
     ) -> None:
         self._settings, self._configuration = configuration.service, configuration
-        self._records, self._crew, self._inspector = records, crew, inspector
+        self.records, self._crew, self._inspector = records, crew, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
+        self._versions = versions
         self.conductor = Conductor(self)
         self.triggers = Triggers()
         self.active: Active | None = None
@@ -85,7 +91,9 @@ class Service:
         self._pending: Pending | None = None
         self._now: Inspection | None = None
         self._unrecorded: list[Inspection] = []
-        self._beginning = asyncio.Lock()
+        self.records_fault: RecordsError | None = None
+        """Why the records are not to be relied on, until they were opened again."""
+        self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
         self._background: set[asyncio.Task[None]] = set()
         self._told_late: State | None = None
 
@@ -137,7 +145,7 @@ class Service:
             sequence: its number.
         """
         if self.triggers.inspection(sequence) is None:
-            for outcome in (await self._records.open_inspections()).ended:
+            for outcome in (await self.records.open_inspections()).ended:
                 if outcome.sequence == sequence:
                     return outcome
         return await self.triggers.outcome(sequence)
@@ -148,7 +156,7 @@ class Service:
         Args:
             outcome: what stands from now on.
         """
-        first = await self._records.published(outcome)
+        first = await self.records.published(outcome)
         self.triggers.published(outcome)
         if first:
             now = self.triggers.inspection(outcome.sequence)
@@ -157,7 +165,7 @@ class Service:
 
     async def open(self) -> Open:
         """What was begun and not acknowledged."""
-        held = await self._records.open_inspections()
+        held = await self.records.open_inspections()
         now = self.running
         running = None if now is None or now.sequence is None else (now.sequence, now.trigger.trigger_id)
         return Open(running=running, outcomes=held.ended)
@@ -262,8 +270,9 @@ class Service:
     async def _check(self) -> Event:
         if self.stop_asked:
             return Event.STOP
-        for fault in self._crew.faults.values():
-            raise fault
+        for fault in (*self._crew.faults.values(), self.records_fault):
+            if fault is not None:
+                raise fault
         return Event.READY
 
     async def _recover_arm(self) -> Event:
@@ -274,16 +283,14 @@ class Service:
         pending = self._pending
         if pending is None:
             raise RuntimeError("no trigger is waiting")
-        now = pending.inspection
+        pending.recording = asyncio.ensure_future(self.records.begin(pending.inspection.trigger))
         try:
-            now.sequence = await self._records.begin(now.trigger)
-        except RecordsError:
+            pending.inspection.sequence = await pending.recording
+        except RecordsError as error:
+            self.records_fault = error
             pending.answer(self._refused(Refusal.RECORDS_FULL))
             raise
-        if pending.withdrawn is None:
-            return Event.TRIGGER_RECORDED
-        await self._accept_and_close(pending)
-        return None
+        return Event.TRIGGER_RECORDED
 
     def _accept(self) -> None:
         pending, self._pending = self._pending, None
@@ -295,30 +302,31 @@ class Service:
         pending.answer(self._begun(now))
 
     def _refuse(self, because: Happened) -> None:
-        """A trigger of which nothing comes: refused where it is not durable, else accepted and closed."""
-        pending = self._pending
+        """Nothing comes of the trigger: refused where it is not durable yet, else accepted and closed."""
+        pending, self._pending = self._pending, None
         if pending is None:
             return
-        pending.withdrawn = StationError(because.why)
-        if pending.inspection.sequence is not None:
-            self._in_background(self._accept_and_close(pending))
-        elif because.event is Event.RECORDS_FAULT:
-            pending.answer(self._refused(Refusal.RECORDS_FULL))
-
-    async def _accept_and_close(self, pending: Pending) -> None:
-        self.conductor.post  # noqa: B018
         now = pending.inspection
+        if now.sequence is None:
+            if pending.recording is not None:
+                pending.recording.cancel()  # which takes the record back
+            pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
+            return
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
         pending.answer(self._begun(now))
-        now.interrupt(Reason.CALLED_OFF, str(pending.withdrawn))
+        now.interrupt(REASONS[because.event], because.why)
         self._unrecorded.append(now)
-        await self._close_unfinished()
+        self._in_background(self._close_unfinished())
 
     async def _record(self, now: Inspection) -> Event:
         if now.sequence is None:
             raise RuntimeError("an inspection without a sequence is recorded")
-        now.standing = await self._records.conclude(now.sequence, self._with_devices(now.record()))
+        try:
+            now.standing = await self.records.conclude(now.sequence, self._signed(now.record()))
+        except RecordsError as error:
+            self.records_fault = error
+            raise
         return Event.RECORDED
 
     def _publish(self, now: Inspection) -> None:
@@ -329,14 +337,15 @@ class Service:
                 log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))
 
     async def _close_unfinished(self) -> Event:
-        while self._unrecorded:
-            now = self._unrecorded[0]
-            now.outcome_name = "NO_RESULT"
-            if not now.interruptions:
-                now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
-            await self._record(now)
-            self._publish(now)
-            self._unrecorded.remove(now)
+        async with self._closing:
+            while self._unrecorded:
+                now = self._unrecorded[0]
+                now.outcome_name = "NO_RESULT"
+                if not now.interruptions:
+                    now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
+                await self._record(now)
+                self._publish(now)
+                self._unrecorded.remove(now)
         return Event.UNFINISHED_CLOSED
 
     # Small parts.
@@ -355,14 +364,14 @@ class Service:
         arm = self._configuration.arm
         return Pace(
             frames_per_s=self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S,
-            arm_move_s=0.0 if self._crew.cell.arm is None else arm.longest_move_s,
+            arm_move_s=0.0 if self._crew.cell.arm is None else longest_move_s(arm),
             stroke_mm=self._crew.cell.gripper.max_width_mm,
             record_s=self._configuration.records.deadline_s,
             measure_s=_MEASURE_S,
         )
 
-    def _with_devices(self, record: InspectionRecord) -> InspectionRecord:
-        return record
+    def _signed(self, record: InspectionRecord) -> InspectionRecord:
+        return replace(record, devices=self._crew.names, versions=self._versions)
 
     def _tell_late(self) -> None:
         now = self._now
@@ -383,3 +392,14 @@ class Service:
         task = asyncio.ensure_future(work)
         self._background.add(task)
         task.add_done_callback(self._background.discard)
+
+
+def longest_move_s(arm: ArmSettings) -> float:
+    """The longest way between two of the arm's places: its leading joint speeds up, travels and brakes.
+
+    Args:
+        arm: poses, speed and acceleration.
+    """
+    places = [arm.poses.joints_rad(pose) for pose in POSES]
+    ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in combinations(places, 2)]
+    return max(ways_rad) / arm.joint_speed_rad_s + arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2

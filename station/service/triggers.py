@@ -4,7 +4,6 @@ import asyncio
 from collections import OrderedDict
 
 from station.channel.line import Begin, Begun, Outcome
-from station.errors import StationError
 from station.records.errors import UnknownInspectionError
 from station.service.inspection import Inspection
 
@@ -97,8 +96,8 @@ class Pending:
 
     def __init__(self, request: Begin, inspection: Inspection) -> None:
         self.request, self.inspection = request, inspection
-        self.withdrawn: StationError | None = None
-        """Why nothing comes of it, although it may become durable."""
+        self.recording: asyncio.Future[int] | None = None
+        """Makes it durable; where it is cancelled, the record is taken back."""
         self._answer: asyncio.Future[Begun] = asyncio.get_running_loop().create_future()
 
     def answer(self, begun: Begun) -> None:

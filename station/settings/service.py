@@ -26,8 +26,8 @@ class ReferenceSettings(Settings):
     least_sharpness: float = setting(
         0.7,
         title="Least sharpness",
-        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where a fog "
-        "of 0.4 of the worst reaches it.",
+        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where 0.4 of "
+        "its worst fog reaches it.",
         gt=0.0,
         le=1.0,
     )
@@ -46,7 +46,9 @@ class ServiceSettings(Settings):
     """The station's own process."""
 
     bench: bool = setting(
-        False, title="Bench", description="No arm: the gripper is fixed and the fruit lies between its fingers."
+        default=False,
+        title="Bench",
+        description="No arm: the gripper is fixed and the fruit lies between its fingers.",
     )
     placing: Literal["nest", "arm"] = setting(
         "nest",
@@ -54,10 +56,17 @@ class ServiceSettings(Settings):
         description="`nest` lets the fruit go where it lay, for the line to divert; `arm` carries it to the accept or "
         "reject pose by its outcome.",
     )
-    inspection_deadline_s: float = setting(
-        45.0,
+    automatic_reset: bool = setting(
+        default=True,
+        title="Automatic reset",
+        description="Make ready after a start, and after a fault that is gone: the jaws open and the arm goes home. "
+        "After a safety stop, or with a fruit left between the jaws, a person's reset is always needed.",
+    )
+    inspection_deadline_s: float | None = setting(
+        None,
         title="Inspection's deadline",
-        description="From trigger to outcome; what is not judged by then is NO_RESULT with the reason late.",
+        description="From trigger to outcome, where the line wants it sooner than the recipe's steps need at most; what "
+        "is not judged by then is NO_RESULT with the reason late. Null for the recipe's own.",
         unit="s",
         ge=1.0,
         le=600.0,
