@@ -9,10 +9,10 @@ from plc_interface.handshake.modes import TIMERS, Signal
 from plc_interface.handshake.state import State
 from plc_interface.handshake.table import apply
 from plc_interface.handshake.work import Work
-from station.settings.plc import PlcSettings
+from station.settings.plc import HandshakeSettings
 
 
-def step(before: State, event: Event, settings: PlcSettings) -> tuple[State, tuple[Action, ...]]:
+def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[State, tuple[Action, ...]]:
     """The state after an event, and the actions to carry out in their order.
 
     Timers that ran out before the event come first, then the event. `before` is not changed.

@@ -10,7 +10,7 @@ from plc_interface.handshake.events import Event, Moment
 from plc_interface.handshake.modes import Mode, Signal
 from plc_interface.handshake.state import Fault, State
 from station.channel.line import Outcome
-from station.settings.plc import PlcSettings
+from station.settings.plc import HandshakeSettings
 
 
 @dataclass(slots=True)
@@ -20,7 +20,7 @@ class Work:
     state: State
     at: Moment
     event: Event
-    settings: PlcSettings
+    settings: HandshakeSettings
     actions: list[Action] = field(default_factory=list)
     signals: deque[Signal] = field(default_factory=deque)
     found: Outcome | None = None

@@ -12,7 +12,7 @@ LONGEST_SOCKET_PATH = 107
 """Linux, unix(7): a socket's path with its closing NUL fits 108 bytes."""
 
 
-class PlcSettings(Settings):
+class HandshakeSettings(Settings):
     """The handshake's deadlines and time-outs, and where the interface reaches the station."""
 
     endpoint: str | None = setting(
@@ -93,7 +93,7 @@ class PlcSettings(Settings):
         return self
 
 
-def line_endpoint(settings: PlcSettings, home: Path) -> str:
+def line_endpoint(settings: HandshakeSettings, home: Path) -> str:
     """Where the station serves the line's channel and the PLC interface looks for it.
 
     Args:
@@ -108,6 +108,6 @@ def line_endpoint(settings: PlcSettings, home: Path) -> str:
     if path != endpoint and len(path.encode()) > LONGEST_SOCKET_PATH:
         raise BadInputError(
             f"the line's socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
-            "choose a shorter home folder, or set plc.endpoint to a short ipc:// path"
+            "choose a shorter home folder, or set handshake.endpoint to a short ipc:// path"
         )
     return endpoint
