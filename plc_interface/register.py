@@ -1,0 +1,123 @@
+"""What a register of the map is."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import NamedTuple
+
+
+class Access(StrEnum):
+    """Who may write."""
+
+    READ_ONLY = "read only"
+    READ_WRITE = "read and write"
+
+
+class Kind(StrEnum):
+    """How a value lies in its registers."""
+
+    U16 = "u16"
+    I16 = "i16"
+    U32 = "u32"
+    I32 = "i32"
+    U64 = "u64"
+    F32 = "f32"
+    """IEEE 754 binary32."""
+    TEXT = "text"
+    """ASCII, two characters a register, the first in the high byte, filled up with NUL; never in another word order."""
+    BITS = "bits16"
+    BITS32 = "bits32"
+
+
+WORDS = {
+    Kind.U16: 1,
+    Kind.I16: 1,
+    Kind.BITS: 1,
+    Kind.U32: 2,
+    Kind.I32: 2,
+    Kind.F32: 2,
+    Kind.BITS32: 2,
+    Kind.U64: 4,
+}
+"""Registers of one value, for every kind but TEXT."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bit:
+    """One flag, counted from the value's least significant bit, which is 0."""
+
+    number: int
+    name: str
+    meaning: str
+
+
+class Code(NamedTuple):
+    """One value of an enumeration."""
+
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One value of the map, in one or more registers."""
+
+    name: str
+    address: int
+    """PDU address of its first register, from 0."""
+    kind: Kind
+    access: Access
+    unit: str
+    """Empty for a number without one."""
+    low: float | None
+    """Smallest valid value; None for texts and bits, and where the kind is the bound."""
+    high: float | None
+    meaning: str
+    bits: tuple[Bit, ...] = ()
+    """Every flag that has a meaning; the others are 0 and stay so."""
+    codes: Mapping[int, Code] = field(default_factory=dict, hash=False)
+    """The only valid values of an enumeration; empty for what is none."""
+    invalid: float | None = None
+    """The value that says that there is none, such as 0x80000000 for an area; valid outside the bounds."""
+    text_words: int = 0
+    """Registers of a TEXT, two characters each."""
+
+    @property
+    def words(self) -> int:
+        """How many registers the value takes."""
+        return self.text_words if self.kind is Kind.TEXT else WORDS[self.kind]
+
+    @property
+    def end(self) -> int:
+        """The address behind its last register."""
+        return self.address + self.words
+
+    @property
+    def mask(self) -> int:
+        """All its flags that have a meaning."""
+        return sum(1 << bit.number for bit in self.bits)
+
+    def bit(self, name: str) -> int:
+        """The mask of one flag; KeyError where the register has none of that name."""
+        for bit in self.bits:
+            if bit.name == name:
+                return 1 << bit.number
+        raise KeyError(name)
+
+    def flags(self, names: Iterable[str]) -> int:
+        """The value in which exactly these flags are set; KeyError for a name that it has not."""
+        value = 0
+        for name in names:
+            value |= self.bit(name)
+        return value
+
+    def names(self, value: int) -> frozenset[str]:
+        """The flags that are set in a value; those without a meaning are left out."""
+        return frozenset(bit.name for bit in self.bits if value >> bit.number & 1)
+
+    def code(self, name: str) -> int:
+        """The value that an enumeration's name stands for; KeyError where it has none."""
+        for value, code in self.codes.items():
+            if code.name == name:
+                return value
+        raise KeyError(name)
