@@ -16,9 +16,12 @@ from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
 from station.settings.network import Host
 from station.settings.paths import Folder
+from station.settings.plc import HandshakeSettings
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
+from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
+from station.settings.service import ServiceSettings
 from station.settings.validation import validated
 from station.settings.yaml_loader import Document, read_document
 
@@ -74,6 +77,9 @@ class Configuration(Settings):
     modbus: ModbusSettings = setting(
         ModbusSettings(), title="Modbus TCP", description="Where the line's PLC reaches the station."
     )
+    handshake: HandshakeSettings = setting(
+        HandshakeSettings(), title="Handshake", description="How the PLC interface waits for the PLC and the station."
+    )
     hmi: HmiSettings = setting(HmiSettings(), title="HMI", description="Where operators' browsers reach the station.")
     metrics: MetricsSettings = setting(
         MetricsSettings(), title="Metrics", description="Where Prometheus and supervisors reach the station."
@@ -82,6 +88,12 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    records: RecordsSettings = setting(
+        RecordsSettings(), title="Records", description="What the station keeps of its inspections."
+    )
+    service: ServiceSettings = setting(
+        ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."
+    )
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:

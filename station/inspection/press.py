@@ -1,0 +1,47 @@
+"""One press as it was measured: what the judge is given, in plain values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from station.vocabulary import Reason
+
+
+class Flag(StrEnum):
+    """What a reader of an area has to know about it; the same words as the measurement's own flags."""
+
+    NO_CONTACT = "no_contact"
+    UNDECIDED = "undecided"
+    CUT_BY_BORDER = "cut_by_border"
+    SATURATED = "saturated"
+    LOW_CONFIDENCE = "low_confidence"
+    REFERENCE_MISMATCH = "reference_mismatch"
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One measured width step."""
+
+    closing_mm: float
+    """Onset minus the measured width; negative before the first contact."""
+    area_mm2: float
+    area_px: int
+    area_uncertainty_mm2: float
+    """Half the interval in which another image of the same contact would lie. The error of the scale, which all of a
+    unit's areas and its recipes' limits share, is no part of it."""
+    confidence: float | None
+    """0 to 1; None where the method does not say, which is no trust."""
+    flags: frozenset[Flag] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """One inspection's measured steps."""
+
+    onset_mm: float | None
+    """The measured gripper width at first contact, so the fruit's width; None where nothing was touched."""
+    onset_uncertainty_mm: float
+    """How much sooner the contact may have begun: from the last image without it to the first with it."""
+    points: tuple[Measured, ...]
+    """In any order."""
+    interruptions: tuple[Reason, ...] = ()
+    """What ended the steps or spoilt them from outside the measurement: a fault, called off, late, a bad reference."""

@@ -1,0 +1,218 @@
+"""The SQLite file: how it is opened, checked, brought up to date, and moved aside when it is damaged."""
+
+import json
+import math
+import shutil
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from alembic import command
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy.pool import NullPool
+
+from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
+from station.records.failures import in_words
+
+FILE_NAME = "records.sqlite3"
+MIGRATIONS = Path(__file__).parent / "migrations"
+CHECK_S = 5.0
+"""A large database is checked no longer than this at a start; damage found later is told by SQLite itself."""
+BUSY_MS = 1000
+
+
+def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
+    """Make an engine whose connections write ahead, durably, with real transactions.
+
+    Args:
+        path: the database.
+        mode: read only, read and write, or made where it is missing.
+    """
+    read_only = mode == "ro"
+    engine = create_engine(
+        f"sqlite:///file:{path.absolute().as_posix().replace('%', '%25').replace('?', '%3f').replace('#', '%23')}"
+        f"?mode={mode}&uri=true",
+        poolclass=NullPool,
+        json_serializer=_to_json,
+    )
+
+    @event.listens_for(engine, "connect")
+    def _prepare(connection: sqlite3.Connection, _record: Any) -> None:
+        connection.isolation_level = None  # the driver would begin and commit by its own rules
+        connection.execute(f"PRAGMA busy_timeout = {BUSY_MS}")
+        connection.execute("PRAGMA foreign_keys = ON")
+        if not read_only:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+            connection.execute(f"PRAGMA journal_size_limit = {64 * 1024 * 1024}")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
+
+    return engine
+
+
+def check(path: Path) -> None:
+    """Look for damage, within `CHECK_S`.
+
+    Args:
+        path: the database, which exists.
+
+    Raises:
+        DamagedError: something is wrong with it.
+        RecordsError: it cannot be read.
+    """
+    until_s = time.monotonic() + CHECK_S
+    try:
+        with closing(sqlite3.connect(path, timeout=BUSY_MS / 1000)) as connection:
+            connection.set_progress_handler(lambda: time.monotonic() > until_s, 10_000)
+            found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+    except sqlite3.Error as error:
+        if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_INTERRUPT:
+            return
+        raise in_words(error, str(path)) from error
+    if found != "ok":
+        raise in_words(_corrupt(found), str(path))
+
+
+def _corrupt(found: str) -> sqlite3.DatabaseError:
+    error = sqlite3.DatabaseError(found)
+    error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
+    return error
+
+
+def move_aside(folder: Path, *names: str) -> Path:
+    """Move a damaged database, and what belongs to it, out of the way.
+
+    Args:
+        folder: the records' folder.
+        names: the files and folders in it; those that are missing are left out.
+
+    Returns:
+        The new folder, named with date and time.
+
+    Raises:
+        OSError: it cannot be moved.
+    """
+    aside = folder / "aside" / stamp()
+    aside.mkdir(parents=True)
+    for name in names:
+        if (folder / name).exists():
+            (folder / name).rename(aside / name)
+    return aside
+
+
+def stamp() -> str:
+    """The date and time as part of a file's name, never the same twice."""
+    return datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+
+
+def migrate(engine: Engine, folder: Path) -> bool:
+    """Bring the schema up to date, with a copy of the database made before.
+
+    Args:
+        engine: of the database.
+        folder: where `backups` lies.
+
+    Returns:
+        Whether the database was a new one.
+
+    Raises:
+        SchemaError: it is a newer program's, or a migration failed; then it is as it was.
+        RecordsError: it cannot be read or written.
+    """
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    scripts = ScriptDirectory.from_config(config)
+    backup: Path | None = None
+    with engine.begin() as connection:
+        found = MigrationContext.configure(connection).get_current_revision()
+        if found == scripts.get_current_head():
+            return False
+        known = {script.revision for script in scripts.walk_revisions()}
+        if found is not None and found not in known:
+            raise SchemaError(
+                f"{engine.url.database} has the form {found!r} of a newer fruit-station",
+                f"install that version again, or put back the copy in {folder / 'backups'} that this version made",
+            )
+    if found is not None:
+        backup = _backed_up(folder, found)
+    try:
+        with engine.begin() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+    except Exception as error:
+        told = in_words(error, str(folder / FILE_NAME))
+        if isinstance(told, (DiskFullError, ReadOnlyError, LockedError, DamagedError)):
+            raise told from error
+        kept = f"; a copy of it is {backup}" if backup else ""
+        raise SchemaError(
+            f"the database could not be brought from form {found} to {scripts.get_current_head()}: {error}",
+            f"it is as it was; install the earlier version again and report this{kept}",
+        ) from error
+    return found is None
+
+
+def _backed_up(folder: Path, revision: str) -> Path:
+    """A whole copy of the database, durable before it is named."""
+    backup = folder / "backups" / f"{stamp()}-form-{revision}.sqlite3"
+    backup.parent.mkdir(exist_ok=True)
+    size_bytes = (folder / FILE_NAME).stat().st_size
+    if shutil.disk_usage(folder).free < 2 * size_bytes:
+        raise DiskFullError(f"{backup}: no space for a copy of {size_bytes} bytes before the upgrade", "free space")
+    partial = backup.with_suffix(".partial")
+    with closing(sqlite3.connect(folder / FILE_NAME)) as source, closing(sqlite3.connect(partial)) as target:
+        source.backup(target)
+    partial.rename(backup)
+    return backup
+
+
+@contextmanager
+def reading(folder: Path) -> Iterator[Connection]:
+    """A connection that cannot write, for another thread or process than the writer's.
+
+    Args:
+        folder: the records' folder.
+
+    Raises:
+        RecordsError: there are no records, or they cannot be read.
+    """
+    path = folder / FILE_NAME
+    if not path.exists():
+        raise RecordsError(f"there is no {path}", "give the station's home folder, or let the station begin one")
+    try:
+        with open_engine(path, "ro").connect() as connection:
+            yield connection
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise in_words(error, str(path)) from error
+
+
+def _to_json(value: Any) -> str:
+    """JSON of any value: what has no JSON, as NaN, is null, so that no odd figure costs a record."""
+    return json.dumps(_finite(value), default=_number, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def _number(value: Any) -> Any:
+    """The numbers of numpy as Python's, anything else as text."""
+    item = getattr(value, "item", None)
+    return _finite(item()) if callable(item) else str(value)

@@ -1,0 +1,231 @@
+"""The images that are kept: PNG files named by their content, written by a thread of their own."""
+
+import contextlib
+import hashlib
+import math
+import os
+import queue
+import shutil
+import threading
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+from sqlalchemy import Connection, func, select
+
+from station.records.errors import RecordsError
+from station.records.failures import in_words
+from station.records.model import Image
+from station.records.schema import images
+from station.records.sequence_mark import sync_folder
+from station.records.writer import Work
+from station.records.writing import add_images, remove_oldest_images
+from station.settings.records import RecordsSettings
+
+FOLDER_NAME = "images"
+MB = 1_000_000
+_PARTIAL = ".partial"
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
+_RECORDED_S = 30.0
+"""Longest wait for the writer; longer, and the images are given up."""
+
+
+class _Set(NamedTuple):
+    """One inspection's images."""
+
+    sequence: int
+    accepted: bool
+    images: tuple[Image, ...]
+
+
+class _NotKeptError(Exception):
+    """Why an inspection's images are not kept."""
+
+
+def image_path(folder: Path, sha256: str) -> Path:
+    """Where an image lies.
+
+    Args:
+        folder: the records' folder.
+        sha256: of the file's bytes.
+    """
+    return folder / FOLDER_NAME / sha256[:2] / f"{sha256}.png"
+
+
+def accepted_is_kept(sequence: int, share: float) -> bool:
+    """Whether the images of an accepted fruit are kept: evenly spread, and the same answer every time.
+
+    Args:
+        sequence: the inspection's.
+        share: 0 to 1.
+    """
+    return math.floor(sequence * share) > math.floor((sequence - 1) * share)
+
+
+class ImageStore:
+    """Writes images behind the cycle's back; what cannot be written is given up and said so."""
+
+    def __init__(self, folder: Path, settings: RecordsSettings, submit: Callable[[Work[Any]], Future[Any]]) -> None:
+        """Start the thread; it first removes files that nothing refers to.
+
+        Args:
+            folder: the records' folder.
+            settings: quota, reserve and queue.
+            submit: of the writer.
+        """
+        self.results: Counter[str] = Counter()
+        self.size_bytes = 0
+        self._folder = folder
+        self._settings = settings
+        self._submit = submit
+        self._places = threading.BoundedSemaphore(settings.images_queue)
+        self._put = self._done = 0
+        self._counted = False
+        self._queue: queue.SimpleQueue[_Set | None] = queue.SimpleQueue()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="records-images", daemon=True)
+        self._thread.start()
+
+    @property
+    def waiting(self) -> int:
+        """Inspections whose images wait for the disk or are being written."""
+        return self._put - self._done
+
+    def reserve(self) -> bool:
+        """Take a place in the queue, if there is one; then either `put` or `release` it."""
+        return self._places.acquire(blocking=False)
+
+    def release(self) -> None:
+        """Give a place back."""
+        self._places.release()
+
+    def put(self, sequence: int, candidates: tuple[Image, ...], *, accepted: bool) -> None:
+        """Have one inspection's images written, in the place reserved."""
+        self._put += 1
+        self._queue.put(_Set(sequence, accepted, candidates))
+
+    def drop(self, number: int) -> None:
+        """Count images that found no place."""
+        self.results["dropped"] += number
+
+    def close(self, within_s: float) -> None:
+        """Write what waits, for so long at most, and end the thread. Idempotent; blocks."""
+        self._queue.put(None)
+        self._thread.join(within_s)
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        with contextlib.suppress(OSError, RecordsError, TimeoutError):  # tried again before images are written
+            self._remove_orphans()
+        while (work := self._queue.get()) is not None and not self._stopping.is_set():
+            self._keep(work)
+            self._done += 1
+            self.release()
+
+    def _keep(self, work: _Set) -> None:
+        """Files first, durable; then the rows that refer to them."""
+        rows: list[dict[str, Any]] = []
+        try:
+            if not self._counted:
+                self._remove_orphans()
+            encoded = [_encoded(image) for image in work.images]
+            self._make_space(sum(len(content) for content in encoded), accepted=work.accepted)
+            for image, content in zip(work.images, encoded, strict=True):
+                self._go_on()
+                sha256 = hashlib.sha256(content).hexdigest()
+                self._write(image_path(self._folder, sha256), content)
+                rows.append({"kind": image.kind, "step": image.step, "sha256": sha256, "size_bytes": len(content)})
+            state, left = "kept", 0
+        except _NotKeptError as error:
+            state, left = f"dropped: {error}", len(work.images) - len(rows)
+            self.results["dropped"] += left
+        except Exception as error:  # noqa: BLE001 (an image must not cost the thread)
+            left = len(work.images) - len(rows)
+            state = f"failed: {in_words(error, str(self._folder / FOLDER_NAME)).cause}"
+            self.results["failed"] += left
+        if left and rows:
+            state = f"{state}; {len(rows)} of {len(work.images)} kept"
+        try:
+            self._record(lambda connection: add_images(connection, work.sequence, rows, state))
+        except (RecordsError, TimeoutError):
+            self.results["failed"] += len(rows)
+            return
+        self.results["kept"] += len(rows)
+
+    def _go_on(self) -> None:
+        if self._stopping.is_set():
+            raise _NotKeptError("the station ended")
+
+    def _write(self, path: Path, content: bytes) -> None:
+        """One durable file; nothing is done where it is there already."""
+        if path.exists():
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(_PARTIAL)
+        try:
+            with partial.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            partial.rename(path)
+        except OSError:
+            partial.unlink(missing_ok=True)
+            raise
+        sync_folder(path.parent)
+        self.size_bytes += len(content)
+
+    def _make_space(self, needed_bytes: int, *, accepted: bool) -> None:
+        """Remove the oldest of the accepted, then of the others, until the new ones fit into the quota.
+
+        They are removed as well where the disk is nearly full: no fruit goes uninspected for want of space that
+        images take. An accepted fruit's images never push out a rejected one's.
+        """
+        quota_bytes = self._settings.images_quota_mb * MB
+        if needed_bytes > quota_bytes:
+            raise _NotKeptError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
+        reserve_bytes = 2 * self._settings.free_reserve_mb * MB
+        while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
+            removed = self._record(lambda connection: remove_oldest_images(connection, accepted=True))
+            if removed is None and not accepted:
+                removed = self._record(lambda connection: remove_oldest_images(connection, accepted=False))
+            if removed is None:
+                whose = "the quota is full of" if over else "the disk is nearly full, beside"
+                raise _NotKeptError(f"{whose} images of rejected fruit")
+            freed_bytes, names = removed
+            for name in names:
+                image_path(self._folder, name).unlink(missing_ok=True)
+            self.size_bytes -= freed_bytes
+            self.results["removed"] += len(names)
+
+    def _free_bytes(self) -> int:
+        return shutil.disk_usage(self._folder).free
+
+    def _remove_orphans(self) -> None:
+        """Remove files that nothing refers to, as of a station that was killed, and count the rest."""
+        referred = self._record(_referred)
+        for file in (self._folder / FOLDER_NAME).glob("*/*"):
+            if file.suffix == _PARTIAL or (file.suffix == ".png" and file.stem not in referred):
+                file.unlink(missing_ok=True)
+        self.size_bytes = sum(referred.values())
+        self._counted = True
+
+    def _record(self, work: Work[Any]) -> Any:
+        return self._submit(work).result(_RECORDED_S)
+
+
+def _referred(connection: Connection) -> dict[str, int]:
+    """The files that rows refer to, with their sizes."""
+    query = select(images.c.sha256, func.max(images.c.size_bytes)).group_by(images.c.sha256)
+    return {name: size for name, size in connection.execute(query)}  # noqa: C416 (rows are no pairs to dict)
+
+
+def _encoded(image: Image) -> bytes:
+    """The image as PNG, without loss."""
+    done, content = cv2.imencode(".png", image.pixels, _PNG)
+    if not done:
+        raise ValueError(f"no PNG can hold {image.pixels.dtype} of shape {image.pixels.shape}")
+    return content.tobytes()

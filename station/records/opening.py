@@ -1,0 +1,187 @@
+"""How the records of a folder are opened, whatever state they were left in."""
+
+import fcntl
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import Connection, func, select
+
+from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
+from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
+from station.records.failures import DAMAGED_REMEDY, in_words
+from station.records.images import FOLDER_NAME, ImageStore
+from station.records.schema import inspections
+from station.records.sequence_mark import SequenceMark
+from station.records.writer import Writer
+from station.records.writing import add_event, end_what_was_left
+from station.settings.records import RecordsSettings
+
+MARK_NAME = "sequence"
+LOCK_NAME = "lock"
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something that opening the records found and a person has to know: the caller raises an alarm of it."""
+
+    code: str
+    """The code of the `RecordsError` that it would have been, as `damaged`."""
+    cause: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """Records that are open."""
+
+    writer: Writer
+    images: ImageStore
+    mark: SequenceMark
+    notices: tuple[Notice, ...]
+    lost: tuple[int, ...]
+    """The inspections that an earlier start left open."""
+
+
+def lock_folder(folder: Path) -> int:
+    """Make the folder where it is missing, and keep other stations out of it.
+
+    Args:
+        folder: the records' folder.
+
+    Returns:
+        A descriptor; closing it lets others in.
+
+    Raises:
+        LockedError: another station has it.
+        RecordsError: it cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise in_words(error, str(folder)) from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, str(os.getpid()).encode())
+    except BlockingIOError as error:
+        holder = os.read(descriptor, 20).decode("ascii", "replace") or "unknown"
+        os.close(descriptor)
+        raise LockedError(
+            f"{folder}: another station has it, process {holder}", "stop that one, or set another home"
+        ) from error
+    except OSError as error:
+        os.close(descriptor)
+        raise in_words(error, str(folder)) from error
+    return descriptor
+
+
+def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
+    """Open the records; the folder is locked by the caller. Blocks.
+
+    Args:
+        folder: the records' folder.
+        settings: for the images.
+        boot: this start of the station.
+
+    Raises:
+        RecordsError: they cannot be opened.
+    """
+    path = folder / FILE_NAME
+    try:
+        mark = SequenceMark(folder / MARK_NAME)
+        notices = list(_make_sound(folder, mark))
+        new = _migrated(folder)
+        if new and not notices and mark.value:
+            cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
+            notices.append(Notice("damaged", cause, "look for the old one: somebody moved or removed it"))
+        writer = Writer(*_connector(path, mark), str(path))
+        try:
+            lost = writer.submit(lambda connection: _begin_again(connection, mark, boot, notices)).result()
+            images = ImageStore(folder, settings, writer.submit)
+        except BaseException:
+            writer.close()
+            raise
+    except OSError as error:
+        raise in_words(error, str(folder)) from error
+    return Opened(writer, images, mark, tuple(notices), lost)
+
+
+def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
+    """Move a damaged database aside, if the numbers can go on without it."""
+    path = folder / FILE_NAME
+    if not path.exists():
+        if not mark.known and (folder / "aside").exists():
+            raise _lost_mark(mark)
+        return ()
+    try:
+        check(path)
+    except DamagedError as error:
+        if not mark.known:
+            raise _lost_mark(mark) from error
+        aside = move_aside(folder, FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FOLDER_NAME)
+        log.exception("%s; moved to %s", error.cause, aside)
+        remedy = f"the old one and its images are in {aside}: `sqlite3 FILE .recover` reads what is left of it"
+        return (Notice(error.code, f"{error.cause}; a new one was begun after number {mark.value}", remedy),)
+    return ()
+
+
+def _lost_mark(mark: SequenceMark) -> SequenceError:
+    return SequenceError(
+        f"{mark.path}: which numbers were given is not known, and the database does not tell",
+        "see the last number that the PLC or the reports know, then: station records continue-after NUMBER",
+    )
+
+
+def _migrated(folder: Path) -> bool:
+    """Bring the schema up to date; whether the database is new."""
+    engine = open_engine(folder / FILE_NAME, "rwc")
+    try:
+        return migrate(engine, folder)
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise in_words(error, str(folder / FILE_NAME)) from error
+    finally:
+        engine.dispose()
+
+
+def _connector(path: Path, mark: SequenceMark) -> tuple[Callable[[], Connection], Callable[[Connection], None]]:
+    """How the writer connects, and what it does before each commit."""
+    engine = open_engine(path, "rw")
+    found = path.stat()
+    saved = mark.value if mark.known else 0
+
+    def confirm() -> None:
+        """A file that was taken away could be written for ever, and nobody would find it again."""
+        now = path.stat() if path.exists() else None
+        if now is None or (now.st_dev, now.st_ino) != (found.st_dev, found.st_ino):
+            raise DamagedError(f"{path}: was removed or replaced while the station ran", DAMAGED_REMEDY)
+
+    def connect() -> Connection:
+        confirm()
+        return engine.connect()
+
+    def before_commit(_connection: Connection) -> None:
+        nonlocal saved
+        if mark.value != saved:
+            mark.save()
+            saved = mark.value
+        confirm()
+
+    return connect, before_commit
+
+
+def _begin_again(connection: Connection, mark: SequenceMark, boot: str, notices: list[Notice]) -> tuple[int, ...]:
+    """The first transaction of a start."""
+    mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
+    lost = end_what_was_left(connection)
+    add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
+    for notice in notices:
+        add_event(connection, f"notice_{notice.code}", None, {"cause": notice.cause, "remedy": notice.remedy})
+    return tuple(lost)

@@ -1,0 +1,334 @@
+"""The records' door: asynchronous, each call with a deadline; below it one thread writes."""
+
+import asyncio
+import contextlib
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self, TypeVar
+
+from sqlalchemy import Connection
+
+from station.channel.line import Outcome
+from station.records.database import FILE_NAME, reading
+from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
+from station.records.images import MB, accepted_is_kept
+from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
+from station.records.opening import Notice, Opened, lock_folder, open_records
+from station.records.reading import read_alarms, read_inspection, read_open, read_totals
+from station.records.writer import Work
+from station.records.writing import (
+    PENDING,
+    acknowledge,
+    add_counts,
+    add_event,
+    conclude,
+    insert_trigger,
+    publish,
+    replace_alarms,
+    withdraw,
+)
+from station.settings.records import RecordsSettings
+
+T = TypeVar("T")
+
+READING_S = 10.0
+"""Longest wait for an answer to a question."""
+IMAGES_CLOSE_S = 5.0
+"""How long closing waits for images."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How the records do, for metrics and readiness."""
+
+    writes: int
+    """Transactions that were committed."""
+    failures: dict[str, int]
+    """Requests that failed, by the code of their error."""
+    queue: int
+    """Requests that wait for the writer."""
+    images_waiting: int
+    """Inspections whose images are not yet on the disk."""
+    images: dict[str, int]
+    """Images since the start: `kept`, `dropped`, `failed`, `removed`."""
+    database_bytes: int
+    image_bytes: int
+    free_bytes: int
+    last_write_age_s: float | None
+    """By the monotonic clock; None before the first."""
+    error: str
+    """Of the last write, where it failed; empty where it went well."""
+
+
+class Records:
+    """One station's records. Make it with `open`."""
+
+    def __init__(self, folder: Path, settings: RecordsSettings, boot: str) -> None:
+        self.folder = folder
+        self.notices: tuple[Notice, ...] = ()
+        """What the last `open` or `reopen` found."""
+        self.lost: tuple[int, ...] = ()
+        """The inspections that it ended with `station_lost`."""
+        self._settings = settings
+        self._boot = boot
+        self._opened: Opened | None = None
+        self._why_closed: RecordsError = RecordsClosedError("they are closed", "open them first")
+        self._lock: int | None = None
+        self._helper = ThreadPoolExecutor(1, "records-helper")
+
+    @classmethod
+    async def open(cls, folder: Path, settings: RecordsSettings, boot: str) -> Self:
+        """Open the records of a station, or begin them.
+
+        Brings the schema up to date, moves a damaged database aside, and ends what an earlier start of the station
+        left open: an inspection that was running, or whose outcome was never published, becomes NO_RESULT with
+        `station_lost`.
+
+        Args:
+            folder: made where missing; one station at a time.
+            settings: the quota, the reserve, the deadline.
+            boot: this start of the station, as in `StationState.boot`.
+
+        Raises:
+            RecordsError: they cannot be opened.
+        """
+        records = cls(folder, settings, boot)
+        try:
+            await records.reopen()
+        except BaseException:
+            await records.close()
+            raise
+        return records
+
+    async def reopen(self) -> None:
+        """Close what is open and open it again, after a fault of the disk; not while an inspection runs.
+
+        Raises:
+            RecordsError: they still cannot be opened; every request is refused with that error until they can.
+        """
+        await asyncio.get_running_loop().run_in_executor(self._helper, self._reopen)
+
+    def _reopen(self) -> None:
+        self._shut()
+        try:
+            if self._lock is None:
+                self._lock = lock_folder(self.folder)
+            self._opened = open_records(self.folder, self._settings, self._boot)
+        except RecordsError as error:
+            self._why_closed = error
+            raise
+        self.notices, self.lost = self._opened.notices, self._opened.lost
+
+    def _shut(self) -> None:
+        if self._opened is not None:
+            self._opened.images.close(IMAGES_CLOSE_S)
+            self._opened.writer.close()
+        self._opened = None
+
+    async def close(self) -> None:
+        """Finish what waits, images for `IMAGES_CLOSE_S` at most, and end the threads. Idempotent."""
+        self._why_closed = RecordsClosedError("they are closed", "open them first")
+        with contextlib.suppress(RuntimeError):  # the helper has ended
+            await asyncio.get_running_loop().run_in_executor(self._helper, self._shut)
+        self._helper.shutdown()
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    async def begin(self, trigger: Trigger) -> int:
+        """Make a trigger durable and number it. Not idempotent: each call begins another inspection.
+
+        Returns:
+            The sequence, higher than any given before, by any database in this folder.
+
+        Raises:
+            RecordsError: nothing was begun, or what was is withdrawn.
+        """
+        opened = self._get()
+
+        def work(connection: Connection) -> int:
+            free_mb = shutil.disk_usage(self.folder).free // MB
+            if free_mb < self._settings.free_reserve_mb:
+                raise DiskFullError(
+                    f"{free_mb} MB are free on the disk of {self.folder}, less than the reserve of "
+                    f"{self._settings.free_reserve_mb} MB",
+                    "free space, or lower records.images_quota_mb",
+                )
+            sequence = opened.mark.next()
+            insert_trigger(connection, sequence, trigger, self._boot)
+            return sequence
+
+        def withdraw_begun(future: Future[int]) -> None:
+            if not future.cancelled() and future.exception() is None:
+                opened.writer.submit(lambda connection: withdraw(connection, future.result()))
+
+        future = opened.writer.submit(work)
+        try:
+            return await self._answer(future)
+        except BaseException:  # the caller has gone, or will refuse the trigger
+            future.add_done_callback(withdraw_begun)
+            raise
+
+    async def conclude(self, sequence: int, record: InspectionRecord) -> Outcome:
+        """Make an outcome durable. The first one stands: a repetition changes nothing.
+
+        Images are written afterwards in the background, and dropped and said so where that cannot be done.
+
+        Returns:
+            What stands: this record's outcome, or the one that was published or concluded before.
+
+        Raises:
+            UnknownInspectionError: this sequence was not begun.
+            RecordsError: it may not be durable; the PLC must not see a result of it.
+        """
+        opened = self._get()
+        wanted = bool(record.images) and self._settings.images_quota_mb > 0
+        reserved = wanted and opened.images.reserve()
+        state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
+        accepted = PENDING if reserved and accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
+        future = opened.writer.submit(
+            lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
+        )
+        future.add_done_callback(lambda done: self._hand_over(opened, done, sequence, record, reserved=reserved))
+        outcome, _ = await self._answer(future)
+        return outcome
+
+    def _hand_over(
+        self,
+        opened: Opened,
+        done: Future[tuple[Outcome, str | None]],
+        sequence: int,
+        record: InspectionRecord,
+        *,
+        reserved: bool,
+    ) -> None:
+        """Once an outcome is durable, have its images written."""
+        failed = done.cancelled() or done.exception() is not None
+        state = None if failed else done.result()[1]
+        if state == PENDING:
+            accepted = record.outcome == done.result()[0].outcome == "PASS"
+            opened.images.put(sequence, record.images, accepted=accepted)
+            return
+        if state is not None and state.startswith("dropped"):
+            opened.images.drop(len(record.images))
+        if reserved:
+            opened.images.release()
+
+    async def published(self, outcome: Outcome) -> bool:
+        """Note what the PLC was told; it stands, also against what was judged. The first one stands: idempotent.
+
+        An inspection that this database does not know, as one begun before a damaged database was moved aside, is
+        recorded from the outcome itself.
+
+        Returns:
+            Whether it is the first time, so that it is counted once.
+
+        Raises:
+            UnknownInspectionError: no such sequence was ever given.
+            RecordsError: it may not be durable.
+        """
+        mark = self._get().mark
+        return await self._ask(lambda connection: publish(connection, outcome, mark.value, self._boot))
+
+    async def acknowledged(self, sequence: int) -> int:
+        """Note that the PLC has taken every published outcome up to this sequence. Idempotent.
+
+        Returns:
+            How many were newly acknowledged.
+
+        Raises:
+            RecordsError: it may not be durable.
+        """
+        return await self._ask(lambda connection: acknowledge(connection, sequence))
+
+    async def open_inspections(self) -> OpenInspections:
+        """What was begun and not acknowledged."""
+        return await self._ask(read_open)
+
+    async def inspection(self, sequence: int) -> FullRecord:
+        """All that is known of one inspection.
+
+        Raises:
+            UnknownInspectionError: there is no record of it.
+        """
+        return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
+
+    async def totals(self, boot: str | None = None) -> dict[tuple[str, str, str], int]:
+        """How many outcomes the PLC was given, by fruit, outcome and first reason (`none` for PASS).
+
+        Args:
+            boot: of the inspections begun by this start of the station; all by default.
+        """
+        return await self._read(lambda connection: read_totals(connection, boot))
+
+    async def save_alarms(self, active: Sequence[AlarmRow], log: Sequence[AlarmEntry] = ()) -> None:
+        """Replace the remembered alarms and append to their log, in one transaction."""
+        await self._ask(lambda connection: replace_alarms(connection, active, log))
+
+    async def load_alarms(self) -> tuple[AlarmRow, ...]:
+        """The alarms that were saved last."""
+        return await self._ask(read_alarms)
+
+    async def count(self, **by: int) -> dict[str, int]:
+        """Add to counters that outlive restarts and give all of them."""
+        return await self._ask(lambda connection: add_counts(connection, by))
+
+    async def note_event(self, name: str, sequence: int | None = None, **details: float | str | bool | None) -> None:
+        """Append to the events, with the time."""
+        await self._ask(lambda connection: add_event(connection, name, sequence, details))
+
+    def status(self) -> Status:
+        """How the records do; never waits."""
+        opened = self._opened
+        path = self.folder / FILE_NAME
+        files = [path, path.with_name(f"{FILE_NAME}-wal")]
+        free_bytes = 0
+        with contextlib.suppress(OSError):
+            free_bytes = shutil.disk_usage(self.folder).free
+        written_s = opened.writer.last_write_s if opened else None
+        return Status(
+            writes=opened.writer.writes if opened else 0,
+            failures=dict(opened.writer.failures) if opened else {},
+            queue=opened.writer.waiting if opened else 0,
+            images_waiting=opened.images.waiting if opened else 0,
+            images=dict(opened.images.results) if opened else {},
+            database_bytes=sum(file.stat().st_size for file in files if file.exists()),
+            image_bytes=opened.images.size_bytes if opened else 0,
+            free_bytes=free_bytes,
+            last_write_age_s=None if written_s is None else time.monotonic() - written_s,
+            error=opened.writer.error if opened else str(self._why_closed),
+        )
+
+    def _get(self) -> Opened:
+        opened = self._opened
+        if opened is None:
+            raise self._why_closed
+        return opened
+
+    async def _ask(self, work: Work[T]) -> T:
+        return await self._answer(self._get().writer.submit(work))
+
+    async def _answer(self, future: Future[T]) -> T:
+        deadline_s = self._settings.deadline_s
+        try:
+            async with asyncio.timeout(deadline_s):
+                return await asyncio.wrap_future(future)
+        except TimeoutError:
+            raise RecordsDeadlineError(
+                f"the disk did not take it within {deadline_s:g} s", "look at the disk, or raise records.deadline_s"
+            ) from None
+
+    async def _read(self, question: Callable[[Connection], T]) -> T:
+        self._get()
+
+        def ask() -> T:
+            with reading(self.folder) as connection:
+                return question(connection)
+
+        async with asyncio.timeout(READING_S):
+            return await asyncio.get_running_loop().run_in_executor(self._helper, ask)

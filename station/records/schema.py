@@ -1,0 +1,152 @@
+"""The tables. A change here needs a migration beside it: a test compares the two.
+
+Times are UTC in ms as the machine's clock gave them, which may step; what is ordered is ordered by sequence or row.
+"""
+
+from sqlalchemy import (
+    JSON,
+    Boolean,
+    CheckConstraint,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    Table,
+    Text,
+)
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ck": "ck_%(table_name)s_%(constraint_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+recipe_snapshots = Table(
+    "recipe_snapshots",
+    metadata,
+    Column("sha256", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("number", Integer, nullable=False),
+    Column("revision", Text, nullable=False),
+    Column("checksum", Integer, nullable=False),
+    Column("text", Text, nullable=False),
+)
+
+inspections = Table(
+    "inspections",
+    metadata,
+    Column("sequence", Integer, primary_key=True, autoincrement=False),
+    Column("boot", Text, nullable=False),
+    Column("trigger_id", Integer, nullable=False),
+    Column("encoder", Integer, nullable=False),
+    Column("lot", Text, nullable=False),
+    Column("recipe_sha256", Text, ForeignKey("recipe_snapshots.sha256")),
+    Column("recipe_number", Integer, nullable=False),
+    Column("recipe_checksum", Integer, nullable=False),
+    Column("simulated", Boolean, nullable=False),
+    Column("began_utc_ms", Integer, nullable=False),
+    Column("ended_utc_ms", Integer),
+    Column("duration_ms", Integer),
+    Column("judged", Text),
+    Column("reasons", JSON(none_as_null=True)),
+    Column("explanation", JSON(none_as_null=True)),
+    Column("late", Boolean),
+    Column("partial", Boolean),
+    Column("area_mm2", Float),
+    Column("area_px", Integer),
+    Column("closing_mm", Float),
+    Column("confidence", Float),
+    Column("phases_s", JSON(none_as_null=True)),
+    Column("measures", JSON(none_as_null=True)),
+    Column("devices", JSON(none_as_null=True)),
+    Column("versions", JSON(none_as_null=True)),
+    Column("images_state", Text, nullable=False),
+    Column("outcome", Text),
+    Column("standing", Text),
+    Column("published_utc_ms", Integer),
+    Column("acknowledged_utc_ms", Integer),
+    CheckConstraint("judged IN ('PASS', 'FAIL', 'NO_RESULT')", name="judged"),
+    CheckConstraint("outcome IN ('PASS', 'FAIL', 'NO_RESULT')", name="outcome"),
+    CheckConstraint("published_utc_ms IS NULL OR outcome IS NOT NULL", name="published"),
+    CheckConstraint("acknowledged_utc_ms IS NULL OR published_utc_ms IS NOT NULL", name="acknowledged"),
+)
+"""`judged` and what belongs to it are the station's own view; `outcome` and `standing` are what the PLC was told, or is
+to be told: the name, and the whole message."""
+Index("ix_inspections_unacknowledged", inspections.c.sequence, sqlite_where=inspections.c.acknowledged_utc_ms.is_(None))
+Index("ix_inspections_lot", inspections.c.lot)
+Index("ix_inspections_began_utc_ms", inspections.c.began_utc_ms)
+
+curve_points = Table(
+    "curve_points",
+    metadata,
+    Column("sequence", ForeignKey("inspections.sequence", ondelete="CASCADE"), primary_key=True),
+    Column("step", Integer, primary_key=True, autoincrement=False),
+    Column("width_mm", Float, nullable=False),
+    Column("closing_mm", Float),
+    Column("area_mm2", Float),
+    Column("area_px", Integer),
+    Column("confidence", Float),
+    Column("flags", JSON, nullable=False),
+    Column("captured_s", Float),
+)
+
+images = Table(
+    "images",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("sequence", ForeignKey("inspections.sequence", ondelete="CASCADE"), nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("step", Integer),
+    Column("sha256", Text, nullable=False),
+    Column("size_bytes", Integer, nullable=False),
+    CheckConstraint("kind IN ('reference', 'step', 'mask')", name="kind"),
+    Index("ix_images_sequence", "sequence"),
+    Index("ix_images_sha256", "sha256"),
+)
+"""The file is `images/<first two of sha256>/<sha256>.png` beside the database."""
+
+alarms = Table(
+    "alarms",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("state", Text, nullable=False),
+    Column("raised_utc_ms", Integer, nullable=False),
+    Column("changed_utc_ms", Integer, nullable=False),
+    Column("detail", Text, nullable=False),
+    Column("shelved_until_utc_ms", Integer),
+)
+"""Those not in their normal state."""
+
+alarms_log = Table(
+    "alarms_log",
+    metadata,
+    Column("row", Integer, primary_key=True),
+    Column("utc_ms", Integer, nullable=False),
+    Column("id", Text, nullable=False),
+    Column("change", Text, nullable=False),
+    Column("detail", Text, nullable=False),
+    Column("sequence", Integer),
+)
+
+counters = Table(
+    "counters",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("value", Integer, nullable=False),
+)
+
+events = Table(
+    "events",
+    metadata,
+    Column("row", Integer, primary_key=True),
+    Column("utc_ms", Integer, nullable=False),
+    Column("name", Text, nullable=False),
+    Column("sequence", Integer),
+    Column("details", JSON, nullable=False),
+)

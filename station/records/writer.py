@@ -1,0 +1,154 @@
+"""The one thread that writes: it takes all requests that wait, and makes them durable with one commit."""
+
+import contextlib
+import queue
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from sqlalchemy import Connection
+
+from station.records.errors import (
+    DamagedError,
+    DiskError,
+    DiskFullError,
+    LockedError,
+    ReadOnlyError,
+    RecordsClosedError,
+    RecordsError,
+)
+from station.records.failures import in_words
+
+T = TypeVar("T")
+Work = Callable[[Connection], T]
+"""What a request does within the transaction, in the writer's thread. It may raise a `RecordsError`."""
+
+LARGEST_BATCH = 128
+CONCERNING_ALL = (DamagedError, DiskError, DiskFullError, LockedError, ReadOnlyError)
+"""Faults of the disk or the file, after which a whole transaction is undone."""
+
+
+class Writer:
+    """Runs requests on one connection, in the order in which they came."""
+
+    def __init__(
+        self, connect: Callable[[], Connection], before_commit: Callable[[Connection], None], place: str
+    ) -> None:
+        """Start the thread.
+
+        Args:
+            connect: called in the thread, again after each failure.
+            before_commit: called in each transaction after its requests; what it raises fails them all.
+            place: the database's path, for messages.
+
+        Raises:
+            RecordsError: no connection could be made.
+        """
+        self.writes = 0
+        self.failures: Counter[str] = Counter()
+        self.last_write_s: float | None = None
+        self.error = ""
+        self._connect = connect
+        self._connection: Connection | None = None
+        self._before_commit = before_commit
+        self._place = place
+        self._queue: queue.SimpleQueue[tuple[Work[Any], Future[Any]] | None] = queue.SimpleQueue()
+        self._closed = False
+        self._gate = threading.Lock()
+        opened: Future[None] = Future()
+        self._thread = threading.Thread(target=self._run, args=(opened,), name="records-writer", daemon=True)
+        self._thread.start()
+        opened.result()
+
+    @property
+    def waiting(self) -> int:
+        """Requests that wait."""
+        return self._queue.qsize()
+
+    def submit(self, work: Work[T]) -> Future[T]:
+        """Ask for a piece of work; cancelling the future withdraws it while it is not begun.
+
+        Args:
+            work: runs in the thread.
+
+        Returns:
+            Its result once it is durable, or a `RecordsError`.
+        """
+        future: Future[T] = Future()
+        with self._gate:
+            if self._closed:
+                future.set_exception(RecordsClosedError("they are closed", "ask before closing"))
+            else:
+                self._queue.put((work, future))
+        return future
+
+    def close(self) -> None:
+        """Finish what waits and end the thread. Idempotent; blocks."""
+        with self._gate:
+            if not self._closed:
+                self._closed = True
+                self._queue.put(None)
+        self._thread.join()
+
+    def _run(self, opened: Future[None]) -> None:
+        try:
+            self._connection = self._connect()
+        except Exception as error:  # noqa: BLE001 (handed to the caller)
+            opened.set_exception(in_words(error, self._place))
+            return
+        opened.set_result(None)
+        last = False
+        while not last:
+            batch = [self._queue.get()]
+            while len(batch) < LARGEST_BATCH and not self._queue.empty():
+                batch.append(self._queue.get())
+            last = None in batch
+            taken = [entry for entry in batch if entry is not None and entry[1].set_running_or_notify_cancel()]
+            if taken:
+                self._carry_out(taken)
+        self._disconnect()
+
+    def _carry_out(self, batch: list[tuple[Work[Any], Future[Any]]]) -> None:
+        """One transaction, and then the answers."""
+        answers: list[Any] = []
+        try:
+            if self._connection is None:
+                self._connection = self._connect()
+            with self._connection.begin():
+                answers.extend(self._attempt(self._connection, work) for work, _ in batch)
+                self._before_commit(self._connection)
+        except Exception as error:  # noqa: BLE001 (told to all who asked)
+            told = in_words(error, self._place)
+            answers = [told] * len(batch)
+            self.error = str(told)
+            self._disconnect()  # the next batch begins with a sound connection, if there can be one
+        else:
+            self.writes += 1
+            self.last_write_s = time.monotonic()
+            self.error = ""
+        for (_, future), answer in zip(batch, answers, strict=True):
+            if isinstance(answer, RecordsError):
+                self.failures[answer.code] += 1
+                future.set_exception(answer)
+            else:
+                future.set_result(answer)
+
+    def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
+        """The work's result, or why it alone failed and was undone; what concerns all is raised."""
+        try:
+            with connection.begin_nested():
+                return work(connection)
+        except Exception as error:
+            told = in_words(error, self._place)
+            if isinstance(told, CONCERNING_ALL):
+                raise
+            return told
+
+    def _disconnect(self) -> None:
+        if self._connection is not None:
+            with contextlib.suppress(Exception):
+                self._connection.close()
+        self._connection = None

@@ -1,0 +1,300 @@
+"""The requests that change the records, each a function of the writer's connection."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from pydantic import ValidationError
+from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from station.channel.line import Outcome, Reason
+from station.records.errors import BadRecordError, UnknownInspectionError
+from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
+from station.records.schema import (
+    alarms,
+    alarms_log,
+    counters,
+    curve_points,
+    events,
+    images,
+    inspections,
+    recipe_snapshots,
+)
+
+PENDING = "pending"
+LOST = "lost: the station ended before they were written"
+
+
+def utc_ms() -> int:
+    """Now, by the machine's clock."""
+    return time.time_ns() // 1_000_000
+
+
+def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot: str) -> None:
+    """Begin an inspection."""
+    recipe = trigger.recipe
+    if recipe is not None:
+        snapshot = {
+            "sha256": recipe.sha256,
+            "name": recipe.name,
+            "number": recipe.number,
+            "revision": recipe.revision,
+            "checksum": recipe.checksum,
+            "text": recipe.text,
+        }
+        connection.execute(upsert(recipe_snapshots).values(snapshot).on_conflict_do_nothing())
+    connection.execute(
+        insert(inspections).values(
+            sequence=sequence,
+            boot=boot,
+            trigger_id=trigger.trigger_id,
+            encoder=trigger.encoder,
+            lot=trigger.lot,
+            recipe_sha256=recipe.sha256 if recipe else None,
+            recipe_number=recipe.number if recipe else 0,
+            recipe_checksum=recipe.checksum if recipe else 0,
+            simulated=trigger.simulated,
+            began_utc_ms=trigger.began_utc_ms,
+            images_state="",
+        )
+    )
+
+
+def withdraw(connection: Connection, sequence: int) -> None:
+    """Take back an inspection whose caller had gone when it was durable; its number is not given again."""
+    connection.execute(delete(inspections).where(inspections.c.sequence == sequence, inspections.c.outcome.is_(None)))
+    add_event(connection, "begin_withdrawn", sequence, {})
+
+
+def conclude(
+    connection: Connection, sequence: int, record: InspectionRecord, images_states: Mapping[str, str]
+) -> tuple[Outcome, str | None]:
+    """Record how an inspection ended, unless that is recorded already.
+
+    Args:
+        connection: the writer's.
+        sequence: which one.
+        record: how it ended.
+        images_states: what to say of its images, by the outcome that decides: `PASS` or `other`.
+
+    Returns:
+        The outcome that stands, and what is said of the images; None where this record was not taken.
+    """
+    row = _row(connection, sequence)
+    standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
+    if row.judged is not None and standing is not None:
+        return standing, None
+    judged = _outcome(row, record)
+    standing = standing or judged
+    passed = record.outcome == standing.outcome == "PASS"
+    images_state = images_states["PASS" if passed else "other"]
+    connection.execute(
+        update(inspections)
+        .where(inspections.c.sequence == sequence)
+        .values(
+            judged=record.outcome,
+            reasons=[str(reason) for reason in record.reasons],
+            explanation=list(record.explanation),
+            late=record.late,
+            partial=record.partial,
+            area_mm2=judged.area_mm2,
+            area_px=judged.area_px,
+            closing_mm=judged.closing_mm,
+            confidence=judged.confidence,
+            ended_utc_ms=record.ended_utc_ms,
+            duration_ms=record.duration_ms,
+            phases_s=dict(record.phases_s),
+            measures=dict(record.measures),
+            devices=dict(record.devices),
+            versions=dict(record.versions),
+            images_state=images_state,
+            outcome=standing.outcome,
+            standing=standing.model_dump_json(),
+        )
+    )
+    if record.curve:
+        points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
+        connection.execute(insert(curve_points), points)
+    return standing, images_state
+
+
+def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:
+    """Note what the PLC was told, unless that is noted already; True the first time."""
+    found = connection.execute(
+        select(inspections.c.published_utc_ms).where(inspections.c.sequence == outcome.sequence)
+    ).one_or_none()
+    if found is not None and found.published_utc_ms is not None:
+        return False
+    if found is None:
+        if outcome.sequence > given_up_to:
+            raise UnknownInspectionError(f"inspection {outcome.sequence} was never begun", "ask what is open")
+        _insert_told(connection, outcome, boot)
+    connection.execute(
+        update(inspections)
+        .where(inspections.c.sequence == outcome.sequence)
+        .values(outcome=outcome.outcome, standing=outcome.model_dump_json(), published_utc_ms=utc_ms())
+    )
+    return True
+
+
+def acknowledge(connection: Connection, sequence: int) -> int:
+    """Note that the PLC has taken what was published up to this sequence; how many that were."""
+    table = inspections.c
+    return connection.execute(
+        update(inspections)
+        .where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_not(None), table.sequence <= sequence)
+        .values(acknowledged_utc_ms=utc_ms())
+    ).rowcount
+
+
+def end_what_was_left(connection: Connection) -> list[int]:
+    """After a start: what was not surely delivered becomes NO_RESULT with `station_lost`.
+
+    Returns:
+        The sequences.
+    """
+    table = inspections.c
+    rows = connection.execute(
+        select(inspections).where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_(None))
+    ).all()
+    for row in rows:
+        lost = Outcome(
+            sequence=row.sequence,
+            trigger_id=row.trigger_id,
+            outcome="NO_RESULT",
+            reasons=(Reason.STATION_LOST,),
+            late=bool(row.late),
+            partial=row.judged is None or bool(row.partial),
+            simulated=row.simulated,
+            area_mm2=None,
+            area_px=None,
+            closing_mm=None,
+            confidence=None,
+            recipe_number=row.recipe_number,
+            recipe_checksum=row.recipe_checksum,
+            began_utc_ms=row.began_utc_ms,
+            ended_utc_ms=utc_ms() if row.ended_utc_ms is None else row.ended_utc_ms,
+            duration_ms=row.duration_ms or 0,
+            encoder=row.encoder,
+            lot=row.lot,
+        )
+        connection.execute(
+            update(inspections)
+            .where(table.sequence == row.sequence)
+            .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
+        )
+    connection.execute(update(inspections).where(table.images_state == PENDING).values(images_state=LOST))
+    return [row.sequence for row in rows]
+
+
+def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequence[AlarmEntry]) -> None:
+    """Remember these alarms and no others, and append to the log."""
+    connection.execute(delete(alarms))
+    if active:
+        connection.execute(insert(alarms), [asdict(row) for row in active])
+    if log:
+        connection.execute(insert(alarms_log), [asdict(entry) for entry in log])
+
+
+def add_counts(connection: Connection, by: Mapping[str, int]) -> dict[str, int]:
+    """Add to counters and give all."""
+    for name, number in by.items():
+        row = upsert(counters).values(name=name, value=number)
+        connection.execute(row.on_conflict_do_update(["name"], set_={"value": counters.c.value + number}))
+    return {row.name: row.value for row in connection.execute(select(counters))}
+
+
+def add_event(connection: Connection, name: str, sequence: int | None, details: Mapping[str, Any]) -> None:
+    """Append an event."""
+    values = {"utc_ms": utc_ms(), "name": name, "sequence": sequence, "details": dict(details)}
+    connection.execute(insert(events).values(values))
+
+
+def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: str) -> None:
+    """Reference images whose files are durable, and say how many were kept."""
+    if rows:
+        connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
+    connection.execute(update(inspections).where(inspections.c.sequence == sequence).values(images_state=state))
+
+
+def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:
+    """Forget the images of the oldest accepted, or the oldest other inspection that has some.
+
+    Returns:
+        The freed bytes and the names of the files that nothing refers to any more; None where there is none.
+    """
+    kind = inspections.c.outcome == "PASS" if accepted else inspections.c.outcome != "PASS"
+    oldest = connection.scalar(
+        select(images.c.sequence)
+        .join(inspections, inspections.c.sequence == images.c.sequence)
+        .where(kind)
+        .order_by(images.c.sequence)
+        .limit(1)
+    )
+    if oldest is None:
+        return None
+    rows = connection.execute(select(images.c.sha256, images.c.size_bytes).where(images.c.sequence == oldest)).all()
+    connection.execute(delete(images).where(images.c.sequence == oldest))
+    sizes = {row.sha256: row.size_bytes for row in rows}
+    kept = connection.scalars(select(images.c.sha256).where(images.c.sha256.in_(sizes))).all()
+    free = {name: size for name, size in sizes.items() if name not in kept}
+    add_images(connection, oldest, (), "removed: space for newer ones")
+    return sum(free.values()), list(free)
+
+
+def _row(connection: Connection, sequence: int) -> Any:
+    row = connection.execute(select(inspections).where(inspections.c.sequence == sequence)).one_or_none()
+    if row is None:
+        raise UnknownInspectionError(f"inspection {sequence} is not in this database", "begin it first")
+    return row
+
+
+def _outcome(row: Any, record: InspectionRecord) -> Outcome:
+    """What the PLC is to be told."""
+    if bool(record.reasons) == (record.outcome == "PASS"):
+        raise BadRecordError(f"inspection {row.sequence}: {record.outcome} with {record.reasons}", "see the log")
+    try:
+        return Outcome(
+            sequence=row.sequence,
+            trigger_id=row.trigger_id,
+            outcome=record.outcome,
+            reasons=tuple(Reason(reason) for reason in record.reasons),
+            late=record.late,
+            partial=record.partial,
+            simulated=row.simulated,
+            area_mm2=None if record.area_mm2 is None else float(record.area_mm2),
+            area_px=None if record.area_px is None else int(record.area_px),
+            closing_mm=None if record.closing_mm is None else float(record.closing_mm),
+            confidence=None if record.confidence is None else float(record.confidence),
+            recipe_number=row.recipe_number,
+            recipe_checksum=row.recipe_checksum,
+            began_utc_ms=row.began_utc_ms,
+            ended_utc_ms=record.ended_utc_ms,
+            duration_ms=record.duration_ms,
+            encoder=row.encoder,
+            lot=row.lot,
+        )
+    except (ValidationError, ValueError) as error:
+        raise BadRecordError(f"the record of inspection {row.sequence} is malformed: {error}", "see the log") from error
+
+
+def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
+    """An inspection that only its outcome is known of: it was begun in a database that was moved aside."""
+    connection.execute(
+        insert(inspections).values(
+            sequence=outcome.sequence,
+            boot=boot,
+            trigger_id=outcome.trigger_id,
+            encoder=outcome.encoder,
+            lot=outcome.lot,
+            recipe_number=outcome.recipe_number,
+            recipe_checksum=outcome.recipe_checksum,
+            simulated=outcome.simulated,
+            began_utc_ms=outcome.began_utc_ms,
+            ended_utc_ms=outcome.ended_utc_ms,
+            duration_ms=outcome.duration_ms,
+            images_state="none: known by its outcome alone",
+        )
+    )

@@ -1,0 +1,212 @@
+"""The station's devices: opened, watched, and brought back where that is safe."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.ur import UrArm
+from station.devices.camera.open import camera_from
+from station.devices.gripper.errors import (
+    NEEDS_ACTIVATION,
+    GripperError,
+    GripperFaultError,
+    GripperNotActiveError,
+)
+from station.devices.gripper.robotiq import make_gripper
+from station.errors import StationError
+from station.service.grip import FRAME_DEADLINE_S, Cell, FramesError
+from station.service.watching import DeviceWatch
+from station.settings.configuration import Configuration
+
+CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
+STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
+"""What the arm's safety controller decided and a person has to look at."""
+_BAD_FRAMES = 3
+_OPEN_WITHIN_MM = 2.0
+_OVER_TEMPERATURE = 0x8
+
+
+class Crew:
+    """Camera, gripper and arm of one station with their watches.
+
+    Args:
+        configuration: which devices, and where.
+        on_change: told a device's name and what is wrong with it from now on, None for nothing.
+        on_progress: told a device's name whenever its watch got something done.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        on_change: Callable[[str, StationError | None], None],
+        on_progress: Callable[[str], None],
+    ) -> None:
+        arm = None if configuration.service.bench else UrArm(configuration.arm)
+        self._arm, self._configuration = arm, configuration
+        self.cell = Cell(camera_from(configuration.camera), make_gripper(configuration.gripper), arm)
+        self.simulated = (
+            configuration.camera.driver != "digit"
+            or (arm is not None and configuration.arm.host.startswith("127."))
+            or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
+        )
+        self.confirmed_clear = False
+        """A person has said that nothing is between the jaws; used up by the next activation."""
+        self._bad_frames = 0
+        looks = {CAMERA: self._look_at_camera, GRIPPER: self._look_at_gripper}
+        if arm is not None:
+            looks[ARM] = self._look_at_arm
+        self.watches = {
+            name: DeviceWatch(
+                name,
+                look,
+                configuration.service.retry_longest_s,
+                lambda fault, name=name: on_change(name, fault),
+                lambda name=name: on_progress(name),
+            )
+            for name, look in looks.items()
+        }
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def open(self) -> None:
+        """Begin to watch; a device that is away is waited for."""
+        if self._arm is not None:
+            await self._arm.open()
+        self._tasks = [
+            asyncio.create_task(watch.run(), name=f"watch of the {name}") for name, watch in self.watches.items()
+        ]
+
+    async def close(self) -> None:
+        """Let the devices go. Nothing is moved."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.cell.camera.close()
+        with contextlib.suppress(GripperError):
+            await self.cell.gripper.close()
+        if self._arm is not None:
+            await self._arm.close()
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Who takes part, for the records."""
+        names = {CAMERA: self.cell.camera.description.name, GRIPPER: f"Robotiq 2F-85 by {self._configuration.gripper.driver}"}
+        return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
+
+    @property
+    def faults(self) -> dict[str, StationError]:
+        """What is wrong, by device; empty where all are well."""
+        return {name: watch.fault for name, watch in self.watches.items() if watch.fault is not None}
+
+    def well_since(self, since_s: float) -> bool:
+        """Whether every device was found well after a time, and nothing is wrong with any.
+
+        Args:
+            since_s: monotonic time.
+        """
+        watches = self.watches.values()
+        return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
+
+    def use(self, *, by_inspection: bool) -> None:
+        """Leave the devices to an inspection, or watch them again; the arm is watched always.
+
+        Args:
+            by_inspection: whether one is under way.
+        """
+        for name in (CAMERA, GRIPPER):
+            self.watches[name].in_use = by_inspection
+
+    @property
+    def standing_stop(self) -> ArmFault | None:
+        """The safety stop that stands and is a person's."""
+        fault = self.watches[ARM].fault if ARM in self.watches else None
+        return fault if isinstance(fault, ArmFault) and fault.cause in STANDING_STOPS else None
+
+    def renew_health(self, lease_s: float) -> None:
+        """Let the arm move for a while; when the lease runs out its controller stops it.
+
+        Args:
+            lease_s: seconds from now.
+        """
+        if self._arm is not None:
+            self._arm.renew_health(lease_s)
+
+    async def halt(self) -> None:
+        """Stop arm and gripper where they are. Never raises: what does not answer is watched anyway."""
+
+        async def quietly(stop: Callable[[], object]) -> None:
+            with contextlib.suppress(StationError, TimeoutError):
+                result = stop()
+                if asyncio.iscoroutine(result):
+                    await result
+
+        await asyncio.gather(
+            quietly(self.cell.gripper.stop), quietly(self._arm.stop if self._arm is not None else lambda: None)
+        )
+
+    async def play_again(self) -> None:
+        """Have the arm's program play again after a stop whose cause is gone; a playing one is left alone.
+
+        Raises:
+            ArmFault: it does not play.
+        """
+        if self._arm is not None:
+            await self._arm.upload_again()
+            self.watches[ARM].failed(ArmFault(ArmCause.STALE, "the arm's program has just begun to play"))
+
+    async def activate_if_safe(self) -> None:
+        """Activate a gripper that lost its activation, unless a fruit may be between the jaws, which it would crush.
+
+        Nothing is between them where the arm stands away from the nest, or where a person has said so. With the jaws
+        open at the nest the arm leaves it first.
+
+        Raises:
+            StationError: it may not be activated, with what a person can do; or it could not be.
+        """
+        reading = await self.cell.gripper.read()
+        if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
+            return
+        if not self.confirmed_clear:
+            await self._leave_the_nest(reading.width_mm)
+        self.confirmed_clear = False
+        await self.cell.gripper.activate()
+
+    async def _leave_the_nest(self, width_mm: float) -> None:
+        refusal = GripperNotActiveError(
+            "it is not activated, and what is between its jaws is not known",
+            "take out what is between them, then reset the station: the jaws travel their whole way",
+        )
+        if self._arm is None:
+            raise refusal
+        state = await self._arm.state()
+        if state.fault is not None:
+            raise state.fault
+        if state.at == "nest" and width_mm > self.cell.gripper.max_width_mm - _OPEN_WITHIN_MM:
+            await self._arm.move_to("above_nest")
+        elif state.at not in {"home", "above_nest"}:
+            raise refusal
+
+    async def _look_at_camera(self) -> None:
+        await self.cell.camera.open()
+        newer_than_s = time.monotonic()
+        frame = await self.cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
+        self._bad_frames = self._bad_frames + 1 if frame.faults else 0
+        if self._bad_frames >= _BAD_FRAMES:
+            raise FramesError(
+                f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
+                "and its light, then `station devices check`"
+            )
+
+    async def _look_at_gripper(self) -> None:
+        reading = await self.cell.gripper.read()
+        if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
+            raise GripperFaultError(reading.fault_code)
+        if not reading.active:
+            raise GripperNotActiveError("it is not activated", "wait: the station activates it where that is safe")
+
+    async def _look_at_arm(self) -> None:
+        assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
+        state = await self._arm.state()
+        if state.fault is not None:
+            raise state.fault

@@ -1,0 +1,193 @@
+"""The parts of a grip: sound frames, width steps, the approach, letting go. Who grips what, and why, is not known here."""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from station.devices.arm.arm import Arm
+from station.devices.camera.interface import Camera, Frame, Image
+from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
+from station.errors import StationError
+from station.settings.arm import PoseName
+from station.settings.recipe import Recipe
+
+FRAME_DEADLINE_S = 1.0
+_MOST_FAULTY_FRAMES = 10
+
+
+class GripError(StationError):
+    """The grip could not be carried through; the message says at which step and why."""
+
+
+class FramesError(GripError):
+    """The camera gives frames, and none that can be measured."""
+
+
+class NothingTouchedError(GripError):
+    """The fingers closed down to the recipe's smallest width and nothing was there."""
+
+
+class UnseenContactError(GripError):
+    """The gripper holds something that the sensor does not see."""
+
+
+@dataclass(frozen=True, slots=True)
+class GripStep:
+    """One width step of a grip."""
+
+    number: int
+    """0 at the start, the onset or the recipe's start width; negative for the approach's last image before it."""
+    move: MoveResult
+    frames: tuple[Frame, ...]
+    """All captured after the move's end, in order; none has a fault."""
+
+    @property
+    def image(self) -> Image:
+        """The frames' mean, shape (height, width, 3), dtype uint8, BGR."""
+        mean = np.mean([frame.image for frame in self.frames], axis=0)
+        return np.rint(mean).astype(np.uint8)
+
+    @property
+    def last_frame(self) -> Frame:
+        """The newest frame."""
+        return self.frames[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The devices of one station, ready to be used; no arm on a bench."""
+
+    camera: Camera
+    gripper: Gripper
+    arm: Arm | None
+
+
+Touches = Callable[[GripStep], Awaitable[bool]]
+"""Says whether the gel is touched in a step's frames."""
+
+
+class Grip:
+    """The moves of one grip by a recipe.
+
+    Args:
+        cell: the devices, opened.
+        recipe: width steps, speed, force, settle time and frames.
+    """
+
+    def __init__(self, cell: Cell, recipe: Recipe) -> None:
+        self._cell, self._recipe = cell, recipe
+
+    async def go(self, *poses: PoseName) -> None:
+        """Bring the arm to one pose after the other; without an arm nothing moves.
+
+        Raises:
+            ArmFault: the arm did not get there.
+        """
+        if self._cell.arm is not None:
+            for pose in poses:
+                await self._cell.arm.move_to(pose)
+
+    async def sound_frames(self, number: int) -> tuple[Frame, ...]:
+        """Frames captured from now on with nothing wrong with them.
+
+        Raises:
+            FramesError: too many in a row had a fault.
+            NoFrameError: none came in time.
+        """
+        frames: list[Frame] = []
+        newer_than_s = time.monotonic()
+        while len(frames) < number:
+            frames.append(await self._sound_frame(newer_than_s))
+            newer_than_s = frames[-1].captured_s
+        return tuple(frames)
+
+    async def step(self, number: int, width_mm: float) -> GripStep:
+        """Go to a width, let fruit and gel settle, and take the recipe's frames.
+
+        Args:
+            number: what the step is called.
+            width_mm: the width to ask for; less than 0 is 0.
+        """
+        move = await self.close_to(width_mm)
+        await asyncio.sleep(self._recipe.imaging.settle_s)
+        return GripStep(number, move, await self.sound_frames(self._recipe.imaging.frames_per_step))
+
+    async def close_to(self, width_mm: float) -> MoveResult:
+        """Move the fingers at the recipe's speed and force.
+
+        Args:
+            width_mm: the width to ask for; less than 0 is 0.
+        """
+        grip = self._recipe.gripper
+        return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
+
+    async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
+        """Close step by step until the gel is touched.
+
+        On the way one frame without a pause is enough; where it shows a contact, a full step at the same width has to
+        confirm it.
+
+        Args:
+            touches: judges a step's frames.
+
+        Returns:
+            The last step before the contact, with one frame, and the first with it.
+
+        Raises:
+            NothingTouchedError: nothing was touched down to the recipe's smallest width.
+            UnseenContactError: the gripper was stopped by something and the gel shows nothing.
+        """
+        expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
+        width_mm = min(expected.largest_mm, self._cell.gripper.max_width_mm)
+        before: GripStep | None = None
+        while width_mm >= expected.smallest_mm - step_mm:
+            move = await self.close_to(width_mm)
+            step = GripStep(-1, move, await self.sound_frames(1))
+            held = move.reading.object_state is ObjectState.CONTACT_CLOSING
+            if held or await touches(step):
+                step = await self.step(0, width_mm)
+                if await touches(step):
+                    return before, step
+                if held:
+                    raise UnseenContactError(
+                        f"the gripper holds something at {move.width_mm:.1f} mm which the gel does not show: look for "
+                        "what stands between the fingers beside the gel, then `station devices check`"
+                    )
+            before = step
+            width_mm -= step_mm
+        raise NothingTouchedError(
+            f"nothing was touched from {expected.largest_mm:g} down to {expected.smallest_mm:g} mm: is a "
+            f"{self._recipe.name} in the nest, and is the arm there?"
+        )
+
+    async def let_go(self) -> str | None:
+        """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
+
+        Returns:
+            What could not be done, in words.
+        """
+        try:
+            await self._cell.gripper.open()
+        except StationError as error:
+            return f"The gripper could not be opened, and the arm stays where it is: {error}"
+        try:
+            await self.go("above_nest", "home")
+        except StationError as error:
+            return f"The gripper is open, and the arm stays where it is: {error}"
+        return None
+
+    async def _sound_frame(self, newer_than_s: float) -> Frame:
+        faults: set[str] = set()
+        for _ in range(_MOST_FAULTY_FRAMES):
+            frame = await self._cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
+            if not frame.faults:
+                return frame
+            faults |= frame.faults
+            newer_than_s = frame.captured_s
+        raise FramesError(
+            f"the camera gave {_MOST_FAULTY_FRAMES} bad frames in a row ({', '.join(sorted(faults))}); "
+            "see `station devices check`"
+        )

@@ -1,0 +1,216 @@
+"""Metrics and health over HTTP, in the station's own event loop: /metrics, /livez, /readyz, /version."""
+
+import asyncio
+import contextlib
+import errno
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from station.errors import StationError
+from station.service.metrics import Metrics
+
+CLOSE_S = 1.0
+"""How long closing waits for answers under way."""
+START_S = 5.0
+
+
+class AddressError(StationError):
+    """The address cannot be served on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dependency:
+    """One thing that inspecting needs."""
+
+    name: str
+    state: Literal["ok", "degraded", "fault", "unknown"]
+    """`degraded` still inspects."""
+    age_s: float | None
+    """Since it was last heard; None where never."""
+    detail: str = ""
+    remedy: str = ""
+    """Empty only where ok."""
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """Whether a trigger would be accepted, and why not."""
+
+    ready: bool
+    why: str
+    """One sentence with the remedy; empty where ready."""
+    dependencies: tuple[Dependency, ...]
+
+
+class Liveness:
+    """Fed by progress alone: what stands still for longer than it may makes the station not live."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """Watch nothing yet.
+
+        Args:
+            clock: monotonic, s.
+        """
+        self._clock = clock
+        self._within_s: dict[str, float] = {}
+        self._last_s: dict[str, float] = {}
+
+    def watch(self, name: str, within_s: float) -> None:
+        """Expect progress of this name, from now on, at least every so many seconds."""
+        self._within_s[name] = within_s
+        self._last_s[name] = self._clock()
+
+    def unwatch(self, name: str) -> None:
+        """Expect it no more."""
+        self._within_s.pop(name, None)
+        self._last_s.pop(name, None)
+
+    def progress(self, name: str) -> None:
+        """Something was got done; a name that is not watched is ignored."""
+        if name in self._last_s:
+            self._last_s[name] = self._clock()
+
+    def ages_s(self) -> dict[str, float]:
+        """How long ago each last made progress."""
+        now_s = self._clock()
+        return {name: now_s - last_s for name, last_s in self._last_s.items()}
+
+    def stuck(self) -> dict[str, float]:
+        """What makes no progress, with its age in s; empty while alive."""
+        return {name: age_s for name, age_s in self.ages_s().items() if age_s > self._within_s[name]}
+
+
+class HealthServer:
+    """Serves until it is closed; leaves no thread, task or port."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        metrics: Metrics,
+        liveness: Liveness,
+        readiness: Callable[[], Readiness],
+        version: Mapping[str, str],
+    ) -> None:
+        """Name what is served; nothing is listened on yet.
+
+        Args:
+            host: the address, or its name.
+            port: TCP; 0 takes a free one.
+            metrics: for /metrics.
+            liveness: for /livez.
+            readiness: asked at each /readyz; must not wait.
+            version: for /version.
+        """
+        self._host = host
+        self._port = port
+        self._metrics = metrics
+        self._liveness = liveness
+        self._readiness = readiness
+        self._version = dict(version)
+        self._server: _Server | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    async def start(self) -> int:
+        """Listen; returns the port.
+
+        Raises:
+            AddressError: the port is in use, or the address is not this machine's.
+        """
+        listener = _listen(self._host, self._port)
+        routes = [
+            Route("/metrics", self._metrics_page),
+            Route("/livez", self._livez),
+            Route("/readyz", self._readyz),
+            Route("/version", self._version_page),
+        ]
+        config = uvicorn.Config(
+            Starlette(routes=routes),
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            ws="none",
+            server_header=False,
+            limit_concurrency=64,
+            timeout_keep_alive=30,
+            timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
+        )
+        self._server = _Server(config)
+        self._task = asyncio.create_task(self._server.serve(sockets=[listener]), name="health")
+        async with asyncio.timeout(START_S):
+            while not self._server.started:
+                if self._task.done():
+                    self._task.result()
+                    raise AddressError(f"the health server on {self._host}:{self._port} ended at once; see the log")
+                await asyncio.sleep(0.005)
+        return listener.getsockname()[1]
+
+    async def close(self) -> None:
+        """Answer what is under way, for at most a second, and stop. Idempotent."""
+        if self._server is None or self._task is None:
+            return
+        self._server.should_exit = True
+        try:
+            await self._task
+        finally:
+            self._server = self._task = None
+
+    async def _metrics_page(self, request: Request) -> Response:
+        content, kind = self._metrics.exposition(request.headers.get("accept", ""))
+        return Response(content, headers={"content-type": kind})
+
+    async def _livez(self, _request: Request) -> Response:
+        stuck = self._liveness.stuck()
+        body = {
+            "live": not stuck,
+            "stuck_s": {name: round(age_s, 3) for name, age_s in stuck.items()},
+            "progress_age_s": {name: round(age_s, 3) for name, age_s in self._liveness.ages_s().items()},
+        }
+        return JSONResponse(body, status_code=503 if stuck else 200)
+
+    async def _readyz(self, _request: Request) -> Response:
+        readiness = self._readiness()
+        return JSONResponse(asdict(readiness), status_code=200 if readiness.ready else 503)
+
+    async def _version_page(self, _request: Request) -> Response:
+        return JSONResponse(self._version)
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves the process's signals to the station."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A listening socket, or one clear sentence."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise AddressError(f"metrics.host {host!r}: {error.strerror}; set an address of this machine") from error
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(64)
+        listener.settimeout(0)
+    except OSError as error:
+        listener.close()
+        why = {
+            errno.EADDRINUSE: "another program listens there; stop it, or set another metrics.port",
+            errno.EADDRNOTAVAIL: "that is no address of this machine; set another metrics.host",
+            errno.EACCES: "this user may not listen on so low a port; set metrics.port to 1024 or more",
+        }.get(error.errno or 0, f"{error.strerror}; set another metrics.host or metrics.port")
+        raise AddressError(f"metrics and health cannot be served on {host}:{port}: {why}") from error
+    return listener

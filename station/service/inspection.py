@@ -1,0 +1,144 @@
+"""One inspection's own state: what was triggered, seen and found, until it is a record."""
+
+import time
+from dataclasses import dataclass, field
+
+from station.channel.line import Outcome
+from station.inspection.deadlines import Deadlines
+from station.inspection.judge import Verdict
+from station.inspection.press import Flag, Measured, Press
+from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
+from station.service.eye import Seen
+from station.service.grip import GripStep
+from station.service.recipe_book import Active
+from station.vocabulary import OutcomeName, Reason
+
+_UNCERTAINTY_SHARE = 0.06
+"""Median error of the robust method's areas on the twin, docs/measurement.md."""
+_LEAST_UNCERTAINTY_MM2 = 1.0
+
+
+def utc_ms() -> int:
+    """Milliseconds since 1970-01-01 UTC; for records, never for waits."""
+    return time.time_ns() // 1_000_000
+
+
+@dataclass(slots=True)
+class Inspection:
+    """From the trigger to the record."""
+
+    trigger: Trigger
+    active: Active
+    limits: Deadlines
+    mm_per_px: float
+    began_s: float = field(default_factory=time.monotonic)
+    sequence: int | None = None
+    """Once it is durable."""
+    accepted_s: float | None = None
+    reference_s: float | None = None
+    """Capture of the reference's last frame; monotonic, as are all times in s."""
+    reference_image: Image | None = None
+    before_onset_mm: float | None = None
+    """The last width at which nothing touched."""
+    steps: list[GripStep] = field(default_factory=list)
+    """Captured, in order."""
+    seen: list[Seen] = field(default_factory=list)
+    """Measured, in order."""
+    interruptions: list[Reason] = field(default_factory=list)
+    explanation: list[str] = field(default_factory=list)
+    verdict: Verdict | None = None
+    outcome_name: OutcomeName = "NO_RESULT"
+    phases_s: dict[str, float] = field(default_factory=dict)
+    measures: dict[str, float | int | str | bool | None] = field(default_factory=dict)
+    standing: Outcome | None = None
+    """What the records hold."""
+
+    @property
+    def next_width_mm(self) -> float:
+        """The width of the next step, counted from the measured width of the first."""
+        return self.steps[0].move.width_mm - len(self.steps) * self.active.recipe.steps.step_mm
+
+    @property
+    def onset_mm(self) -> float | None:
+        """The measured width of the first contact; None before it."""
+        return next((seen.step.move.width_mm for seen in self.seen if seen.contact.found), None)
+
+    def interrupt(self, reason: Reason, why: str) -> None:
+        """Something from outside the measurement ended or spoilt it.
+
+        Args:
+            reason: for the PLC.
+            why: for a person, one sentence.
+        """
+        if reason not in self.interruptions:
+            self.interruptions.append(reason)
+        if why and why not in self.explanation:
+            self.explanation.append(why)
+
+    def press(self) -> Press:
+        """What was measured so far, for the judge."""
+        onset_mm = self.onset_mm
+        if onset_mm is None:
+            return Press(None, 0.0, (), tuple(self.interruptions))
+        before = [s.step.move.width_mm for s in self.seen if s.step.move.width_mm > onset_mm]
+        earlier_mm = min([*before, *([] if self.before_onset_mm is None else [self.before_onset_mm])], default=onset_mm)
+        points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
+        return Press(onset_mm, max(0.0, earlier_mm - onset_mm), points, tuple(self.interruptions))
+
+    def record(self) -> InspectionRecord:
+        """What is to be made durable."""
+        verdict, onset_mm = self.verdict, self.onset_mm
+        deciding = verdict.deciding if verdict is not None else None
+        found = [finding.reason for finding in verdict.findings] if verdict is not None else []
+        reasons = tuple(dict.fromkeys([*self.interruptions, *found]))
+        sentences = [finding.sentence for finding in verdict.findings] if verdict is not None else []
+        return InspectionRecord(
+            outcome=self.outcome_name,
+            reasons=() if self.outcome_name == "PASS" else tuple(map(str, reasons)),
+            explanation=tuple(dict.fromkeys([*self.explanation, *sentences])),
+            late=Reason.LATE in self.interruptions,
+            partial=verdict.partial if verdict is not None else True,
+            area_mm2=None if deciding is None else deciding.area_mm2,
+            area_px=None if deciding is None else deciding.area_px,
+            closing_mm=None if deciding is None else deciding.closing_mm,
+            confidence=None if deciding is None else deciding.confidence,
+            ended_utc_ms=utc_ms(),
+            duration_ms=round(1000 * (time.monotonic() - self.began_s)),
+            curve=tuple(self._point(number, seen, onset_mm) for number, seen in enumerate(self.seen)),
+            phases_s=dict(self.phases_s),
+            measures={**self.measures, "onset_mm": onset_mm},
+            images=self._images(),
+        )
+
+    def _measured(self, seen: Seen, onset_mm: float) -> Measured:
+        contact = seen.contact
+        area_mm2 = contact.area_px * self.mm_per_px**2
+        return Measured(
+            closing_mm=onset_mm - seen.step.move.width_mm,
+            area_mm2=area_mm2,
+            area_px=contact.area_px,
+            area_uncertainty_mm2=max(_LEAST_UNCERTAINTY_MM2, _UNCERTAINTY_SHARE * area_mm2),
+            confidence=contact.confidence,
+            flags=frozenset(Flag(flag.value) for flag in contact.flags),
+        )
+
+    def _point(self, number: int, seen: Seen, onset_mm: float | None) -> CurvePoint:
+        width_mm = seen.step.move.width_mm
+        return CurvePoint(
+            step=number,
+            width_mm=width_mm,
+            closing_mm=None if onset_mm is None else onset_mm - width_mm,
+            area_mm2=seen.contact.area_px * self.mm_per_px**2,
+            area_px=seen.contact.area_px,
+            confidence=seen.contact.confidence,
+            flags=tuple(sorted(flag.value for flag in seen.contact.flags)),
+            captured_s=seen.step.last_frame.captured_s - self.began_s,
+        )
+
+    def _images(self) -> tuple[Image, ...]:
+        steps = [
+            image
+            for number, seen in enumerate(self.seen)
+            for image in (Image("step", number, seen.image), Image("mask", number, seen.contact.mask))
+        ]
+        return (*([] if self.reference_image is None else [self.reference_image]), *steps)

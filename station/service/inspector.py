@@ -1,0 +1,164 @@
+"""Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
+
+import asyncio
+
+from station.devices.gripper.interface import MoveResult, ObjectState
+from station.inspection.cycle import REASONS, Event
+from station.inspection.judge import early_stop, judge
+from station.records.model import Image
+from station.service.crew import CAMERA, GRIPPER, Crew
+from station.service.eye import Eye
+from station.service.grip import Grip, GripStep, NothingTouchedError, UnseenContactError
+from station.service.inspection import Inspection
+from station.service.reference import BadReferenceError
+from station.settings.service import ServiceSettings
+from station.vision.methods import median_image
+from station.vocabulary import Reason
+
+_OPEN_WITHIN_MM = 2.0
+
+
+class Inspector:
+    """The actions that need the devices. Each ends with an event or a device's `StationError`.
+
+    Args:
+        crew: the devices.
+        eye: the measurement.
+        settings: placing, and how old a reference may be.
+    """
+
+    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings) -> None:
+        self._crew, self._eye, self._settings = crew, eye, settings
+        self._reached: MoveResult | None = None
+
+    async def open_jaws(self) -> Event:
+        """Let go of whatever is held."""
+        await self._crew.cell.gripper.open()
+        return Event.JAWS_OPEN
+
+    async def go_home(self) -> Event:
+        """Bring the arm home; from the nest, or from where it is not known, over the place above it."""
+        arm = self._crew.cell.arm
+        if arm is not None:
+            if (await arm.state()).at not in {"home", "above_nest", "accept", "reject"}:
+                await arm.move_to("above_nest")
+            await arm.move_to("home")
+        return Event.HOME
+
+    async def take_reference(self, now: Inspection) -> Event:
+        """Take the reference with the jaws open; a gripper that is not open may hold something against the gel."""
+        self._reached = None
+        gripper = self._crew.cell.gripper
+        opened = await gripper.open()
+        touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
+        if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
+            now.interrupt(
+                Reason.REFERENCE_BAD,
+                f"the jaws stand at {opened.width_mm:.1f} mm instead of open: something may touch the gel; look at them",
+            )
+            return Event.REFERENCE_BAD
+        self._crew.watches[GRIPPER].heard()
+        recipe = now.active.recipe
+        frames = await self._grip(now).sound_frames(recipe.imaging.reference_frames)
+        self._crew.watches[CAMERA].heard()
+        now.reference_s = frames[-1].captured_s
+        now.reference_image = Image("reference", None, median_image([frame.image for frame in frames]))
+        try:
+            looks = await self._eye.take_reference(frames, recipe.segmentation)
+        except BadReferenceError as error:
+            now.interrupt(Reason.REFERENCE_BAD, str(error))
+            return Event.REFERENCE_BAD
+        now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
+        now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
+        return Event.REFERENCE_TAKEN
+
+    async def approach(self, now: Inspection) -> Event:
+        """Bring the open jaws to the fruit."""
+        await self._grip(now).go("above_nest", "nest")
+        return Event.ARRIVED
+
+    async def close_to_onset(self, now: Inspection) -> Event:
+        """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
+        grip, plan = self._grip(now), now.active.recipe.steps
+        try:
+            if plan.start_width_mm is not None:
+                start = await grip.step(0, plan.start_width_mm)
+            else:
+                before, start = await grip.approach(self._touches)
+                now.before_onset_mm = None if before is None else before.move.width_mm
+        except (NothingTouchedError, UnseenContactError) as error:
+            now.interrupt(Reason.NO_CONTACT, str(error))
+            return Event.NO_ONSET
+        now.steps.append(start)
+        now.seen.append(await self._eye.measure(start))
+        return Event.ONSET_FOUND
+
+    async def close_step(self, now: Inspection) -> Event:
+        """Close by one step, counted in measured widths from the first."""
+        self._reached = await self._grip(now).close_to(now.next_width_mm)
+        return Event.REACHED
+
+    async def settle(self, now: Inspection) -> Event:
+        """Let fruit and gel come to rest: every step waits as long, because fruit creeps."""
+        await asyncio.sleep(now.active.recipe.imaging.settle_s)
+        return Event.SETTLED
+
+    async def capture(self, now: Inspection) -> Event:
+        """Take the step's frames, all of them captured from now on."""
+        recipe, reached = now.active.recipe, self._reached
+        if reached is None:
+            raise RuntimeError("a step is captured that was not reached")
+        frames = await self._grip(now).sound_frames(recipe.imaging.frames_per_step)
+        self._crew.watches[CAMERA].heard()
+        self._crew.watches[GRIPPER].heard()
+        now.steps.append(GripStep(len(now.steps), reached, frames))
+        held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
+        if len(now.steps) > recipe.steps.number or held or now.next_width_mm <= 0:
+            return Event.LAST_CAPTURED
+        return Event.CAPTURED
+
+    async def measure(self, now: Inspection) -> Event:
+        """Measure the captured step that is next in order, and say whether the recipe lets another one be made."""
+        now.seen.append(await self._eye.measure(now.steps[len(now.seen)]))
+        return Event.MEASURED if early_stop(now.press(), now.active.recipe) is None else Event.EARLY_STOP
+
+    async def judge(self, now: Inspection) -> Event:
+        """Judge what was measured."""
+        age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
+        if age_s > self._settings.reference.oldest_s:
+            now.interrupt(
+                Reason.REFERENCE_BAD,
+                f"the reference was {age_s:.0f} s old at the last step, at most "
+                f"{self._settings.reference.oldest_s:g} s are allowed",
+            )
+        now.verdict = judge(now.press(), now.active.recipe)
+        now.outcome_name = now.verdict.outcome
+        return Event.JUDGED_PASS if now.outcome_name == "PASS" else Event.JUDGED_DIVERT
+
+    async def place(self, now: Inspection) -> Event:
+        """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
+        if self._settings.placing == "arm" and self._crew.cell.arm is not None:
+            await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
+        await self._crew.cell.gripper.open()
+        return Event.PLACED
+
+    @staticmethod
+    def close_as_no_result(now: Inspection, because: Event, why: str) -> None:
+        """End an inspection that cannot be judged, with what was measured so far.
+
+        Args:
+            now: the inspection.
+            because: the event that ended it.
+            why: for a person, one sentence; may be empty.
+        """
+        now.interrupt(REASONS[because], why)
+        now.verdict = judge(now.press(), now.active.recipe)
+        now.outcome_name = "NO_RESULT"
+
+    def _grip(self, now: Inspection) -> Grip:
+        return Grip(self._crew.cell, now.active.recipe)
+
+    async def _touches(self, step: GripStep) -> bool:
+        self._crew.watches[CAMERA].heard()
+        self._crew.watches[GRIPPER].heard()
+        return (await self._eye.measure(step)).contact.found

@@ -1,0 +1,75 @@
+"""The station's end of the channel to the PLC interface: `station.channel.line` answered."""
+
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    Line,
+    Noted,
+    Open,
+    Outcome,
+    Published,
+    Resume,
+    StationState,
+)
+from station.channel.server import ChannelServer
+from station.service.orders import Orders
+from station.service.readiness import Gate
+from station.service.service import Service
+
+
+class LineServer:
+    """Answers the PLC interface, until cancelled.
+
+    Args:
+        endpoint: where; bound at once.
+        service: the cycle and its outcomes.
+        orders: the commands, and what the line says of itself.
+        gate: whether a trigger is accepted.
+    """
+
+    def __init__(self, endpoint: str, service: Service, orders: Orders, gate: Gate) -> None:
+        self._service, self._orders, self._gate = service, orders, gate
+        self._server = ChannelServer(
+            endpoint,
+            {
+                Begin: self._begin,
+                AwaitOutcome: self._outcome,
+                Published: self._published,
+                Acknowledged: self._acknowledged,
+                Resume: self._resume,
+                Line: self._line,
+                Command: self._command,
+            },
+        )
+
+    async def serve(self) -> None:
+        """Answer until cancelled."""
+        await self._server.serve()
+
+    async def _begin(self, request: Begin) -> Begun:
+        return await self._service.begin(request, self._gate.refusal()[0])
+
+    async def _outcome(self, request: AwaitOutcome) -> Outcome:
+        return await self._service.outcome(request.sequence)
+
+    async def _published(self, request: Published) -> Noted:
+        await self._service.published(request.outcome)
+        return Noted()
+
+    async def _acknowledged(self, request: Acknowledged) -> Noted:
+        await self._service.records.acknowledged(request.sequence)
+        return Noted()
+
+    async def _resume(self, _request: Resume) -> Open:
+        return await self._service.open()
+
+    async def _line(self, request: Line) -> StationState:
+        self._orders.line(request)
+        return self._gate.state()
+
+    async def _command(self, request: Command) -> CommandDone:
+        return await self._orders.carry_out(request)

@@ -1,0 +1,209 @@
+"""The station's metrics: what is counted and shown, in a registry of its own.
+
+Counters begin at 0 with each start of the station, as Prometheus expects; what has to last is in the records. An
+inspection is counted when the PLC is given its outcome, once, so that the counts of one start equal its records'.
+"""
+
+import platform
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    Info,
+    ProcessCollector,
+    disable_created_metrics,
+)
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.exposition import choose_encoder
+from prometheus_client.registry import Collector
+
+from station.channel.line import Outcome
+from station.records.records import Status
+from station.service.metrics_table import LABELS, OTHER, TABLE, Row
+
+DEADLINE_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25, 1.5, 2.0)
+
+
+class Metrics:
+    """What the station counts; every method is cheap and never raises for a value."""
+
+    def __init__(self, version: str, deadline_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        """Register everything in the table.
+
+        Args:
+            version: the program's.
+            deadline_s: of one inspection; the durations' buckets lie around it.
+            clock: monotonic, s.
+        """
+        disable_created_metrics()  # a series more for each counter, which nobody asks for
+        self.registry = CollectorRegistry(auto_describe=False)
+        ProcessCollector(registry=self.registry)
+        self._clock = clock
+        self._values: dict[str, set[str]] = {}
+        self._heard_s: dict[str, float] = {}
+        self._active: set[tuple[str, str]] = set()
+        self._reference: tuple[float, float] | None = None
+        self._status: Callable[[], Status] | None = None
+        buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
+        self._made: dict[str, Any] = {
+            key: _made(row, buckets, self.registry) for key, row in TABLE.items() if not row.at_scrape
+        }
+        self.registry.register(_AtScrape(self._at_scrape))
+        self._made["build"].info(
+            {"version": self._label("version", version), "python": self._label("python", platform.python_version())}
+        )
+
+    def inspection(self, fruit: str, outcome: Outcome, phases_s: Mapping[str, float] | None = None) -> None:
+        """Count one inspection; call it when `Records.published` says that it is the first time.
+
+        Args:
+            fruit: the recipe's name, empty for none.
+            outcome: what the PLC was given.
+            phases_s: how long each phase took.
+        """
+        fruit = fruit or "none"
+        reason = outcome.reasons[0] if outcome.reasons else "none"
+        self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
+        self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
+        if outcome.late:
+            self._of("late", fruit=fruit).inc()
+        if outcome.area_mm2 is not None:
+            self._of("area", fruit=fruit).observe(outcome.area_mm2)
+        if outcome.closing_mm is not None:
+            self._of("closing", fruit=fruit).observe(outcome.closing_mm)
+        for phase, seconds in (phases_s or {}).items():
+            self._of("phase", phase=phase).observe(seconds)
+
+    def frame(self, state: str = "good", number: int = 1) -> None:
+        """Count frames: `good`, `dropped`, or the name of a `FrameFault`."""
+        self._of("frames", state=state).inc(number)
+
+    def reference(self, age_s: float, drift_grey_levels: float) -> None:
+        """Tell the age of the reference in use, which grows from now on, and its distance from the golden one."""
+        self._reference = (self._clock() - age_s, drift_grey_levels)
+
+    def refused(self, reason: str) -> None:
+        """Count a trigger that was not accepted, by its `Refusal`."""
+        self._of("refused", reason=reason).inc()
+
+    def unexpected(self) -> None:
+        """Count an event that the cycle's table does not list."""
+        self._of("unexpected").inc()
+
+    def heard(self, link: str) -> None:
+        """Note a sign of life of a device, process or heartbeat; its age is shown from now on."""
+        self._heard_s[self._label("link", link)] = self._clock()
+
+    def alarms(self, active: Iterable[tuple[str, str]]) -> None:
+        """Show these alarms, as id and priority, and no other, as active."""
+        shown = {(self._label("id", name), self._label("priority", priority)) for name, priority in active}
+        self._active |= shown
+        for name, priority in self._active:
+            self._made["alarms"].labels(name, priority).set((name, priority) in shown)
+
+    def waiting(self, outcomes: int) -> None:
+        """Set how many outcomes the PLC has not acknowledged."""
+        self._of("waiting").set(outcomes)
+
+    def restarted(self, process: str) -> None:
+        """Count a process that was started again."""
+        self._of("restarts", process=process).inc()
+
+    def ready(self, *, ready: bool) -> None:
+        """Set whether a trigger would be accepted."""
+        self._of("ready").set(ready)
+
+    def watch_records(self, status: Callable[[], Status]) -> None:
+        """Ask the records at each scrape: `Records.status`."""
+        self._status = status
+
+    def exposition(self, accept: str = "") -> tuple[bytes, str]:
+        """Everything, and the content type.
+
+        Args:
+            accept: the client's header of that name; empty for Prometheus' text format.
+        """
+        encode, content_type = choose_encoder(accept)
+        return encode(self.registry), content_type
+
+    def _of(self, key: str, **labels: str) -> Any:
+        metric = self._made[key]
+        return metric.labels(**{name: self._label(name, value) for name, value in labels.items()}) if labels else metric
+
+    def _label(self, name: str, value: str) -> str:
+        """The value where the label may read it, else `other`: no caller can make the number of series grow."""
+        allowed = LABELS[name]
+        if isinstance(allowed, frozenset):
+            return str(value) if value in allowed else OTHER
+        taken = self._values.setdefault(name, set())
+        if value not in taken and len(taken) >= allowed:
+            return OTHER
+        taken.add(str(value))
+        return str(value)
+
+    def _at_scrape(self) -> Iterator[Metric]:
+        """What is known only when it is asked for."""
+        now_s = self._clock()
+        ages = GaugeMetricFamily(TABLE["link_age"].name, TABLE["link_age"].help, labels=["link"])
+        for link, heard_s in tuple(self._heard_s.items()):
+            ages.add_metric([link], now_s - heard_s)
+        yield ages
+        if self._reference is not None:
+            taken_s, drift_grey_levels = self._reference
+            yield GaugeMetricFamily(TABLE["reference_age"].name, TABLE["reference_age"].help, now_s - taken_s)
+            yield GaugeMetricFamily(TABLE["reference_drift"].name, TABLE["reference_drift"].help, drift_grey_levels)
+        if self._status is not None:
+            yield from _of_records(self._status())
+
+
+class _AtScrape(Collector):
+    def __init__(self, collect: Callable[[], Iterator[Metric]]) -> None:
+        self._collect = collect
+
+    def collect(self) -> Iterator[Metric]:
+        return self._collect()
+
+
+def _made(row: Row, around_deadline: tuple[float, ...], registry: CollectorRegistry) -> Any:
+    """What prometheus-client counts the row with."""
+    match row.kind:
+        case "counter":
+            return Counter(row.name, row.help, row.labels, registry=registry)
+        case "gauge":
+            return Gauge(row.name, row.help, row.labels, registry=registry)
+        case "histogram":
+            return Histogram(row.name, row.help, row.labels, registry=registry, buckets=row.buckets or around_deadline)
+        case "info":
+            return Info(row.name, row.help, registry=registry)
+
+
+def _of_records(status: Status) -> Iterator[Metric]:
+    """The records' metrics."""
+    gauges: dict[str, Mapping[tuple[str, ...], float | None]] = {
+        "records_queue": {(): status.queue},
+        "records_images_queue": {(): status.images_waiting},
+        "records_bytes": {("database",): status.database_bytes, ("images",): status.image_bytes},
+        "records_free": {(): status.free_bytes},
+        "records_write_age": {(): status.last_write_age_s},
+    }
+    for key, values in gauges.items():
+        gauge = GaugeMetricFamily(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
+        for labels, value in values.items():
+            if value is not None:
+                gauge.add_metric(labels, value)
+        yield gauge
+    counters: dict[str, Mapping[tuple[str, ...], float]] = {
+        "records_writes": {(): status.writes},
+        "records_failures": {(code,): number for code, number in status.failures.items()},
+        "records_images": {(result,): number for result, number in status.images.items()},
+    }
+    for key, values in counters.items():
+        counter = CounterMetricFamily(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
+        for labels, value in values.items():
+            counter.add_metric(labels, value)
+        yield counter

@@ -1,0 +1,181 @@
+"""What the line's PLC orders between fruits, and what it says of itself."""
+
+import asyncio
+import logging
+import time
+
+from station.channel.line import Command, CommandDone, CommandName, Line
+from station.devices.arm.faults import ArmFault
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import UNJUDGED, Event
+from station.inspection.states import STATES, State
+from station.service.crew import Crew
+from station.service.metrics import Metrics
+from station.service.recipe_book import Active, RecipeBook
+from station.service.service import Service
+from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
+
+DEADLINE_S = 25.0
+"""Less than the PLC interface's own patience with a command."""
+LINE_SILENT_S = 2.0
+MODES = (1, 2, 3)
+
+
+class Orders:
+    """Carries the PLC's commands out, one after the other.
+
+    Args:
+        service: the cycle.
+        crew: the devices.
+        book: the recipes.
+        metrics: notes the line's signs of life.
+    """
+
+    def __init__(self, service: Service, crew: Crew, book: RecipeBook, metrics: Metrics) -> None:
+        self._service, self._crew, self._book, self._metrics = service, crew, book, metrics
+        self.mode = MODES[0]
+        """PackML's: 1 production, 2 maintenance, 3 manual."""
+        self.recipe_changing = False
+        self._line: Line | None = None
+        self._line_at_s: float | None = None
+        self._turn = asyncio.Lock()
+
+    @property
+    def line_age_s(self) -> float | None:
+        """Time since the PLC interface was heard; None where it never was."""
+        return None if self._line_at_s is None else time.monotonic() - self._line_at_s
+
+    def line(self, line: Line) -> None:
+        """Note what the PLC interface says with its beat.
+
+        Args:
+            line: as it came.
+        """
+        self._line, self._line_at_s = line, time.monotonic()
+        self._metrics.heard("plc_interface")
+        self._metrics.waiting(line.waiting)
+        if line.plc_alive:
+            self._metrics.heard("plc")
+
+    def line_trouble(self) -> str:
+        """What is wrong with the line, as far as is known; empty where nothing is."""
+        age_s = self.line_age_s
+        if self._line is None or age_s is None:
+            return ""
+        if age_s > LINE_SILENT_S:
+            return f"the PLC interface has not been heard for {age_s:.0f} s"
+        return "" if self._line.plc_alive or not self._line.enabled else "the PLC's heartbeat stands still"
+
+    def show_line(self) -> None:
+        """Raise and clear the alarms that the line's state asks for."""
+        age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
+        if line is None or age_s is None:
+            return
+        silent = age_s > LINE_SILENT_S
+        alarms.show(AlarmId.PLC_INTERFACE_LOST, self.line_trouble() if silent else "")
+        alarms.show(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_trouble())
+        alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in line.faults if "CAN" in fault), ""))
+
+    async def carry_out(self, command: Command) -> CommandDone:
+        """Carry out one command.
+
+        Args:
+            command: as it came.
+        """
+        log.info("the PLC orders %s %s", command.command, command.argument)
+        async with self._turn:
+            try:
+                async with asyncio.timeout(DEADLINE_S):
+                    why = await self._carry_out(command)
+            except TimeoutError:
+                why = f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._sentence()}"
+        if why:
+            log.warning("%s was not done: %s", command.command, why)
+        return CommandDone(done=not why, why=why)
+
+    async def _carry_out(self, command: Command) -> str:
+        match command.command:
+            case CommandName.CHANGE_RECIPE:
+                return await self._change_recipe(command.argument)
+            case CommandName.RESET:
+                return await self._reset()
+            case CommandName.CALL_OFF:
+                return await self._call_off()
+            case CommandName.SET_MODE:
+                if command.argument not in MODES:
+                    return f"mode {command.argument}: expected 1 (production), 2 (maintenance) or 3 (manual)"
+                self.mode = command.argument
+                return ""
+            case CommandName.CLEAR_ALARMS:
+                self._service.alarms.acknowledge_gone()
+                return ""
+
+    async def _change_recipe(self, number: int) -> str:
+        await asyncio.to_thread(self._book.read)
+        found = self._book.find(number)
+        if found is None:
+            known = ", ".join(map(str, self._book.numbers)) or "none"
+            return f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._book.problems)
+        widest_mm = self._crew.cell.gripper.max_width_mm
+        if found.recipe.expected_width.smallest_mm >= widest_mm:
+            return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
+        self.recipe_changing = True
+        try:
+            await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
+            self.choose(found)
+        finally:
+            self.recipe_changing = False
+        if not self._book.remember(found):
+            return f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
+        return ""
+
+    def choose(self, active: Active) -> None:
+        """Inspect by a recipe from the next fruit on.
+
+        Args:
+            active: the recipe.
+        """
+        self._service.active = active
+        log.info("recipe %s (%d) is active", active.recipe.name, active.recipe.plc_number)
+
+    async def _call_off(self) -> str:
+        service = self._service
+        if service.state not in UNJUDGED:
+            busy = STATES[service.state].refusal is Refusal.BUSY
+            return "the inspection is already judged" if busy else ""
+        service.conductor.post(Event.CALLED_OFF, "the PLC called the inspection off")
+        await service.conductor.until(lambda state: state not in UNJUDGED)
+        return ""
+
+    async def _reset(self) -> str:
+        service, state = self._service, self._service.state
+        if service.stop_asked:
+            return "the station is told to end"
+        if stop := self._crew.standing_stop:
+            return f"{stop} A safety stop is a person's to confirm at the cell: `station devices recover`"
+        if STATES[state].refusal is Refusal.BUSY:
+            return "an inspection is under way; call it off first"
+        if state is State.IDLE:
+            return ""
+        service.reset_wanted = True
+        self._crew.confirmed_clear = True
+        if state in {State.LATCHED, State.CARRIED}:
+            service.conductor.post(Event.PERSON_CONFIRMED, "reset")
+        elif state is State.STOPPED:
+            service.conductor.post(Event.RESET)
+        else:
+            try:
+                await self._crew.play_again()
+            except ArmFault as fault:
+                return str(fault)
+        tried_s = time.monotonic()
+        reached = await service.conductor.until(
+            lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
+        )
+        return "" if reached is State.IDLE else self._sentence()
+
+    def _sentence(self) -> str:
+        faults = list(self._crew.faults.values())
+        return str(faults[0]) if faults else STATES[self._service.state].sentence

@@ -1,0 +1,106 @@
+"""Whether a trigger would be accepted now, and else why not: one sentence with the remedy."""
+
+from station.channel.line import StationState
+from station.inspection.states import STATES, State
+from station.service.crew import Crew
+from station.service.health import Dependency, Liveness, Readiness
+from station.service.orders import Orders
+from station.service.recipe_book import RecipeBook
+from station.service.service import Service
+from station.vocabulary import Refusal
+
+PRODUCTION = 1
+_DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
+
+
+class Gate:
+    """Looks at everything that a trigger needs.
+
+    Args:
+        boot: this start of the station.
+        service: the cycle.
+        crew: the devices.
+        orders: the mode, and a recipe's change under way.
+        book: the recipes there are.
+        liveness: what has to make progress.
+    """
+
+    def __init__(
+        self, boot: str, service: Service, crew: Crew, orders: Orders, book: RecipeBook, liveness: Liveness
+    ) -> None:
+        self._boot = boot
+        self._service, self._crew, self._orders = service, crew, orders
+        self._book, self._liveness = book, liveness
+
+    def refusal(self) -> tuple[Refusal | None, str]:
+        """Why no trigger is accepted, for the PLC and for a person; None and nothing where one is."""
+        service, facts = self._service, STATES[self._service.state]
+        if service.stop_asked:
+            return Refusal.NOT_READY, "The station is told to end; start it again."
+        if facts.refusal is not None:
+            return facts.refusal, self._trouble() or facts.sentence
+        if stuck := self._liveness.stuck():
+            names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
+            return Refusal.NOT_READY, f"No progress of {names}: restart the station if it stays."
+        if self._orders.recipe_changing:
+            return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
+        if service.active is None:
+            numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
+            return Refusal.NOT_READY, f"No recipe is active: choose one by its number ({numbers})."
+        if self._orders.mode != PRODUCTION:
+            return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
+        return None, ""
+
+    def state(self) -> StationState:
+        """The whole state, as the PLC interface gets it with every beat."""
+        service = self._service
+        refusal, why = self.refusal()
+        snapshot = None if service.active is None else service.active.snapshot
+        return StationState(
+            boot=self._boot,
+            healthy=not self._liveness.stuck(),
+            ready=refusal is None,
+            why_not_ready=why,
+            packml_state=STATES[service.state].packml,
+            mode=self._orders.mode,
+            recipe_number=0 if snapshot is None else snapshot.number,
+            recipe_checksum=0 if snapshot is None else snapshot.checksum,
+            error_code=service.alarms.alarms.error_code,
+            alarms=service.alarms.alarms.word,
+            simulated=self._crew.simulated,
+        )
+
+    def readiness(self) -> Readiness:
+        """The same for supervisors, with every dependency's age."""
+        refusal, why = self.refusal()
+        devices = [
+            Dependency(
+                name,
+                "ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
+                watch.age_s,
+                "" if watch.fault is None else str(watch.fault),
+                "" if watch.fault is None else "see the detail, and `station devices check`",
+            )
+            for name, watch in self._crew.watches.items()
+        ]
+        return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
+
+    def _records(self) -> Dependency:
+        fault, status = self._service.records_fault, self._service.records.status()
+        if fault is None:
+            return Dependency("records", "ok", status.last_write_age_s)
+        return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
+
+    def _line(self) -> Dependency:
+        age_s = self._orders.line_age_s
+        if age_s is None:
+            return Dependency("plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run")
+        if trouble := self._orders.line_trouble():
+            return Dependency("plc", "fault", age_s, trouble, "see the detail")
+        return Dependency("plc", "ok", age_s)
+
+    def _trouble(self) -> str:
+        if self._service.state not in _DEVICES_DECIDE:
+            return ""
+        faults = [*self._crew.faults.values(), *([self._service.records_fault] if self._service.records_fault else [])]
+        return str(faults[0]) if faults else ""

@@ -1,0 +1,115 @@
+"""Whether a picture of the untouched gel may serve as the reference that everything is measured against."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from station.devices.camera.interface import Image
+from station.errors import StationError
+from station.service.keeping import Kept
+from station.settings.segmentation import Segmentation
+from station.settings.service import ReferenceSettings
+from station.vision.contact import Flag
+from station.vision.methods import make_method, median_image
+
+_DETAIL_PX = (5.0, 15.0)
+"""Between these two blurs lies what a lens shows and fog hides: structure of the light, above the pixels' noise."""
+_SATURATED_LEVEL = 250
+GOLDEN = "golden_reference.png"
+
+
+class BadReferenceError(StationError):
+    """The picture cannot be a reference; the message says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """What a reference looks like."""
+
+    sharpness: float
+    """Root mean square of its detail, grey levels."""
+    saturated_share: float
+    drift_levels: float
+    """Root mean square of the light's change since the golden reference; 0 where there is none yet."""
+
+
+class Golden:
+    """The golden reference: the gel as it was when a person last saw that it was clean, kept in the home folder.
+
+    The first reference that is taken becomes it. After a change of gel, or once dirt was wiped off, its file is
+    removed by a person and the next reference takes its place.
+    """
+
+    def __init__(self, kept: Kept) -> None:
+        self._kept = kept
+
+    def image(self) -> Image | None:
+        """The picture, shape (height, width, 3); None where there is none that can be read."""
+        data = self._kept.read(GOLDEN)
+        picture = None if data is None else cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        return None if picture is None else np.asarray(picture, np.uint8)
+
+    def keep(self, images: Sequence[Image]) -> None:
+        """Make frames of the untouched gel the golden reference.
+
+        Args:
+            images: of one shape (height, width, 3), dtype uint8, BGR.
+        """
+        self._kept.write(GOLDEN, cv2.imencode(".png", median_image(images))[1].tobytes())
+
+
+def examine(
+    images: Sequence[Image], golden: Image | None, segmentation: Segmentation, settings: ReferenceSettings
+) -> Looks:
+    """Judge the frames that are to be a reference.
+
+    Args:
+        images: the frames, taken with nothing touching the gel.
+        golden: the golden reference, of the frames' shape; None where there is none yet.
+        segmentation: the recipe's method, which looks for a contact between the golden reference and this one.
+        settings: what is good enough.
+
+    Raises:
+        BadReferenceError: it cannot serve.
+    """
+    image = median_image(images)
+    saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
+    if saturated > settings.saturated_share:
+        raise BadReferenceError(
+            f"reference: {saturated:.0%} of it are saturated, at most {settings.saturated_share:.0%} may be: "
+            "keep outside light off the gel, or lower the LEDs"
+        )
+    detail = sharpness(image)
+    if golden is None or golden.shape != image.shape:
+        return Looks(detail, saturated, 0.0)
+    contact = make_method([golden], segmentation).measure(image)
+    drift = contact.drift_levels or 0.0
+    share = detail / sharpness(golden)
+    if share < settings.least_sharpness:
+        raise BadReferenceError(
+            f"reference: {share:.0%} as sharp as the golden reference, at least {settings.least_sharpness:.0%} are "
+            "needed: clean the sensor's lens and gel"
+        )
+    if drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
+        raise BadReferenceError(
+            f"reference: its light differs from the golden reference's by {drift:.0f} grey levels: look at the "
+            f"sensor's LEDs; after a change of gel or sensor remove {GOLDEN} from the home folder"
+        )
+    if contact.found or Flag.UNDECIDED in contact.flags:
+        raise BadReferenceError(
+            "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
+            f"gel; if the gel was changed, remove {GOLDEN} from the home folder"
+        )
+    return Looks(detail, saturated, drift)
+
+
+def sharpness(image: Image) -> float:
+    """Root mean square of the detail between two scales, grey levels.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+    """
+    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
+    return float(np.sqrt(np.mean((finer - coarser) ** 2)))

@@ -1,0 +1,145 @@
+"""Looks after what an inspection needs, outside of inspections: brings it back where that is safe, raises alarms."""
+
+import asyncio
+import logging
+import time
+
+from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
+from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import Event
+from station.inspection.states import State
+from station.records.errors import RecordsError
+from station.service.crew import GRIPPER, Crew
+from station.service.health import Liveness
+from station.service.metrics import Metrics
+from station.service.orders import Orders
+from station.service.readiness import Gate
+from station.service.recipe_book import RecipeBook
+from station.service.service import Service
+
+log = logging.getLogger(__name__)
+
+UPKEEP = "upkeep"
+PERIOD_S = 0.2
+_ALARMS_EVERY_S = 1.0
+_CLOCK_STEP_S = 2.0
+_MB = 1_000_000
+_AWAY = {State.UNKNOWN, State.HELD}
+
+
+class Upkeep:
+    """One task beside the cycle.
+
+    Args:
+        service: the cycle.
+        crew: the devices.
+        gate: readiness, for the metrics.
+        orders: the line's own alarms.
+        book: the recipes.
+        metrics: shows what is ready.
+        liveness: fed with this task's progress.
+        broken: what was wrong with the configuration at the start; empty for nothing.
+        reserve_mb: space on the disk below which nothing is inspected.
+        longest_pause_s: between two tries to bring something back.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        crew: Crew,
+        gate: Gate,
+        orders: Orders,
+        book: RecipeBook,
+        metrics: Metrics,
+        liveness: Liveness,
+        *,
+        broken: str,
+        reserve_mb: int,
+        longest_pause_s: float,
+    ) -> None:
+        self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
+        self._metrics, self._liveness = metrics, liveness
+        self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
+        self._told_ready_s = 0.0
+        self._alarms_at_s = 0.0
+        self._clock_offset_s = time.time() - time.monotonic()
+        self._pause_s, self._again_s = PERIOD_S, 0.0
+
+    async def run(self) -> None:
+        """Look after everything until cancelled."""
+        while True:
+            if self._service.state in _AWAY:
+                await self._bring_back()
+            else:
+                self._pause_s, self._again_s = PERIOD_S, 0.0
+            if time.monotonic() - self._alarms_at_s > _ALARMS_EVERY_S:
+                self._alarms_at_s = time.monotonic()
+                self._show_conditions()
+            self._metrics.ready(ready=self._gate.refusal()[0] is None)
+            self._liveness.progress(UPKEEP)
+            await asyncio.sleep(PERIOD_S)
+
+    async def _bring_back(self) -> None:
+        service, now_s = self._service, time.monotonic()
+        if now_s >= self._again_s and (service.records_fault is not None or self._activation_is_lost):
+            self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
+            await self._open_records_again()
+            await self._activate()
+            self._again_s = time.monotonic() + self._pause_s
+        entered_s = service.conductor.entered_s
+        if service.records_fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
+            self._told_ready_s = time.monotonic()
+            service.conductor.post(Event.READY)
+
+    @property
+    def _activation_is_lost(self) -> bool:
+        return isinstance(self._crew.watches[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
+
+    async def _open_records_again(self) -> None:
+        service = self._service
+        if service.records_fault is None:
+            return
+        try:
+            await service.records.reopen()
+            free_mb = service.records.status().free_bytes / _MB
+            if free_mb >= self._reserve_mb:
+                service.records_fault = None
+        except RecordsError as error:
+            service.records_fault = error
+
+    async def _activate(self) -> None:
+        if not self._activation_is_lost or not self._others_are_well:
+            return
+        try:
+            await self._crew.activate_if_safe()
+        except StationError as error:
+            self._crew.watches[GRIPPER].refused(error)
+
+    @property
+    def _others_are_well(self) -> bool:
+        return set(self._crew.faults) <= {GRIPPER}
+
+    def _show_conditions(self) -> None:
+        service, alarms = self._service, self._service.alarms
+        alarms.tick()
+        for name, watch in self._crew.watches.items():
+            alarms.device(name, watch.fault if watch.was_heard_or_tried else None)
+        fault = service.records_fault
+        alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
+        free_mb = service.records.status().free_bytes / _MB
+        alarms.show(
+            AlarmId.DISK_LOW,
+            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve" if free_mb < 2 * self._reserve_mb else "",
+        )
+        alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
+        alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
+        alarms.show(AlarmId.NO_RECIPE, "" if service.active is not None else self._gate.refusal()[1])
+        self._orders.show_line()
+        offset_s = time.time() - time.monotonic()
+        if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
+            step_s = offset_s - self._clock_offset_s
+            alarms.raise_(AlarmId.CLOCK_STEPPED, f"the machine's clock was set by {step_s:+.0f} s")
+        else:
+            alarms.clear(AlarmId.CLOCK_STEPPED)
+        self._clock_offset_s = offset_s

@@ -1,0 +1,106 @@
+"""Looks at one device again and again: whether it answers, how long ago it did, and what is wrong with it."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+
+from station.errors import StationError
+
+PERIOD_S = 0.25
+FIRST_PAUSE_S = 0.25
+
+log = logging.getLogger(__name__)
+
+Look = Callable[[], Awaitable[None]]
+"""Asks the device; raises what is wrong with it. It ends by itself, whatever the device does."""
+
+
+class NotYetHeardError(StationError):
+    """The device has not answered since the start."""
+
+
+class DeviceWatch:
+    """One device's watch, a task of its own. It goes on for ever, with growing pauses while the device is away.
+
+    Args:
+        name: the device's, as in messages.
+        look: how it is asked.
+        longest_pause_s: between two tries.
+        on_change: told what is wrong from now on, None for nothing.
+        on_progress: told after each look, whatever came of it.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        look: Look,
+        longest_pause_s: float,
+        on_change: Callable[[StationError | None], None],
+        on_progress: Callable[[], None],
+    ) -> None:
+        self.name = name
+        self.fault: StationError | None = NotYetHeardError(f"{name}: it has not answered yet; wait a moment")
+        self.heard_s: float | None = None
+        """Monotonic time of the last look that found the device well."""
+        self.in_use = False
+        """While somebody else works with it, it is not asked; its user tells what goes wrong."""
+        self._look, self._longest_pause_s = look, longest_pause_s
+        self._on_change, self._on_progress = on_change, on_progress
+        self._again = asyncio.Event()
+
+    @property
+    def age_s(self) -> float | None:
+        """Time since it was last found well; None where it never was."""
+        return None if self.heard_s is None else time.monotonic() - self.heard_s
+
+    def heard(self) -> None:
+        """Somebody has just worked with it, and it did."""
+        self.heard_s = time.monotonic()
+        self._on_progress()
+
+    def failed(self, fault: StationError) -> None:
+        """Somebody who works with it found this; the watch looks again at once.
+
+        Args:
+            fault: what is wrong.
+        """
+        self._set(fault)
+        self._again.set()
+
+    async def run(self) -> None:
+        """Look until cancelled."""
+        pause_s = PERIOD_S
+        while True:
+            if self.in_use:
+                self._on_progress()
+            else:
+                try:
+                    await self._look()
+                except StationError as fault:
+                    pause_s = FIRST_PAUSE_S if self.fault is None else min(2 * pause_s, self._longest_pause_s)
+                    self._set(fault)
+                    self._on_progress()
+                else:
+                    pause_s = PERIOD_S
+                    self.heard()
+                    self._set(None)
+            await self._pause(pause_s)
+
+    async def _pause(self, pause_s: float) -> None:
+        until_s = time.monotonic() + pause_s
+        self._again.clear()
+        while (left_s := until_s - time.monotonic()) > 0:
+            try:
+                async with asyncio.timeout(min(left_s, PERIOD_S)):
+                    await self._again.wait()
+                return
+            except TimeoutError:
+                self._on_progress()
+
+    def _set(self, fault: StationError | None) -> None:
+        before, self.fault = self.fault, fault
+        if str(before or "") != str(fault or ""):
+            log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault or "well")
+        if (before is None) != (fault is None) or type(before) is not type(fault):
+            self._on_change(fault)

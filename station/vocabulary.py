@@ -1,0 +1,72 @@
+"""Words that the domain and the wire share, as the line's PLC and the records know them."""
+
+from enum import StrEnum
+from typing import Literal
+
+OutcomeName = Literal["PASS", "FAIL", "NO_RESULT"]
+
+
+class Reason(StrEnum):
+    """Why an outcome is not PASS. The order is the bits' order in the register map, bit 0 first."""
+
+    AREA_OVER_LIMIT = "area_over_limit"
+    GROWTH_OVER_LIMIT = "growth_over_limit"
+    EARLY_STOP = "early_stop"
+    NO_CONTACT = "no_contact"
+    CONTACT_LOST = "contact_lost"
+    AREA_NOT_RISING = "area_not_rising"
+    CUT_BY_BORDER = "cut_by_border"
+    SATURATED = "saturated"
+    LOW_CONFIDENCE = "low_confidence"
+    REFERENCE_BAD = "reference_bad"
+    IMAGE_STALE = "image_stale"
+    OUT_OF_RANGE = "out_of_range"
+    """The fruit's width is not one of the recipe's."""
+    LATE = "late"
+    CALLED_OFF = "called_off"
+    ARM_FAULT = "arm_fault"
+    GRIPPER_FAULT = "gripper_fault"
+    CAMERA_FAULT = "camera_fault"
+    RECORDS_FAULT = "records_fault"
+    STATION_LOST = "station_lost"
+    """The station stopped answering, or was restarted, before the outcome was the PLC's."""
+    INTERNAL_FAULT = "internal_fault"
+
+
+class Refusal(StrEnum):
+    """Why a trigger was not accepted. The order is the codes' order in the register map, from 1."""
+
+    NOT_ENABLED = "not_enabled"
+    NOT_READY = "not_ready"
+    BUSY = "busy"
+    QUEUE_FULL = "queue_full"
+    BAD_TRIGGER_ID = "bad_trigger_id"
+    """The id is 0 or the one of the trigger before."""
+    OFFLINE = "offline"
+    STATION_LOST = "station_lost"
+    RECIPE_CHANGING = "recipe_changing"
+    NOT_WRITER = "not_writer"
+    RECORDS_FULL = "records_full"
+    """The station could not make the trigger durable."""
+
+
+class PackmlState(StrEnum):
+    """ISA-TR88.00.02-2022, table 1, in the order of their numbers, from 1."""
+
+    CLEARING = "clearing"
+    STOPPED = "stopped"
+    STARTING = "starting"
+    IDLE = "idle"
+    SUSPENDED = "suspended"
+    EXECUTE = "execute"
+    STOPPING = "stopping"
+    ABORTING = "aborting"
+    ABORTED = "aborted"
+    HOLDING = "holding"
+    HELD = "held"
+    UNHOLDING = "unholding"
+    SUSPENDING = "suspending"
+    UNSUSPENDING = "unsuspending"
+    RESETTING = "resetting"
+    COMPLETING = "completing"
+    COMPLETED = "completed"

@@ -1,0 +1,165 @@
+"""The cycle's table, proven by walking through every world that it can lead to."""
+
+from collections import Counter
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from station.inspection.cycle import LATCHES, REASONS, ROWS, START, TABLE, Action, Cycle, Event, Raise
+from station.inspection.states import STATES, State
+from station.vocabulary import PackmlState, Refusal
+
+
+def test_every_state_is_told_and_reached(cycle_model):
+    assert set(STATES) == set(State)
+    assert {world.state for world in cycle_model} == set(State)
+    for state, facts in STATES.items():
+        assert facts.sentence.endswith("."), state
+        assert (facts.refusal is None) == (state == State.IDLE)
+        assert not facts.needs_person or "confirm" in facts.sentence
+
+
+def test_no_row_is_dead_and_none_is_there_twice(cycle_model):
+    reached = {(world.state, event) for world, events in cycle_model.items() for event in events}
+    assert set(TABLE) <= reached
+    assert len(TABLE) == sum(len(row.states) * len(row.events) for row in ROWS)
+
+
+def test_a_trigger_has_one_outcome_and_it_is_recorded_before_it_is_told(cycle_model):
+    # `BrokenError` is raised while the model is made; here what only the whole shows.
+    for world, events in cycle_model.items():
+        if world.state == State.IDLE:
+            assert world.accepted == 0, world
+        for event, following in events.items():
+            answered = world.accepted and not following.accepted
+            if answered and event != Event.UNFINISHED_CLOSED:
+                assert Action.PUBLISH in TABLE[world.state, Event(event)].actions
+
+
+def test_a_fruit_is_carried_only_to_its_place(cycle_model):
+    # Jaws that may be closed: the arm's only motion is the one that places the fruit, after its record.
+    placing = {(s, e): t for (s, e), t in TABLE.items() if {Action.PLACE_ACCEPT, Action.PLACE_REJECT} & set(t.actions)}
+    assert {event for _, event in placing} == {Event.RECORDED}
+    assert placing[State.RECORDING_ACCEPT, Event.RECORDED].actions == (Action.PUBLISH, Action.PLACE_ACCEPT)
+    assert placing[State.RECORDING_REJECT, Event.RECORDED].actions == (Action.PUBLISH, Action.PLACE_REJECT)
+    assert {state for (state, _), t in TABLE.items() if t.state == State.RECORDING_ACCEPT} <= {
+        State.JUDGING,
+        State.RECORDING_ACCEPT,
+    }
+
+
+def test_from_everywhere_there_is_a_way_back_to_ready(cycle_model):
+    ready = {world for world in cycle_model if world.state == State.IDLE}
+    alone = backwards(cycle_model, ready, without={Event.PERSON_CONFIRMED})
+    with_a_person = backwards(cycle_model, ready, without=set())
+    assert with_a_person == set(cycle_model)
+    for world in set(cycle_model) - alone:
+        assert waits_for_a_person(world), world
+
+
+def backwards(model, goals, without):
+    """The worlds from which a goal is reached by events alone: a crash helps nobody."""
+    before = {}
+    for world, events in model.items():
+        for event, following in events.items():
+            if event in set(Event) - set(without):
+                before.setdefault(following, set()).add(world)
+    found, todo = set(goals), list(goals)
+    while todo:
+        for world in before.get(todo.pop(), set()) - found:
+            found.add(world)
+            todo.append(world)
+    return found
+
+
+def waits_for_a_person(world):
+    """A safety stop stands, or the state itself says that only a person leads on."""
+    return world.stopped_for_a_person or STATES[world.state].needs_person
+
+
+def test_a_safety_stop_is_left_only_by_a_person():
+    leaving = {e for (s, e), t in TABLE.items() if s == State.LATCHED and t.state != State.LATCHED}
+    assert leaving == {Event.PERSON_CONFIRMED}
+    for state in set(State) - {State.LATCHED}:
+        for event, alarm in LATCHES.items():
+            transition = TABLE[state, event]
+            assert Raise(alarm) in transition.actions
+            assert transition.state in (State.LATCHED, State.RECORDING_LATCHED)
+            if state != State.RECORDING_LATCHED:
+                assert Action.HALT in transition.actions
+
+
+@pytest.mark.parametrize("event", [Event.ARM_FAULT, Event.GRIPPER_FAULT, Event.INTERNAL_FAULT, Event.RECORDS_FAULT])
+def test_no_state_is_without_an_answer_to_a_fault(event):
+    assert {state for state in State if (state, event) not in TABLE} == set()
+
+
+def test_after_a_fault_nothing_moves_before_the_devices_were_read():
+    for (state, event), transition in TABLE.items():
+        if transition.state == State.HELD and state != State.HELD:
+            assert transition.actions[-1] == Action.READ_DEVICES, (state, event)
+        if transition.state == State.CLEARING and state != State.CLEARING:
+            assert event == Event.READY, state
+
+
+def test_what_closes_an_inspection_has_a_reason():
+    closing = {event for (_, event), t in TABLE.items() if Action.CLOSE_AS_NO_RESULT in t.actions}
+    assert closing == set(REASONS)
+
+
+def test_a_state_that_may_end_the_process_has_no_inspection_under_way(cycle_model):
+    for state, facts in STATES.items():
+        if facts.may_exit:
+            assert facts.refusal != Refusal.BUSY, state
+    moving = {t.state for t in TABLE.values() if {Action.GO_HOME, Action.OPEN_JAWS, Action.CLOSE_STEP} & set(t.actions)}
+    assert not any(STATES[state].may_exit for state in moving)
+
+
+def test_an_orderly_stop_ends_everywhere_without_a_person(cycle_model):
+    ends = {world for world in cycle_model if STATES[world.state].may_exit}
+    assert backwards(cycle_model, ends, without={Event.PERSON_CONFIRMED, Event.TRIGGER}) == set(cycle_model)
+
+
+GOOD = [
+    Event.READY, Event.UNFINISHED_CLOSED, Event.JAWS_OPEN, Event.RESET, Event.JAWS_OPEN, Event.HOME, Event.READY,
+    Event.TRIGGER, Event.TRIGGER_RECORDED, Event.REFERENCE_TAKEN, Event.ARRIVED, Event.ONSET_FOUND, Event.REACHED,
+    Event.SETTLED, Event.CAPTURED, Event.REACHED, Event.MEASURED, Event.SETTLED, Event.LAST_CAPTURED, Event.MEASURED,
+    Event.JUDGED_ACCEPT, Event.RECORDED, Event.PLACED, Event.HOME, Event.READY,
+]  # fmt: skip
+
+
+def test_one_fruit_from_start_to_ready_again():
+    cycle = Cycle()
+    actions = [action for event in GOOD for action in cycle.on(event) or ()]
+    assert cycle.state == State.IDLE
+    assert cycle.facts.packml == PackmlState.IDLE
+    assert not cycle.refused
+    counted = Counter(actions)
+    assert counted[Action.MEASURE] == counted[Action.CAPTURE] == 2
+    assert counted[Action.PUBLISH] == counted[Action.RECORD] == counted[Action.ACCEPT_TRIGGER] == 1
+    assert actions.index(Action.RECORD) < actions.index(Action.PUBLISH)
+
+
+def test_the_next_step_is_made_while_an_image_is_measured_but_never_two_ahead():
+    transition = TABLE[State.CAPTURING, Event.CAPTURED]
+    assert transition.actions == (Action.MEASURE, Action.CLOSE_STEP)
+    assert TABLE[State.CAPTURING_MEASURING, Event.CAPTURED].actions == ()
+
+
+@given(st.lists(st.sampled_from(list(Event)), max_size=60))
+def test_any_events_are_taken_without_an_error_and_the_unlisted_are_counted(events):
+    cycle = Cycle()
+    refused = 0
+    for event in events:
+        before = cycle.state
+        if cycle.on(event) is None:
+            refused += 1
+            assert cycle.state == before
+    assert cycle.refused.total() == refused
+
+
+def test_the_start_knows_nothing():
+    assert START.state == State.UNKNOWN
+    assert STATES[START.state].packml is None
+    assert Cycle().on(Event.TRIGGER) is None
