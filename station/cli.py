@@ -26,6 +26,7 @@ COMMANDS = {
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
+    "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 
