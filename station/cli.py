@@ -21,12 +21,13 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
-    "demo": Entry("station.commands.demo:demo", "Measure a simulated press and say where the report lies."),
+    "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
+    "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 

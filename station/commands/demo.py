@@ -1,57 +1,123 @@
-"""`station demo`: the way from tactile images to a report, on a press that the twin draws."""
+"""`station demo`: the whole station against the simulated world, fruit after fruit, on the real protocols."""
 
-import itertools
-import subprocess
-import sys
-from datetime import UTC, datetime
+import asyncio
+import contextlib
+import os
+import signal
 
 import click
+from rich.console import Console
 
-from station.commands.analyze import analyze_command
+from plc_interface.codec import WordOrder
+from plc_interface.line.display import LineDisplay, summary_line
+from plc_interface.line.faults import FaultPlan, LineFault
+from plc_interface.line.nest import TwinNest
+from plc_interface.line.program import LineProgram
+from plc_interface.line.scan import Scanner
+from plc_interface.line.simulator import LineSimulator, Pace
+from station.commands.run import addresses
 from station.errors import StationError
-from station.settings.configuration import load_configuration
-from station.settings.recipe import recipe_files
+from station.records.database import reading, records_folder
+from station.records.reading import read_inspection
+from station.records.wording import sparkline
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.recipe import load_recipes
+from station.supervision.programs import station_programs, twin_program
+from station.supervision.supervisor import Supervisor
 
-# The fruit whose contacts the method finds best (docs/measurement.md), in steps that the eye can follow.
-_FRUIT = "blueberry"
-_STEPS = 8
-_STEP_MM = 1.0
-_DRAWING_TIMEOUT_S = 120
+FRUITS = ("strawberry", "raspberry", "blueberry")
+_CONSOLE_PORT = 49211
+_LOT = "DEMO"
+_FAULT_EVERY = 4
 
 
 @click.command("demo")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruit.")
-@click.pass_context
-def demo(context: click.Context, seed: int) -> None:
-    """Press a simulated blueberry, measure the images, and say where the report lies.
+@click.option(
+    "--fruit", "fruits", multiple=True, type=click.Choice(FRUITS), help="Kinds to draw from; may be repeated."
+)
+@click.option("--count", type=click.IntRange(min=1), metavar="N", help="End after N fruits; else Ctrl-C ends it.")
+@click.option(
+    "--speed", type=click.FloatRange(min=0, min_open=True, max=600), metavar="FRUITS",
+    help="Fruits a minute at most; else as fast as the station takes them.",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
+@click.option("--damaged", type=click.FloatRange(0, 1), default=0.25, show_default=True, help="Share of damaged fruit.")
+@click.option("--faults", is_flag=True, help=f"The PLC does something wrong at every {_FAULT_EVERY}th fruit.")
+def demo(
+    fruits: tuple[str, ...],
+    count: int | None,
+    speed: float | None,
+    seed: int,
+    damaged: float,
+    faults: bool,  # noqa: FBT001
+) -> None:
+    """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
 
-    The press has two images of the untouched gel and eight of the contact, 1 mm of closing apart. They are measured
-    with the blueberry's recipe, by the robust method.
+    Arm, gripper, sensor and PLC are simulated, what is between them is real: RTDE, the gripper's socket, camera frames
+    and Modbus TCP. Logs and records lie in the home folder's `demo`.
     """
-    folder = load_configuration().home / "demo" / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%S-%f")
-    drawn = folder / "press"
-    click.echo(f"drawing a press of a simulated {_FRUIT} into {drawn}")
-    options = {"--fruit": _FRUIT, "--seed": seed, "--steps": _STEPS, "--step-mm": _STEP_MM, "--out": drawn}
-    command = (sys.executable, "-m", "station", "twin", "press", *itertools.chain(*options.items()))
+    os.environ["STATION_HOME"] = str(load_configuration().home.resolve() / "demo")
+    site = load_configuration()
+    numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
+    nest = TwinNest(_CONSOLE_PORT, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed)
+    plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
+    pace = Pace(every_s=60 / speed if speed else 0.0)
+    asyncio.run(_run(site, nest, LineProgram(plan, _LOT), pace, count, seed))
+
+
+async def _run(
+    site: Configuration, nest: TwinNest, program: LineProgram, pace: Pace, count: int | None, seed: int
+) -> None:
+    logs = site.home / "logs"
     try:
-        done = subprocess.run(  # noqa: S603 (this program itself)
-            [str(part) for part in command], timeout=_DRAWING_TIMEOUT_S, check=False, stdout=sys.stderr
-        )
-    except subprocess.TimeoutExpired as error:
-        raise StationError(
-            f"the twin took more than {_DRAWING_TIMEOUT_S:g} s to draw the press; "
-            "end what else keeps this machine busy and start the demonstration again"
-        ) from error
-    if done.returncode:
-        raise StationError("the twin could not draw the press: see its message above")
-    shipped = next(file for file in recipe_files() if file.stem == _FRUIT)  # whatever recipes the site has
-    context.invoke(
-        analyze_command,
-        reference=drawn / "reference",
-        recipe_name=str(shipped),
-        widths=drawn / "widths.csv",
-        stages=True,
-        out=folder / "report",
-        images=(drawn / "frames",),
-    )
-    click.echo(f"the report opens in a browser: {(folder / 'report' / 'report.html').as_uri()}")
+        logs.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StationError(f"{logs}: cannot be made: {error.strerror}; name another STATION_HOME") from error
+    ended, ready = asyncio.Event(), asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    supervisor = Supervisor([twin_program(None, _CONSOLE_PORT, seed, logs), *station_programs(None, logs)])
+    click.echo(f"starting the twin, the station and the PLC interface; their logs: {logs}")
+    supervising = asyncio.create_task(supervisor.run(ready.set, ended))
+    waiting = asyncio.create_task(ready.wait())
+    try:
+        await asyncio.wait([supervising, waiting], return_when=asyncio.FIRST_COMPLETED)
+        if ready.is_set() and not ended.is_set():
+            click.echo(addresses(site))
+            await _inspect(site, nest, program, pace, count, ended)
+    finally:
+        waiting.cancel()
+        ended.set()
+        await supervising
+
+
+async def _inspect(
+    site: Configuration, nest: TwinNest, program: LineProgram, pace: Pace, count: int | None, ended: asyncio.Event
+) -> None:
+    modbus = site.modbus
+    async with Scanner(modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order)) as scanner:
+        simulator = LineSimulator(program, scanner, nest, pace)
+        with LineDisplay(Console(), simulator.summary, lambda sequence: _sketch(site, sequence)) as display:
+            simulator.on_passage, simulator.on_scan = display.passed, display.doing
+            running = asyncio.create_task(simulator.run(count))
+            waiting = asyncio.create_task(ended.wait())
+            try:
+                await asyncio.wait([running, waiting], return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                waiting.cancel()
+                running.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await running
+        click.echo(summary_line(simulator.summary))
+        click.echo(f"why a fruit was diverted: STATION_HOME={site.home} ./run station records show NUMBER")
+
+
+def _sketch(site: Configuration, sequence: int) -> str:
+    """A result's area over closing, from the station's records."""
+    folder = records_folder(site.home)
+    try:
+        with reading(folder) as connection:
+            judged = read_inspection(connection, sequence, folder).judged
+            return sparkline([point.area_mm2 for point in judged.curve]) if judged else ""
+    except StationError:
+        return ""

@@ -91,7 +91,10 @@ class Crew:
     @property
     def names(self) -> dict[str, str]:
         """Who takes part, for the records."""
-        names = {CAMERA: self.cell.camera.description.name, GRIPPER: f"Robotiq 2F-85 by {self._configuration.gripper.driver}"}
+        names = {
+            CAMERA: self.cell.camera.description.name,
+            GRIPPER: f"Robotiq 2F-85 by {self._configuration.gripper.driver}",
+        }
         return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
 
     @property

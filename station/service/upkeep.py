@@ -130,7 +130,9 @@ class Upkeep:
         free_mb = service.records.status().free_bytes / _MB
         alarms.show(
             AlarmId.DISK_LOW,
-            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve" if free_mb < 2 * self._reserve_mb else "",
+            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
+            if free_mb < 2 * self._reserve_mb
+            else "",
         )
         alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
         alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))

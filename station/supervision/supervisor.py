@@ -1,4 +1,4 @@
-"""Starts the station's processes, restarts what dies or hangs, and gives up when that happens too often.
+"""Starts processes, restarts what dies or hangs, and gives up when that happens too often.
 
 What is given up stays down while the rest goes on: without the station's process the PLC interface still tells the PLC
 that the station is lost, which is the safe output, and a person has to mend the cause and start again.
@@ -42,6 +42,8 @@ class Program:
     watchdog_s: float = 10.0
     stop_limit_s: float = 30.0
     """From SIGTERM to SIGKILL."""
+    output: Path | None = None
+    """Where its output and messages are appended; None for the supervisor's own."""
 
 
 class _Child:
@@ -68,9 +70,16 @@ class _Child:
             PARENT_VARIABLE: str(os.getpid()),
         }
         # A session of its own: Ctrl-C on the terminal is the supervisor's, which ends the processes in their order.
-        self.process = await asyncio.create_subprocess_exec(
-            *self.program.command, env=environment, stdin=asyncio.subprocess.DEVNULL, start_new_session=True
-        )
+        with contextlib.ExitStack() as stack:
+            output = stack.enter_context(self.program.output.open("ab")) if self.program.output else None
+            self.process = await asyncio.create_subprocess_exec(
+                *self.program.command,
+                env=environment,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+            )
         self._heard_s = time.monotonic()
 
     def listen(self) -> None:

@@ -12,6 +12,7 @@ from station.errors import BadInputError
 from station.settings.arm import ArmPoses, ArmSettings
 from station.settings.camera import TwinCameraSettings
 from station.settings.gripper import GripperSettings
+from station.supervision.notify import feed_watchdog, notify
 from station.twin.clock import Clock, SteadyClock
 from station.twin.console import ConsoleServer
 from station.twin.digit.sensor import DigitSensor
@@ -170,8 +171,11 @@ async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
         loop.add_signal_handler(number, ended.set)
     twin = Twin(options)
     await twin.start()
+    feeding = asyncio.create_task(feed_watchdog(lambda: True))
     try:
         on_started(twin)
+        notify("READY=1")
         await ended.wait()
     finally:
+        feeding.cancel()
         await twin.stop()

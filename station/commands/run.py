@@ -1,0 +1,51 @@
+"""`station run`: the whole station, its processes supervised."""
+
+import asyncio
+import logging
+import signal
+from pathlib import Path
+
+import click
+
+from station.settings.configuration import Configuration, load_configuration
+from station.supervision.notify import notify
+from station.supervision.programs import station_programs
+from station.supervision.supervisor import Supervisor
+
+
+@click.command("run")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def run(config: Path | None) -> None:
+    """Run the station until Ctrl-C: the service and the PLC interface, each a process of its own.
+
+    What dies or hangs is started again, at most 5 times within 60 s. On SIGTERM a running inspection ends, the jaws
+    open, and all processes end.
+    """
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
+    site = load_configuration(config)
+    asyncio.run(_supervise(site, config))
+
+
+async def _supervise(site: Configuration, config: Path | None) -> None:
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+
+    def announce() -> None:
+        click.echo(addresses(site))
+        click.echo("running; Ctrl-C ends it")
+        notify("READY=1")
+
+    await Supervisor(station_programs(config)).run(announce, ended)
+
+
+def addresses(site: Configuration) -> str:
+    """Where a station is reached, one line each.
+
+    Args:
+        site: its configuration.
+    """
+    return (
+        f"Modbus TCP  {site.modbus.host}:{site.modbus.port}, unit {site.modbus.unit}\n"
+        f"metrics     http://{site.metrics.host}:{site.metrics.port}/metrics, health at /livez, /readyz, /version"
+    )

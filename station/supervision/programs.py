@@ -1,0 +1,41 @@
+"""The station's processes, as they are started."""
+
+import sys
+from pathlib import Path
+
+from station.supervision.supervisor import Program
+
+
+def station_programs(config: Path | None, logs: Path | None = None) -> list[Program]:
+    """The processes of one station: the service, and the PLC interface, which outlives it.
+
+    Args:
+        config: the configuration's file; None for the usual one.
+        logs: the folder of their logs; None to leave them on the supervisor's own output.
+    """
+    return [
+        _program("service", logs, "service", *_config(config)),
+        _program("plc", logs, "plc", "run", *_config(config)),
+    ]
+
+
+def twin_program(config: Path | None, console_port: int, seed: int, logs: Path | None = None) -> Program:
+    """The simulated world in place of the devices.
+
+    Args:
+        config: as the station's.
+        console_port: of its console.
+        seed: of the sensor's noise.
+        logs: as the station's.
+    """
+    options = ("--console", str(console_port), "--seed", str(seed))
+    return _program("twin", logs, "twin", *_config(config), *options)
+
+
+def _config(config: Path | None) -> tuple[str, ...]:
+    return ("--config", str(config)) if config else ()
+
+
+def _program(name: str, logs: Path | None, *arguments: str) -> Program:
+    command = (sys.executable, "-m", "station", *arguments)
+    return Program(name, command, output=logs / f"{name}.log" if logs else None)
