@@ -27,7 +27,7 @@ COMMANDS = {
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
-    "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
+    "run": Entry("station.commands.start:run", "Run the station: all its processes, supervised."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 
