@@ -178,7 +178,8 @@ class Unit:
         body = self._body(node.statements.statements)
 
         def run(memory: dict[str, Any]) -> None:
-            for memory[name] in range(first.value(memory), last.value(memory) + 1):
+            for number in range(first.value(memory), last.value(memory) + 1):
+                memory[name] = number
                 for statement in body:
                     statement(memory)
 
@@ -232,7 +233,7 @@ class Unit:
             return Typed(self._library.structures[holder.kind][field], lambda memory: holder.value(memory)[field])
         return Typed(self._library.blocks[holder.kind].kinds[field], lambda memory: holder.value(memory)[field])
 
-    def _expression(self, node: Any) -> Typed:
+    def _expression(self, node: Any) -> Typed:  # noqa: PLR0911 (one for each kind of node)
         match node:
             case tree.ParenthesizedExpression():
                 return self._expression(node.expr)

@@ -316,38 +316,37 @@ STEPS = st.lists(
 )
 
 
+def play(plc, what, number, sequence):
+    """One step of a station and a line gone mad."""
+    station = plc.station
+    match what:
+        case "show":
+            station.show(sequence, number)
+        case "torn":
+            station.show(sequence, number, result_sequence_again=sequence - 1)
+        case "gone":
+            station.flags("online", "trigger_ready")
+        case "accept":
+            station.set(accepted_trigger_id=number)
+            station.flags("online", "trigger_acknowledged", "inspecting")
+        case "refuse":
+            station.flags("online", "trigger_acknowledged", "missed")
+        case "freeze" | "beat":
+            station.beating = what == "beat"
+            plc.scan(210)
+        case "inspect" | "release":
+            plc.scan(inspect=what == "inspect", fruit_id=number)
+        case _:
+            plc.scan(50 * number)
+
+
 @given(STEPS)
 @settings(max_examples=60, deadline=None)
 def test_whatever_comes_only_the_asked_fruits_own_whole_result_passes(make_plc_for_examples, steps):
     plc = make_plc_for_examples()
     plc.scan(3)
-    sequence = 0
-    for what, number in steps:
-        match what:
-            case "show":
-                sequence += 1
-                plc.station.show(sequence, number)
-            case "torn":
-                sequence += 1
-                plc.station.show(sequence, number, result_sequence_again=sequence - 1)
-            case "gone":
-                plc.station.flags("online", "trigger_ready")
-            case "accept":
-                plc.station.set(accepted_trigger_id=number)
-                plc.station.flags("online", "trigger_acknowledged", "inspecting")
-            case "refuse":
-                plc.station.flags("online", "trigger_acknowledged", "missed")
-            case "freeze":
-                plc.station.beating = False
-                plc.scan(210)
-            case "beat":
-                plc.station.beating = True
-            case "inspect":
-                plc.scan(inspect=True, fruit_id=number)
-            case "release":
-                plc.scan(inspect=False)
-            case _:
-                plc.scan(50 * number)
+    for sequence, (what, number) in enumerate(steps, start=1):
+        play(plc, what, number, sequence)
         plc.scan()
         block = plc.block
         if block["passed"]:
