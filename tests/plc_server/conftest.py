@@ -34,19 +34,23 @@ class Serving:
         self.refusal: ExceptionCode | None = None
         self.image: RegisterImage
         self.server: ModbusServer
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever, name="modbus server")
+        self.loop = asyncio.new_event_loop()
+        self.again: asyncio.Handle | None = None
+        self._thread = threading.Thread(target=self.loop.run_forever, name="modbus server")
 
     def start(self) -> None:
         self._thread.start()
         try:
-            asyncio.run_coroutine_threadsafe(self._start(), self._loop).result(DEADLINE_S)
+            asyncio.run_coroutine_threadsafe(self._start(), self.loop).result(DEADLINE_S)
         except BaseException:
             self._end()
             raise
 
+    def stop_server(self) -> None:
+        asyncio.run_coroutine_threadsafe(self.server.stop(), self.loop).result(DEADLINE_S)
+
     def stop(self) -> None:
-        asyncio.run_coroutine_threadsafe(self.server.stop(), self._loop).result(DEADLINE_S)
+        self.stop_server()
         self._end()
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -59,7 +63,7 @@ class Serving:
             except BaseException as error:  # noqa: BLE001
                 result.set_exception(error)
 
-        self._loop.call_soon_threadsafe(run)
+        self.loop.call_soon_threadsafe(run)
         return result.result(DEADLINE_S)
 
     def wait(self, condition: Callable[[], Any]) -> Any:
@@ -80,9 +84,9 @@ class Serving:
         self.changes.append((peer, change))
 
     def _end(self) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
+        self.loop.call_soon_threadsafe(self.loop.stop)
         self._thread.join(DEADLINE_S)
-        self._loop.close()
+        self.loop.close()
 
 
 class Wire:
