@@ -1,20 +1,21 @@
 """The station's configuration: defaults, then `station.yaml`, then the environment."""
 
-import ipaddress
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
-from pydantic import AfterValidator, model_validator
+from pydantic import model_validator
 
 from station.settings.arm import ArmSettings
 from station.settings.camera import CameraSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.gripper import GripperSettings
+from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
+from station.settings.network import Host
+from station.settings.paths import Folder
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
 from station.settings.schema import branches, leaves, schema_of
@@ -22,55 +23,6 @@ from station.settings.validation import validated
 from station.settings.yaml_loader import Document, read_document
 
 FILE_NAME = "station.yaml"
-
-_HOST_NAME = re.compile(r"(?=.{1,253}$)(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
-
-
-def _host(text: str) -> str:
-    """Refuse what is neither an IP address nor a host's name; digits and dots alone are an address or nothing."""
-    try:
-        ipaddress.ip_address(text)
-    except ValueError:
-        if not _HOST_NAME.fullmatch(text) or re.fullmatch(r"[0-9.]+", text):
-            raise ValueError("expected an IP address or a host's name") from None
-    return text
-
-
-def _folder(path: Path) -> Path:
-    """Refuse the empty text, and what no file system or only a shell understands."""
-    if path == Path() or "\0" in str(path) or "~" in path.parts:
-        raise ValueError("expected the path of a folder, written out without ~")
-    return path
-
-
-Host = Annotated[str, AfterValidator(_host)]
-"""An IP address or a host's name; a text, as strict JSON takes no address object for a default."""
-Folder = Annotated[Path, AfterValidator(_folder)]
-
-
-class ModbusSettings(Settings):
-    """Where the line's PLC reaches the station."""
-
-    host: Host = setting(
-        "127.0.0.1",
-        title="Address",
-        description="Network address on which Modbus TCP is served; loopback until a site decides otherwise.",
-        max_length=253,
-    )
-    port: int = setting(
-        5020,
-        title="Port",
-        description="TCP port of Modbus; a site sets 502, which needs the right to bind low ports.",
-        ge=1,
-        le=65_535,
-    )
-    unit: int = setting(
-        1,
-        title="Unit",
-        description="Modbus unit identifier that the station answers to; 0 and 248 to 255 are reserved.",
-        ge=1,
-        le=247,
-    )
 
 
 class HmiSettings(Settings):
@@ -134,9 +86,13 @@ class Configuration(Settings):
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:
         """Two servers cannot share one address."""
-        servers = {name: (getattr(self, name).host, getattr(self, name).port) for name in ("modbus", "hmi", "metrics")}
+        servers: dict[Where, tuple[str, int]] = {
+            (name,): (getattr(self, name).host, getattr(self, name).port) for name in ("modbus", "hmi", "metrics")
+        }
+        if self.modbus.tls.enabled:
+            servers["modbus", "tls"] = (self.modbus.host, self.modbus.tls.port)
         clashes: list[tuple[Where, str]] = [
-            ((name, "port"), f"expected a port of its own, got {address[1]}, which {other}.port is too")
+            ((*name, "port"), f"expected a port of its own, got {address[1]}, which {dotted(other)}.port is too")
             for name, address in servers.items()
             for other in servers
             if other != name and servers[other] == address

@@ -119,7 +119,7 @@ class TestBadFile:
         [
             ("modbus:\n  prot: 1\n", "2: modbus.prot: unknown key prot: did you mean port?"),
             ("plc: {}\n", f"1: plc: unknown key plc: expected {', '.join(Configuration.model_fields)}"),
-            ("\nmodbus: 5020\n", "2: modbus: expected a mapping with host, port, unit, got 5020"),
+            ("\nmetrics: 5020\n", "2: metrics: expected a mapping with host, port, got 5020"),
             ("home:\n", "1: home: expected a path, got nothing"),
             (
                 "home: ~/station\n",
@@ -134,10 +134,10 @@ class TestBadFile:
         assert problems(file) == [f"{file}:{expected}"]
 
     def test_the_environment_does_not_hide_what_is_wrong_around_it(self, write):
-        for content, shown in (("modbus:\n", "nothing"), ("modbus: 7\n", "7")):
+        for content, shown in (("metrics:\n", "nothing"), ("metrics: 7\n", "7")):
             file = write(content)
-            expected = f"{file}:1: modbus: expected a mapping with host, port, unit, got {shown}"
-            assert problems(file, STATION_MODBUS_PORT="502") == [expected]
+            expected = f"{file}:1: metrics: expected a mapping with host, port, got {shown}"
+            assert problems(file, STATION_METRICS_PORT="502") == [expected]
 
     def test_two_servers_on_one_port(self, write):
         file = write("hmi:\n  port: 5020\n")

@@ -1,0 +1,1 @@
+"""The line PLC's view of the station over Modbus TCP."""

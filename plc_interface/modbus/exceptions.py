@@ -1,0 +1,68 @@
+"""How a request goes wrong, and under which heading it is counted."""
+
+from enum import IntEnum, StrEnum
+
+
+class ExceptionCode(IntEnum):
+    """MODBUS Application Protocol Specification V1.1b3, section 7."""
+
+    ILLEGAL_FUNCTION = 1
+    ILLEGAL_ADDRESS = 2
+    ILLEGAL_VALUE = 3
+    DEVICE_FAILURE = 4
+    BUSY = 6
+    """Another client holds the right to write, or the write key is not set."""
+    GATEWAY_NO_RESPONSE = 11
+    """No such unit."""
+
+
+class Trouble(StrEnum):
+    """What the server counts and logs, each by itself."""
+
+    MALFORMED_FRAME = "malformed frames"
+    ILLEGAL_FUNCTION = "unknown functions"
+    ILLEGAL_ADDRESS = "wrong addresses"
+    ILLEGAL_VALUE = "wrong values"
+    UNKNOWN_UNIT = "unknown units"
+    NO_RIGHT = "writes without the right"
+    NOT_WRITER = "writes beside the writer"
+    WRITE_REFUSED = "writes refused by the handshake"
+    DEVICE_FAILURE = "internal faults"
+    NOT_ALLOWED = "connections not allowed"
+    TOO_MANY = "connections over the limit"
+    IDLE = "idle connections"
+    UNFINISHED = "unfinished requests"
+    SLOW_READER = "replies not taken"
+
+
+CONNECTION_TROUBLES = frozenset(
+    (Trouble.NOT_ALLOWED, Trouble.TOO_MANY, Trouble.IDLE, Trouble.UNFINISHED, Trouble.SLOW_READER)
+)
+"""Those for which a connection was refused or closed by a limit; the others answer or end on a bad request."""
+
+
+class RequestError(Exception):
+    """A request that is answered with an exception response."""
+
+    def __init__(self, code: ExceptionCode, trouble: Trouble, why: str) -> None:
+        super().__init__(why)
+        self.code, self.trouble = code, trouble
+
+
+class MalformedFrameError(Exception):
+    """Bytes that are no Modbus TCP: where the next request begins is not known, so the connection has to end."""
+
+
+def illegal_function(why: str) -> RequestError:
+    """Exception 01."""
+    return RequestError(ExceptionCode.ILLEGAL_FUNCTION, Trouble.ILLEGAL_FUNCTION, why)
+
+
+def illegal_address(why: str) -> RequestError:
+    """Exception 02."""
+    return RequestError(ExceptionCode.ILLEGAL_ADDRESS, Trouble.ILLEGAL_ADDRESS, why)
+
+
+def illegal_value(why: str) -> RequestError:
+    """Exception 03."""
+    return RequestError(ExceptionCode.ILLEGAL_VALUE, Trouble.ILLEGAL_VALUE, why)

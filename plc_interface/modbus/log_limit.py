@@ -1,0 +1,62 @@
+"""A log that a flood cannot fill."""
+
+import logging
+from collections import Counter
+from dataclasses import dataclass
+
+BURST = 20
+"""Lines of one kind at once."""
+REFILL_S = 5.0
+"""One more line of a kind after this time."""
+SUMMARY_S = 10.0
+"""How often the lines left out are summed up."""
+
+
+@dataclass(slots=True)
+class _Allowance:
+    lines: float
+    at_s: float
+
+
+class LimitedLog:
+    """Writes lines of each kind up to an allowance that refills, and says how many were left out."""
+
+    def __init__(self, log: logging.Logger) -> None:
+        self._log = log
+        self._allowances: dict[str, _Allowance] = {}
+        self._left_out: Counter[str] = Counter()
+        self._summed_up_s = float("-inf")
+
+    def write(self, kind: str, now_s: float, level: int, message: str, *arguments: object) -> None:
+        """Write a line, or count it as left out.
+
+        Args:
+            kind: what is limited together, in the plural, as the summary says it.
+            now_s: monotonic time.
+            level: of `logging`.
+            message: with the arguments' places, as `logging` takes it.
+            arguments: what goes there; formatted only where the line is written.
+        """
+        allowance = self._allowances.get(kind)
+        if allowance is None:
+            allowance = self._allowances[kind] = _Allowance(BURST, now_s)
+        allowance.lines = min(BURST, allowance.lines + (now_s - allowance.at_s) / REFILL_S)
+        allowance.at_s = now_s
+        if allowance.lines < 1:
+            self._left_out[kind] += 1
+            return
+        allowance.lines -= 1
+        self._log.log(level, message, *arguments)
+
+    def sum_up(self, now_s: float, *, last: bool = False) -> None:
+        """Say how many lines were left out, if any and if the last time is long enough ago.
+
+        Args:
+            now_s: monotonic time.
+            last: say it in any case.
+        """
+        if self._left_out and (last or now_s - self._summed_up_s >= SUMMARY_S):
+            counts = ", ".join(f"{count} of {kind}" for kind, count in sorted(self._left_out.items()))
+            self._log.warning("lines left out: %s", counts)
+            self._left_out.clear()
+            self._summed_up_s = now_s

@@ -1,0 +1,122 @@
+"""Where the line's PLC reaches the station, who may, and when a connection is given up."""
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from station.settings.model import Settings, setting
+from station.settings.network import Host, Network
+from station.settings.paths import File
+
+LOOPBACK = ("127.0.0.0/8", "::1/128")
+
+
+class ModbusTlsSettings(Settings):
+    """Modbus/TCP Security: a second port with TLS 1.3, where a client's certificate says what it may do."""
+
+    enabled: bool = setting(
+        default=False,
+        title="Served",
+        description="Whether the second port is served; it needs the three files below.",
+    )
+    port: int = setting(
+        5802,
+        title="Port",
+        description="TCP port of Modbus over TLS; the registered one is 802, which needs the right to bind low ports.",
+        ge=1,
+        le=65_535,
+    )
+    certificate: File | None = setting(
+        None, title="Certificate", description="PEM file with the station's certificate and what it is signed by."
+    )
+    key: File | None = setting(
+        None, title="Private key", description="PEM file with the certificate's private key, without a passphrase."
+    )
+    client_authority: File | None = setting(
+        None,
+        title="Clients' authority",
+        description="PEM file with the certificates of the authority that signs the clients' certificates.",
+    )
+
+    @model_validator(mode="after")
+    def _has_its_files(self) -> Self:
+        missing = [name for name in ("certificate", "key", "client_authority") if getattr(self, name) is None]
+        if self.enabled and missing:
+            raise ValueError(f"TLS is enabled without {', '.join(missing)}: name the PEM files or set enabled: false")
+        return self
+
+
+class ModbusSettings(Settings):
+    """Where the line's PLC reaches the station, and who may."""
+
+    host: Host = setting(
+        "127.0.0.1",
+        title="Address",
+        description="Network address on which Modbus TCP is served; loopback until a site decides otherwise.",
+        max_length=253,
+    )
+    port: int = setting(
+        5020,
+        title="Port",
+        description="TCP port of Modbus; a site sets 502, which needs the right to bind low ports.",
+        ge=1,
+        le=65_535,
+    )
+    unit: int = setting(
+        1,
+        title="Unit",
+        description="Modbus unit identifier that the station answers to; 0 and 248 to 255 are reserved.",
+        ge=1,
+        le=247,
+    )
+    word_order: Literal["high_first", "low_first"] = setting(
+        "high_first",
+        title="Word order",
+        description="Which register of a 32- or 64-bit value comes first; the bytes in a register are big-endian.",
+    )
+    readers: tuple[Network, ...] = setting(
+        LOOPBACK,
+        title="Who may read",
+        description="Addresses and networks whose connections are taken; all others are closed. Loopback until set.",
+        max_length=64,
+    )
+    writers: tuple[Network, ...] = setting(
+        LOOPBACK,
+        title="Who may write",
+        description="Addresses and networks that may write, if they may read too; the line's PLC. Loopback until set.",
+        max_length=64,
+    )
+    max_connections: int = setting(
+        32,
+        title="Connections",
+        description="Connections at one time; four more are kept for the writer to come back.",
+        ge=1,
+        le=512,
+    )
+    idle_timeout_s: float = setting(
+        60.0,
+        title="Idle time-out",
+        description="A connection without a request for this time is closed.",
+        unit="s",
+        ge=1.0,
+        le=86_400.0,
+    )
+    frame_timeout_s: float = setting(
+        5.0,
+        title="Frame time-out",
+        description="A connection is closed where a request is not complete, or replies are not taken, for this time.",
+        unit="s",
+        ge=0.1,
+        le=60.0,
+    )
+    writer_lease_s: float = setting(
+        10.0,
+        title="Writer's lease",
+        description="After this time without a write from the writer another client may write.",
+        unit="s",
+        ge=0.5,
+        le=3600.0,
+    )
+    tls: ModbusTlsSettings = setting(
+        ModbusTlsSettings(), title="Modbus over TLS", description="A second port with client certificates and roles."
+    )
