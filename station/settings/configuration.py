@@ -16,6 +16,7 @@ from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
 from station.settings.network import Host
 from station.settings.paths import Folder
+from station.settings.plc import HandshakeSettings
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
 from station.settings.schema import branches, leaves, schema_of
@@ -73,6 +74,9 @@ class Configuration(Settings):
     )
     modbus: ModbusSettings = setting(
         ModbusSettings(), title="Modbus TCP", description="Where the line's PLC reaches the station."
+    )
+    handshake: HandshakeSettings = setting(
+        HandshakeSettings(), title="Handshake", description="How the PLC interface waits for the PLC and the station."
     )
     hmi: HmiSettings = setting(HmiSettings(), title="HMI", description="Where operators' browsers reach the station.")
     metrics: MetricsSettings = setting(
