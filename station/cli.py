@@ -25,6 +25,7 @@ COMMANDS = {
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
+    "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.start:run", "Run the station: all its processes, supervised."),

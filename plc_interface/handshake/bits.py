@@ -70,7 +70,7 @@ ARMING_ROWS = (
     row(DISARMED, Signal.WRITER_LOST, count_loss),
     row(RELEASED, Signal.ENABLE_ON, to=ARMED),
     row(RELEASED, Signal.ENABLE_OFF),
-    row(RELEASED, Signal.PLC_SILENT, silent, to=DISARMED),
+    row(RELEASED, Signal.PLC_SILENT, silent),
     row(RELEASED, Signal.WRITER_LOST, count_loss),
     row(ARMED, Signal.ENABLE_OFF, to=RELEASED),
     row(ARMED, Signal.PLC_SILENT, silent, to=DISARMED),

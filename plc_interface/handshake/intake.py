@@ -99,15 +99,22 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
     _acknowledged(work, event, changed=before.acknowledged_sequence != event.inputs.acknowledged_sequence, rose=rose)
     if "acknowledge" in fell:
         work.signals.append(Signal.ACKNOWLEDGE_OFF)
+    held = seen is None and _is_answered_or_asked(work, event.inputs.trigger_id)
     for bit, on, off in (
         ("execute_command", Signal.EXECUTE_ON, Signal.EXECUTE_OFF),
-        ("trigger", Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
+        ("trigger", Signal.TRIGGER_HELD if held else Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
     ):
         if bit in rose or bit in fell:
             work.signals.append(on if bit in rose else off)
 
 
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
+
+
+def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
+    """Whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
+    asked = work.state.asked
+    return trigger_id != 0 and trigger_id == (asked.trigger_id if asked else work.state.journal.accepted_id)
 
 
 def _acknowledged(work: Work, event: PlcWrote, *, changed: bool, rose: frozenset[str]) -> None:

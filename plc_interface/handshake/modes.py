@@ -92,6 +92,7 @@ class Signal(StrEnum):
     OFFLINE_OFF = "offline off"
     TRIGGER_ON = "trigger on"
     TRIGGER_OFF = "trigger off"
+    TRIGGER_HELD = "trigger still on after a reconnect"
     ACKNOWLEDGED = "sequence acknowledged"
     WRONG_ACKNOWLEDGEMENT = "another sequence acknowledged"
     ACKNOWLEDGE_OFF = "acknowledge off"
