@@ -3,14 +3,14 @@
 Every function waits for the node and is called from a worker thread. Objects: CiA 301, CiA 401 and CiA 406.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import can
 import canopen
 from canopen.pdo.base import PdoMap
-from canopen.sdo import SdoAbortedError, SdoCommunicationError
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from plc_interface.can.errors import BringUpError
 from station.settings.can import ENCODER_EDS, GATE_EDS, CanSettings
@@ -24,6 +24,7 @@ class Node(NamedTuple):
     """One of the two nodes, as canopen sees it."""
 
     remote: canopen.RemoteNode
+    number: int
     name: str
     """With the node id, for sentences."""
     setting: str
@@ -52,7 +53,15 @@ def _make(network: canopen.Network, settings: CanSettings, setting: str, name: s
     number = getattr(settings, setting)
     remote = network.add_node(number, eds)
     remote.sdo.RESPONSE_TIMEOUT = settings.answer_timeout_s
-    return Node(remote, f"{name} (node {number})", f"can.{setting}")
+    return Node(remote, number, f"{name} (node {number})", f"can.{setting}")
+
+
+def no_heartbeat(node: Node, settings: CanSettings) -> str:
+    """What to say of a node that is not heard."""
+    return (
+        f"no heartbeat of {node.name} on {settings.interface} {settings.channel}; look at its power, cable, bit rate "
+        f"and node id ({node.setting})"
+    )
 
 
 def verify_identity(node: Node) -> str:
@@ -121,15 +130,15 @@ def gate_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
     """The gate's PDOs: it takes orders and the encoder's count, and reports."""
     remote = node.remote
     return {
-        "RPDO 1": Pdo(remote.rpdo[1], 0x200 + remote.id, 0),
+        "RPDO 1": Pdo(remote.rpdo[1], 0x200 + node.number, 0),
         "RPDO 2": Pdo(remote.rpdo[2], 0x180 + settings.encoder_node, _ms(settings.count_stale_s)),
-        "TPDO 1": Pdo(remote.tpdo[1], 0x180 + remote.id, 0),
+        "TPDO 1": Pdo(remote.tpdo[1], 0x180 + node.number, 0),
     }
 
 
 def encoder_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
     """The encoder's PDO: its count."""
-    return {"TPDO 1": Pdo(node.remote.tpdo[1], 0x180 + node.remote.id, _ms(settings.encoder_period_s))}
+    return {"TPDO 1": Pdo(node.remote.tpdo[1], 0x180 + node.number, _ms(settings.encoder_period_s))}
 
 
 def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
@@ -183,13 +192,14 @@ def _asking(node: Node, what: str) -> Iterator[None]:
             f"{node.name} was asked {what} and did not answer; look at its power and cable, and for a second master"
         ) from error
     except (can.CanError, OSError, RuntimeError) as error:
-        raise BringUpError(f"{node.name} was asked {what}, and the bus failed: {error}; look at the interface") from error
+        raise BringUpError(
+            f"{node.name} was asked {what}, and the bus failed: {error}; look at the interface"
+        ) from error
 
 
 def _variable(node: Node, index: int, subindex: int) -> Any:
-    variable = node.remote.sdo.get_variable(index, subindex)
-    assert variable is not None, f"{index:04X}:{subindex:02X} is not in the data sheet"
-    return variable
+    entry: Any = node.remote.sdo[index]
+    return entry[subindex] if isinstance(entry, Mapping) else entry
 
 
 def _default(node: Node, index: int, subindex: int) -> int:

@@ -9,7 +9,7 @@ class Count(NamedTuple):
     """What the encoder said last."""
 
     value: int
-    """0 to 2³² − 1."""
+    """0 to 2**32 - 1."""
     age_s: float
 
 
@@ -17,14 +17,14 @@ def further(count: int, by: int) -> int:
     """The count that lies so many counts further on.
 
     Args:
-        count: 0 to 2³² − 1.
+        count: 0 to 2**32 - 1.
         by: counts, also negative.
     """
     return (count + by) % RANGE
 
 
 def ahead(of: int, count: int) -> int:
-    """How far a count lies ahead of another, −2³¹ to 2³¹ − 1; at 3000 counts/s half the range takes eight days.
+    """How far a count lies ahead of another, -2**31 to 2**31 - 1; at 3000 counts/s half the range takes eight days.
 
     Args:
         of: where the belt is.

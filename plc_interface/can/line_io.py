@@ -147,9 +147,9 @@ class LineIo:
         Several shots may be under way. The gate keeps an order when the caller is cancelled.
 
         Args:
-            sequence: the inspection's, 1 to 2³² − 1; the gate sees its lower 16 bits.
+            sequence: the inspection's, 1 to 2**32 - 1; the gate sees its lower 16 bits.
             lane: 1 to 8.
-            at_count: the encoder's count at which the flap opens, 0 to 2³² − 1; at most 2³¹ − 1 ahead.
+            at_count: the encoder's count at which the flap opens, 0 to 2**32 - 1; at most 2**31 - 1 ahead.
 
         Raises:
             NotReadyError: nothing was ordered.
@@ -175,14 +175,15 @@ class LineIo:
             began_s = time.monotonic()
             self._counters["shots_ordered"] += 1
             link.send(
-                0x200 + self._settings.gate_node, ORDER.pack(shot.order.on_wire, lane, self._settings.pulse_ms, at_count)
+                0x200 + self._settings.gate_node,
+                ORDER.pack(shot.order.on_wire, lane, self._settings.pulse_ms, at_count),
             )
             report = await self._confirmed(shot)
             confirmed_s = time.monotonic() - began_s
             while report.fired != Fired.FIRED:
                 report = await self._fired(shot, began_s)
             self._counters["shots_fired"] += 1
-            return DivertEcho(sequence, lane, at_count, report.count, confirmed_s)
+            return DivertEcho(sequence, lane, at_count, report.encoder_count, confirmed_s)
 
     async def _confirmed(self, shot: PendingShot) -> Report:
         try:
@@ -192,8 +193,8 @@ class LineIo:
             self._counters["echoes_missing"] += 1
             raise EchoMissingError(
                 shot.order.sequence,
-                f"the gate did not confirm the order within {self._settings.echo_deadline_s:g} s; look at the gate, and "
-                "take the fruit for not diverted",
+                f"the gate did not confirm the order within {self._settings.echo_deadline_s:g} s; look at the gate, "
+                "and take the fruit for not diverted",
             ) from None
 
     async def _fired(self, shot: PendingShot, began_s: float) -> Report:
@@ -291,14 +292,16 @@ class LineIo:
         gate = bring_up.make_gate(link.network, settings)
         encoder = bring_up.make_encoder(link.network, settings)
         for node in (gate, encoder):
-            await self._until(link, lambda node=node: self._alive(link, node.remote.id), self._no_heartbeat(node))
+            await self._until(
+                link, lambda node=node: self._alive(link, node.number), bring_up.no_heartbeat(node, settings)
+            )
             await self._in_worker(lambda node=node: bring_up.verify_identity(node))
             await self._order(link, node, "PRE-OPERATIONAL", _PRE_OPERATIONAL)
         await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
         await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
         for node in (encoder, gate):
             if standing := await self._in_worker(lambda node=node: bring_up.standing_error(node)):
-                self._on_emergency(Emergency(node.remote.id, *standing))
+                self._on_emergency(Emergency(node.number, *standing))
             await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
 
     async def _order(self, link: CanLink, node: bring_up.Node, name: str, state: int) -> None:
@@ -310,17 +313,11 @@ class LineIo:
             raise InterfaceError(f"the bus failed: {error}; look at the interface") from error
 
         def obeyed() -> bool:
-            beat = link.beats[node.remote.id]
+            beat = link.beats[node.number]
             return beat.state == state and beat.at_s > sent_s
 
         why = f"{node.name} did not become {_STATES[state]} when told so; look at its state, and for a second master"
         await self._until(link, obeyed, why)
-
-    def _no_heartbeat(self, node: bring_up.Node) -> str:
-        return (
-            f"no heartbeat of {node.name} on {self._settings.interface} {self._settings.channel}; look at its power, "
-            f"cable, bit rate and node id ({node.setting})"
-        )
 
     def _alive(self, link: CanLink, node: int) -> bool:
         beat = link.beats.get(node)

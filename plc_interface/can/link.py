@@ -57,7 +57,7 @@ class Report(NamedTuple):
     """The lower 16 bits of the ordered one."""
     fired: int
     """0 armed, 1 fired, 2 late, 3 no place left, 4 bad order."""
-    count: int
+    encoder_count: int
     """The encoder's count then."""
 
 
@@ -79,7 +79,9 @@ def open_bus(settings: CanSettings) -> can.BusABC:
     try:
         return can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **options)
     except (can.CanError, OSError) as error:
-        raise InterfaceError(f"{described(settings)} cannot be opened: {_why(error)}; {_remedy(settings, error)}") from error
+        raise InterfaceError(
+            f"{described(settings)} cannot be opened: {_why(error)}; {_remedy(settings, error)}"
+        ) from error
 
 
 def described(settings: CanSettings) -> str:
@@ -111,8 +113,8 @@ class CanLink:
         self,
         settings: CanSettings,
         counters: Counter[str],
-        on_report: Callable[[Report], None] = lambda _: None,
-        on_emergency: Callable[[Emergency], None] = lambda _: None,
+        on_report: Callable[[Report], object] = lambda _: None,
+        on_emergency: Callable[[Emergency], object] = lambda _: None,
     ) -> None:
         """Open the bus and listen.
 
@@ -132,7 +134,8 @@ class CanLink:
         """The encoder's last count and when it came, monotonic."""
         self._failure: InterfaceError | None = None
         self._ended = threading.Event()
-        self.network = canopen.Network(open_bus(settings))
+        self._bus = open_bus(settings)
+        self.network = canopen.Network(self._bus)
         for node in (settings.gate_node, settings.encoder_node):
             self.network.subscribe(HEARTBEAT + node, self._take_beat)
             self.network.subscribe(EMERGENCY + node, self._take_emergency)
@@ -182,11 +185,10 @@ class CanLink:
         self.network.disconnect()
 
     def _receive(self) -> None:
-        assert self.network.bus is not None
-        bus, failures = self.network.bus, 0
+        failures = 0
         while not self._ended.is_set():
             try:
-                message = bus.recv(_RECEIVE_S)
+                message = self._bus.recv(_RECEIVE_S)
             except (can.CanError, OSError, ValueError) as error:
                 self._counters["receive_errors"] += 1
                 failures += 1

@@ -67,7 +67,7 @@ class PendingShot:
             case Fired.ARMED:
                 return report
             case Fired.FIRED:
-                off = ahead(at, report.count)
+                off = ahead(at, report.encoder_count)
                 if abs(off) > self._tolerance_counts:
                     raise EchoWrongError(
                         sequence,
@@ -78,7 +78,7 @@ class PendingShot:
             case Fired.LATE:
                 raise LateShotError(
                     sequence,
-                    f"count {at} was past when the gate got the order, at {report.count}; "
+                    f"count {at} was past when the gate got the order, at {report.encoder_count}; "
                     "the fruit went by: raise can.distance_counts or shorten the inspection",
                 )
             case Fired.FULL:
@@ -139,5 +139,7 @@ class Shots:
     def lose(self, why: str) -> None:
         """End all orders: the gate is gone, and nobody knows what it did."""
         for shot in self._pending.values():
-            lost = ShotLostError(shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit")
+            lost = ShotLostError(
+                shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
+            )
             shot.reports.put_nowait(lost)

@@ -115,8 +115,8 @@ class CanSettings(Settings):
     tolerance_counts: int = setting(
         100,
         title="Tolerance of a shot",
-        description="How far from the ordered count the gate may report its shot; it has to cover the belt's way in one "
-        "period of the encoder, 30 counts on the twin.",
+        description="How far from the ordered count the gate may report its shot; it has to cover the belt's way in "
+        "one period of the encoder, 30 counts on the twin.",
         ge=0,
         le=1_000_000,
     )

@@ -34,7 +34,7 @@ class LineEncoder(TwinNode):
 
     @property
     def count(self) -> int:
-        """Where the belt is, 0 to 2³² − 1."""
+        """Where the belt is, 0 to 2**32 - 1."""
         return int(self._way) % _RANGE
 
     def tick(self) -> None:

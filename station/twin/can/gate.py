@@ -4,7 +4,7 @@ from collections import deque
 from typing import NamedTuple
 
 from canopen.pdo.base import PdoMap
-from canopen.sdo import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError
 
 from station.settings.can import GATE_EDS, CanSettings
 from station.twin.can.faults import LineFault, gone
@@ -31,7 +31,7 @@ class Shot(NamedTuple):
     sequence: int
     lane: int
     pulse_ms: int
-    count: int
+    at_count: int
 
 
 class RejectGate(TwinNode):
@@ -106,14 +106,15 @@ class RejectGate(TwinNode):
     def _on_count(self, pdo: PdoMap) -> None:
         if not self.operational or len(pdo.data) * 8 < pdo.length:
             return
-        self._count, self._counted_s = pdo["Line encoder count"].raw, self._clock.now_s()
+        self._count = count = int(pdo["Line encoder count"].raw)
+        self._counted_s = self._clock.now_s()
         self.clear_error(_COUNT_LOST)
         late = int(self._faults.amount(LineFault.MISPLACED))
         for shot in list(self._armed.values()):
-            if _ahead(self._count, shot.count) + late <= 0:
+            if _ahead(count, shot.at_count) + late <= 0:
                 del self._armed[shot.sequence]
                 self._open_until_s[shot.lane] = self._counted_s + shot.pulse_ms / 1000
-                self.fired.append(shot._replace(count=self._count))
+                self.fired.append(shot._replace(at_count=count))
                 self._report(shot.sequence, _FIRED)
 
     def _on_order(self, pdo: PdoMap) -> None:
@@ -123,12 +124,12 @@ class RejectGate(TwinNode):
             self.raise_error(_WRONG_LENGTH, _COMMUNICATION)
             return
         names = ("Sequence", "Lane", "Pulse in ms", "Fire at count")
-        shot = Shot(*(pdo[f"Shot order.{name}"].raw for name in names))
+        shot = Shot(*(int(pdo[f"Shot order.{name}"].raw) for name in names))
         if shot.sequence in self._armed:
             answer = _ARMED
         elif not 1 <= shot.lane <= _LANES or not shot.pulse_ms:
             answer = _BAD
-        elif self._count is None or _ahead(self._count, shot.count) <= 0:
+        elif self._count is None or _ahead(self._count, shot.at_count) <= 0:
             answer = _LATE
         elif len(self._armed) >= _PLACES:
             answer = _FULL

@@ -83,6 +83,6 @@ class LineNodes:
             if self._faults.active(CommonFault.GARBAGE) and self._clock.now_s() > garbage_s:
                 garbage_s = self._clock.now_s() + _GARBAGE_S
                 for base in (0x080, 0x180, 0x580, 0x700):
-                    self.gate.network.send_message(base + self.gate.local.id, b"\xff" if base != 0x700 else b"")
-                self.encoder.network.send_message(0x180 + self.encoder.local.id, b"\xff")
+                    self.gate.network.send_message(base + self.gate.number, b"\xff" if base != 0x700 else b"")
+                self.encoder.network.send_message(0x180 + self.encoder.number, b"\xff")
             await asyncio.sleep(_TICK_S)

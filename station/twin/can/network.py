@@ -62,7 +62,9 @@ class LoopNetwork(canopen.Network):
                 interface=self._settings.interface, channel=self._settings.channel, ignore_config=True, **options
             )
         except can.CanError as error:
-            raise OSError(f"CAN {self._settings.interface} {self._settings.channel}: {error.__cause__ or error}") from error
+            raise OSError(
+                f"CAN {self._settings.interface} {self._settings.channel}: {error.__cause__ or error}"
+            ) from error
         self.notifier = can.Notifier(self.bus, self.listeners, _RECEIVE_S, loop=asyncio.get_running_loop())
 
     def close(self) -> None:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import canopen
+
 from station.twin.can.network import LoopNetwork
 
 OPERATIONAL = "OPERATIONAL"
@@ -20,7 +22,9 @@ class TwinNode:
             eds: its data sheet, from which its objects come.
         """
         self.network = network
-        self.local = network.create_node(number, str(eds))
+        self.number = number
+        self.local = canopen.LocalNode(number, str(eds))
+        network.add_node(self.local)
         self._errors: dict[int, int] = {}
         network.subscribe(0, self._on_nmt)  # after canopen's own subscription, which sets the state
 
@@ -46,9 +50,8 @@ class TwinNode:
 
     def write(self, index: int, subindex: int, value: int) -> None:
         """Set one of the node's own objects."""
-        variable = self.local.sdo.get_variable(index, subindex)
-        assert variable is not None
-        self.local.set_data(index, subindex, variable.od.encode_raw(value))
+        size = len(self.local.get_data(index, subindex))
+        self.local.set_data(index, subindex, value.to_bytes(size, "little"))
 
     def raise_error(self, code: int, register: int) -> None:
         """Send an emergency once, and remember it in objects 1001 and 1003.
@@ -82,7 +85,7 @@ class TwinNode:
 
     def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         command, number = data[0], data[1]
-        if number not in (0, self.local.id):
+        if number not in (0, self.number):
             return
         if command in _RESETS:
             self.boot()
