@@ -14,7 +14,7 @@ EDS_FOLDER = Path(__file__).parent / "eds"
 GATE_EDS = EDS_FOLDER / "reject_gate.eds"
 ENCODER_EDS = EDS_FOLDER / "line_encoder.eds"
 
-_INTERFACE_NAME = re.compile(r"[A-Za-z0-9_.-]{1,15}")
+_INTERFACE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,14}")
 _FEWEST_BEATS = 2
 
 
