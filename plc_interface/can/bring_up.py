@@ -3,12 +3,14 @@
 Every function waits for the node and is called from a worker thread. Objects: CiA 301, CiA 401 and CiA 406.
 """
 
+import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import can
 import canopen
+from canopen.objectdictionary import ObjectDictionaryError
 from canopen.pdo.base import PdoMap
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
@@ -191,6 +193,8 @@ def _asking(node: Node, what: str) -> Iterator[None]:
         raise BringUpError(
             f"{node.name} was asked {what} and did not answer; look at its power and cable, and for a second master"
         ) from error
+    except (struct.error, ObjectDictionaryError) as error:
+        raise BringUpError(f"{node.name} was asked {what} and answered nonsense: {error}; {_OTHER_NODE}") from error
     except (can.CanError, OSError, RuntimeError) as error:
         raise BringUpError(
             f"{node.name} was asked {what}, and the bus failed: {error}; look at the interface"

@@ -108,7 +108,7 @@ class LineIo:
             return self._trouble or "the CAN bus is being brought up"
         if self.encoder_count() is None:
             return "the encoder's count is not known; look at the encoder's power and cable"
-        return next((text for (node, _), text in self._emergencies.items() if node == self._settings.gate_node), "")
+        return next(iter(self._emergencies.values()), "")
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -154,6 +154,7 @@ class LineIo:
         Raises:
             NotReadyError: nothing was ordered.
             LateShotError, ShotRefusedError: nothing was or will be fired.
+            InterfaceError: the order did not leave.
             EchoMissingError, EchoWrongError, ShotLostError: what was fired, if anything, is not what was ordered.
         """
         if not 1 <= sequence < RANGE or not 1 <= lane <= _LANES or not 0 <= at_count < RANGE:

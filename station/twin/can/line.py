@@ -11,7 +11,7 @@ from station.twin.can.gate import RejectGate
 from station.twin.clock import Clock
 from station.twin.faults import CommonFault, FaultBoard
 
-_TICK_S = 0.002
+_TICK_S = 0.005
 _GARBAGE_S = 0.05
 _SHOWN = 8
 _REAL_BUS = "socketcan"
