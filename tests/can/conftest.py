@@ -4,13 +4,13 @@ import asyncio
 import itertools
 import os
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import can
-import canopen
 import pytest
+from canopen.network import _UninitializedNetwork
 
 from plc_interface.can.line_io import LineIo
 from station.settings.can import CanSettings
@@ -19,7 +19,7 @@ from station.twin.can.line import LineNodes
 from station.twin.clock import SteadyClock
 from station.twin.faults import CommonFault, FaultBoard
 
-_refuse = canopen.network._UninitializedNetwork.__getattribute__
+_refuse = _UninitializedNetwork.__getattribute__
 
 
 def _tell_class(placeholder: Any, name: str) -> Any:
@@ -27,7 +27,7 @@ def _tell_class(placeholder: Any, name: str) -> Any:
     return type(placeholder) if name == "__class__" else _refuse(placeholder, name)
 
 
-setattr(canopen.network._UninitializedNetwork, "__getattribute__", _tell_class)  # noqa: B010 (typed as final)
+setattr(_UninitializedNetwork, "__getattribute__", _tell_class)  # noqa: B010 (typed as final)
 
 SCENARIO_LIMIT_S = 40.0
 GROUP = "239.74.163.2"
@@ -125,7 +125,7 @@ def patient() -> dict[str, Any]:
 
 
 @pytest.fixture
-def multicast_port(unused_port: int) -> Iterator[int]:
+def multicast_port(unused_port: int) -> int:
     """A port on which frames by multicast pass from one socket of this machine to another."""
     options: dict[str, Any] = {"interface": "udp_multicast", "channel": GROUP, "port": unused_port, "hop_limit": 0}
     try:
@@ -140,4 +140,4 @@ def multicast_port(unused_port: int) -> Iterator[int]:
                 pytest.skip("this machine passes no multicast between its own processes")
     except can.CanError as error:
         pytest.skip(f"this machine has no multicast: {error.__cause__ or error}")
-    yield unused_port
+    return unused_port

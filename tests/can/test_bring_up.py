@@ -33,7 +33,10 @@ def test_the_nodes_are_configured_and_operational(on_bus):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ("wrong_identity", "the reject gate (node 16) is another device: its product is 0x0BAD0BAD, expected 0x52474154"),
+        (
+            "wrong_identity",
+            "the reject gate (node 16) is another device: its product is 0x0BAD0BAD, expected 0x52474154",
+        ),
         ("mapping_changed", "the reject gate (node 16) took its PDO mapping and holds another: RPDO 1"),
         ("mapping_refused", "the reject gate (node 16) was asked to take the mapping of its RPDO 1 and refused"),
         ("gate_silent", "no heartbeat of the reject gate (node 16) on virtual"),

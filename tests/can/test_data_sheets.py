@@ -1,6 +1,7 @@
 """The nodes' data sheets are read by canopen and say what the driver packs."""
 
 import configparser
+from typing import Any
 
 import canopen
 import pytest
@@ -11,9 +12,13 @@ from station.settings.can import ENCODER_EDS, GATE_EDS
 NODE = 0x23
 
 
-def mapped(sheet, index, node=NODE):
-    objects = canopen.import_od(str(sheet), node)
-    return [entry.default & 0xFF for subindex, entry in objects[index].items() if subindex]
+def read(sheet) -> Any:
+    return canopen.import_od(str(sheet), NODE)
+
+
+def mapped(sheet, index):
+    """The lengths in bits of what a PDO carries."""
+    return [entry.default & 0xFF for subindex, entry in read(sheet)[index].items() if subindex]
 
 
 @pytest.mark.parametrize(
@@ -24,7 +29,7 @@ def mapped(sheet, index, node=NODE):
     ],
 )
 def test_a_sheet_has_its_profiles_objects(sheet, profile, indices):
-    objects = canopen.import_od(str(sheet), NODE)
+    objects = read(sheet)
     assert objects[0x1000].default & 0xFFFF == profile
     assert all(index in objects for index in indices)
     information = objects.device_information
@@ -55,6 +60,6 @@ def test_the_pdos_are_laid_out_as_the_driver_packs_them():
     assert mapped(GATE_EDS, 0x1A00) == [16, 8, 32]
     assert mapped(ENCODER_EDS, 0x1A00) == [32]
     assert (ORDER.size, REPORT.size, COUNT.size) == (8, 7, 4)
-    objects = canopen.import_od(str(GATE_EDS), NODE)
+    objects = read(GATE_EDS)
     assert objects[0x1400][1].default == 0x200 + NODE
     assert objects[0x1800][1].default & 0x7FF == 0x180 + NODE

@@ -67,7 +67,9 @@ def test_a_loop_that_hangs_sends_no_heartbeat(on_bus):
     on_bus(scenario)
 
 
-@pytest.mark.parametrize(("fault", "name"), [("gate_silent", "the reject gate"), ("encoder_silent", "the line encoder")])
+@pytest.mark.parametrize(
+    ("fault", "name"), [("gate_silent", "the reject gate"), ("encoder_silent", "the line encoder")]
+)
 def test_a_lost_node_is_named_and_found_again(on_bus, fault, name):
     async def scenario(rig):
         await rig.ready()

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from plc_interface.can.command import check_can
+from plc_interface.can.counts import further
 from plc_interface.can.line_io import LineIo
 from station.settings.configuration import load_configuration
 from station.twin.console import ask
@@ -56,7 +57,9 @@ def test_a_fruit_is_diverted_between_processes(configuration, console):
                 io.renew_health(LIMIT_S)
                 while not io.ready:
                     await asyncio.sleep(0.01)
-                echo = await io.divert(9, 3, (io.encoder_count().value + 3000) % 2**32)
+                count = io.encoder_count()
+                assert count is not None
+                echo = await io.divert(9, 3, further(count.value, 3000))
                 state = await asyncio.to_thread(ask, "127.0.0.1", console, {"do": "line"})
                 assert state["fired"] == [{"sequence": 9, "lane": 3, "pulse_ms": 120, "at_count": echo.fired_count}]
                 assert state["gate"] == "operational"
@@ -78,7 +81,9 @@ def test_the_check_says_who_is_there_and_what_is_wrong(configuration, console):
     assert sound.exit_code == 0, sound.output
     interface, gate, encoder = sound.output.splitlines()
     assert interface.startswith("ok      the CAN interface udp_multicast 239.74.163.2 port ")
-    assert gate.startswith("ok      the reject gate (node 16): Reject gate 1.0, heartbeat pre-operational, another mapping")
+    assert gate.startswith(
+        "ok      the reject gate (node 16): Reject gate 1.0, heartbeat pre-operational, another mapping"
+    )
     assert encoder.startswith("ok      the line encoder (node 17): Line encoder 1.0")
     assert "count " in encoder
     ask("127.0.0.1", console, {"do": "set", "device": "line", "fault": "wrong_identity"})
