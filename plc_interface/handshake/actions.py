@@ -71,6 +71,11 @@ class PassOn:
 
 
 @dataclass(frozen=True, slots=True)
+class ClearFaults:
+    """Have the line's outputs forget their faults."""
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Write one line into the log."""
 

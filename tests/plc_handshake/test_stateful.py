@@ -150,7 +150,7 @@ class Handshake(RuleBasedStateMachine):
         self.inputs = ev.Inputs()
         self.next_id = 1
         self.asked_ids: dict[int, str] = {}
-        self.shown: dict[int, dict[str, object]] = {}
+        self.shown: dict[int, dict[str, Any]] = {}
         self.taken: set[int] = set()
         self.accepted: set[int] = set()
         self.commands: set[int | None] = set()
@@ -228,6 +228,8 @@ class Handshake(RuleBasedStateMachine):
             case do.TellPublished() | do.TellAcknowledged():
                 self.tells.clear()
                 self.feed(ev.RequestFailed(self.at(), "a note"))
+            case do.AskOutcome(sequence=sequence):
+                self.feed(ev.OutcomeFailed(self.at(), sequence, "no answer"))
             case _:
                 self.feed(ev.RequestFailed(self.at(), "a question"))
 
