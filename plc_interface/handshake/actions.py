@@ -83,4 +83,6 @@ class Say:
     warning: bool = True
 
 
-Action = Keep | AskBegin | AskOutcome | AskOpen | AskCommand | TellPublished | TellAcknowledged | PassOn | Say
+Action = (
+    Keep | AskBegin | AskOutcome | AskOpen | AskCommand | TellPublished | TellAcknowledged | PassOn | ClearFaults | Say
+)

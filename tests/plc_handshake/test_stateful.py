@@ -149,7 +149,8 @@ class Handshake(RuleBasedStateMachine):
         self.control: set[str] = set()
         self.inputs = ev.Inputs()
         self.next_id = 1
-        self.asked_ids: dict[int, str] = {}
+        self.refused: set[Any] = set()
+        self.missed: tuple[Any, ...] = ()
         self.shown: dict[int, dict[str, Any]] = {}
         self.taken: set[int] = set()
         self.accepted: set[int] = set()
@@ -301,10 +302,14 @@ class Handshake(RuleBasedStateMachine):
         assert isinstance(accepted, int)
         if accepted:
             self.accepted.add(accepted)
-        if seen["last_refusal"] and seen["last_refusal"] != BY_NAME["last_refusal"].code("bad_trigger_id"):
-            refused = seen["last_refused_trigger_id"]
-            assert isinstance(refused, int)
-            self.asked_ids[refused] = "refused"
+            self.refused.discard(accepted)  # a PLC may ask again for what was refused
+        missed = (seen["interface_boots"], seen["counters_epoch"], seen["count_missed"])
+        if missed != self.missed and self.bit("missed"):
+            self.missed = missed
+            if seen["last_refusal"] != BY_NAME["last_refusal"].code("bad_trigger_id"):
+                refused = seen["last_refused_trigger_id"]
+                assert refused not in self.accepted, "a trigger that was accepted is told as refused"
+                self.refused.add(refused)
         if not self.bit("result_valid"):
             assert seen["result_sequence"] == seen["result_outcome"] == 0
             return
@@ -318,7 +323,7 @@ class Handshake(RuleBasedStateMachine):
         assert self.shown.setdefault(sequence, block) == block, "two outcomes under one sequence"
         record = self.station.records[sequence]
         assert block["result_trigger_id"] == record.trigger_id, "a wrong id"
-        assert self.asked_ids.get(record.trigger_id) != "refused", "a result of a trigger that was refused"
+        assert record.trigger_id not in self.refused, "a result of a trigger that was refused"
         flags = block["result_flags"]
         assert isinstance(flags, int)
         if block["result_outcome"] != BY_NAME["result_outcome"].code("NO_RESULT"):
