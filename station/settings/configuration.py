@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from station.settings.arm import ArmSettings
 from station.settings.camera import CameraSettings
+from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.gripper import GripperSettings
 from station.settings.modbus import ModbusSettings
@@ -94,6 +95,7 @@ class Configuration(Settings):
     service: ServiceSettings = setting(
         ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."
     )
+    can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:
