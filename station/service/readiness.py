@@ -94,7 +94,9 @@ class Gate:
     def _line(self) -> Dependency:
         age_s = self._orders.line_age_s
         if age_s is None:
-            return Dependency("plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run")
+            return Dependency(
+                "plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run"
+            )
         if trouble := self._orders.line_trouble():
             return Dependency("plc", "fault", age_s, trouble, "see the detail")
         return Dependency("plc", "ok", age_s)

@@ -1,7 +1,7 @@
 """Looks after what an inspection needs, outside of inspections: brings it back where that is safe, raises alarms."""
 
 import asyncio
-import logging
+import contextlib
 import time
 
 from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
@@ -17,8 +17,7 @@ from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-
-log = logging.getLogger(__name__)
+from station.service.watching import NotYetHeardError
 
 UPKEEP = "upkeep"
 PERIOD_S = 0.2
@@ -109,28 +108,23 @@ class Upkeep:
             service.records_fault = error
 
     async def _activate(self) -> None:
-        if not self._activation_is_lost or not self._others_are_well:
-            return
-        try:
-            await self._crew.activate_if_safe()
-        except StationError as error:
-            self._crew.watches[GRIPPER].refused(error)
-
-    @property
-    def _others_are_well(self) -> bool:
-        return set(self._crew.faults) <= {GRIPPER}
+        if self._activation_is_lost and set(self._crew.faults) == {GRIPPER}:
+            with contextlib.suppress(StationError):  # the gripper's watch says why it could not be
+                await self._crew.activate_if_safe()
 
     def _show_conditions(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
         for name, watch in self._crew.watches.items():
-            alarms.device(name, watch.fault if watch.was_heard_or_tried else None)
+            alarms.device(name, None if isinstance(watch.fault, NotYetHeardError) else watch.fault)
         fault = service.records_fault
         alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
         free_mb = service.records.status().free_bytes / _MB
         alarms.show(
             AlarmId.DISK_LOW,
-            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve" if free_mb < 2 * self._reserve_mb else "",
+            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
+            if free_mb < 2 * self._reserve_mb
+            else "",
         )
         alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
         alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
