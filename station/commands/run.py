@@ -20,7 +20,7 @@ from station.settings.configuration import Configuration
     type=click.Choice(["auto", "json", "human"]),
     default="auto",
     show_default=True,
-    help="Log's form.",
+    help="The log.",
 )
 def service(config: Path | None, style: str) -> None:
     """Inspect fruit at the PLC's triggers, until SIGTERM or Ctrl-C. The arm and the gripper move.

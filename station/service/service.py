@@ -94,7 +94,7 @@ class Service:
         self.records_fault: RecordsError | None = None
         """Why the records are not to be relied on, until they were opened again."""
         self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
-        self._background: set[asyncio.Task[None]] = set()
+        self._background: set[asyncio.Future[Event | None]] = set()
         self._told_late: State | None = None
 
     @property
