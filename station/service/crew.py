@@ -24,6 +24,8 @@ CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
 STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """What the arm's safety controller decided and a person has to look at."""
 _BAD_FRAMES = 3
+_STALE_LOOKS = 3
+"""So often in a row a device may look ill before it counts: a moment's delay of this machine is no fault of its."""
 _OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
@@ -53,7 +55,7 @@ class Crew:
         )
         self.confirmed_clear = False
         """A person has said that nothing is between the jaws; used up by the next activation."""
-        self._bad_frames = 0
+        self._bad_frames, self._stale_looks = 0, 0
         self._not_activated: StationError | None = None
         looks = {CAMERA: self._look_at_camera, GRIPPER: self._look_at_gripper}
         if arm is not None:
@@ -216,6 +218,8 @@ class Crew:
 
     async def _look_at_arm(self) -> None:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
-        state = await self._arm.state()
-        if state.fault is not None:
-            raise state.fault
+        fault = (await self._arm.state()).fault
+        stale = fault is not None and fault.cause is ArmCause.STALE
+        self._stale_looks = self._stale_looks + 1 if stale else 0
+        if fault is not None and not 0 < self._stale_looks < _STALE_LOOKS:
+            raise fault

@@ -109,7 +109,7 @@ class Orders:
                 self.mode = command.argument
                 return ""
             case CommandName.CLEAR_ALARMS:
-                self._service.alarms.acknowledge_gone()
+                self._service.alarms.acknowledge_returned()
                 return ""
 
     async def _change_recipe(self, number: int) -> str:
@@ -174,7 +174,10 @@ class Orders:
         reached = await service.conductor.until(
             lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
         )
-        return "" if reached is State.IDLE else self._sentence()
+        if reached is not State.IDLE:
+            return self._sentence()
+        service.alarms.reset()
+        return ""
 
     def _sentence(self) -> str:
         faults = list(self._crew.faults.values())

@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Awaitable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 from station.channel.line import Begin, Begun, Open, Outcome
@@ -18,7 +19,7 @@ from station.records.errors import RecordsError
 from station.records.model import InspectionRecord, Trigger
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
-from station.service.conductor import Conductor, Happened, event_of
+from station.service.conductor import Conductor, Happened, Work, event_of
 from station.service.crew import Crew
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
@@ -172,21 +173,21 @@ class Service:
 
     # What the cycle asks: see `Performer`.
 
-    def perform(self, action: Action, because: Happened) -> Awaitable[Event | None] | None:  # noqa: C901, PLR0911, PLR0912
-        """Begin an action of the cycle."""
+    def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
+        """Carry an action of the cycle out."""
         match action:
             case Action.OPEN_JAWS:
-                return self._inspector.open_jaws()
+                return self._inspector.open_jaws
             case Action.GO_HOME:
-                return self._inspector.go_home()
+                return self._inspector.go_home
             case Action.CHECK_DEVICES:
-                return self._check()
+                return self._check
             case Action.CLOSE_UNFINISHED:
-                return self._close_unfinished()
+                return self._close_unfinished
             case Action.RECOVER_ARM:
-                return self._recover_arm()
+                return self._recover_arm
             case Action.RECORD_TRIGGER:
-                return self._record_trigger()
+                return self._record_trigger
             case Action.ACCEPT_TRIGGER:
                 self._accept()
                 return None
@@ -205,14 +206,14 @@ class Service:
                 self._inspector.close_as_no_result(now, because.event, because.why)
                 return None
             case Action.RECORD:
-                return self._record(now)
+                return partial(self._record, now)
             case Action.PUBLISH:
                 self._publish(now)
                 return None
             case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
-                return self._inspector.place(now)
+                return partial(self._inspector.place, now)
             case _:
-                return getattr(self._inspector, action.value)(now)
+                return partial(getattr(self._inspector, action.value), now)
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
@@ -231,14 +232,10 @@ class Service:
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Keep the phases' times, and what hangs on a state."""
         self._told_late = None
-        if self._now is not None:
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state is not State.ACCEPTING
         self._crew.use(by_inspection=inspecting_now)
-        if not inspecting_now and self._now is not None and state is not State.ACCEPTING:
-            if self._now.standing is None:
-                self._unrecorded.append(self._now)
-            self._now = None
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
@@ -338,14 +335,13 @@ class Service:
 
     async def _close_unfinished(self) -> Event:
         async with self._closing:
-            while self._unrecorded:
-                now = self._unrecorded[0]
+            while (now := self.running) is not None:
                 now.outcome_name = "NO_RESULT"
                 if not now.interruptions:
                     now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
                 await self._record(now)
                 self._publish(now)
-                self._unrecorded.remove(now)
+            self._unrecorded.clear()
         return Event.UNFINISHED_CLOSED
 
     # Small parts.
@@ -377,7 +373,7 @@ class Service:
         now = self._now
         if now is None or now.accepted_s is None or self._told_late is self.state:
             return
-        since_s = time.monotonic() - now.accepted_s
+        since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
         found = late(now.limits, self.state, self.conductor.in_state_s, since_s)
         if found is None:
             return

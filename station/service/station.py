@@ -77,7 +77,7 @@ class Station:
             service: Service | None = None
 
             def device_changed(name: str, fault: StationError | None) -> None:
-                alarms.device(name, fault)
+                alarms.device(name, crew.watches[name].told_fault)
                 if service is not None:
                     service.device_changed(fault)
 

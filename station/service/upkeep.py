@@ -17,7 +17,6 @@ from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-from station.service.watching import NotYetHeardError
 
 UPKEEP = "upkeep"
 PERIOD_S = 0.2
@@ -81,10 +80,13 @@ class Upkeep:
 
     async def _bring_back(self) -> None:
         service, now_s = self._service, time.monotonic()
-        if now_s >= self._again_s and (service.records_fault is not None or self._activation_is_lost):
+        activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
+        if now_s >= self._again_s and (service.records_fault is not None or activate):
             self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
             await self._open_records_again()
-            await self._activate()
+            if activate:
+                with contextlib.suppress(StationError):  # the gripper's watch says why it could not be
+                    await self._crew.activate_if_safe()
             self._again_s = time.monotonic() + self._pause_s
         entered_s = service.conductor.entered_s
         if service.records_fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
@@ -107,16 +109,11 @@ class Upkeep:
         except RecordsError as error:
             service.records_fault = error
 
-    async def _activate(self) -> None:
-        if self._activation_is_lost and set(self._crew.faults) == {GRIPPER}:
-            with contextlib.suppress(StationError):  # the gripper's watch says why it could not be
-                await self._crew.activate_if_safe()
-
     def _show_conditions(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
         for name, watch in self._crew.watches.items():
-            alarms.device(name, None if isinstance(watch.fault, NotYetHeardError) else watch.fault)
+            alarms.device(name, watch.told_fault)
         fault = service.records_fault
         alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
         free_mb = service.records.status().free_bytes / _MB
@@ -128,7 +125,9 @@ class Upkeep:
         )
         alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
         alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
-        alarms.show(AlarmId.NO_RECIPE, "" if service.active is not None else self._gate.refusal()[1])
+        alarms.show(
+            AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
+        )
         self._orders.show_line()
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
