@@ -121,7 +121,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class Alarms:
-    """All alarms of a station, as a value: each verb gives a new one; what an alarm's life does not list does nothing."""
+    """All alarms of a station, as a value. Each verb gives a new one; what a life does not list changes nothing."""
 
     known: Mapping[AlarmId, Alarm] = field(default_factory=dict)
     """Those that are not normal, or were raised a moment ago."""
