@@ -40,18 +40,6 @@ _MEASURE_S = 1.0
 _FRAMES_PER_S = 30.0
 _RECORD_NO_RESULT_S = 1.0
 
-_WAITED_FOR: dict[State, Event] = {
-    **dict.fromkeys((State.APPROACHING, State.HOMING, State.RETREATING, State.HOMING_UNRECORDED), Event.ARM_FAULT),
-    **dict.fromkeys((State.REFERENCE, State.CAPTURING, State.CAPTURING_MEASURING), Event.CAMERA_FAULT),
-    **dict.fromkeys((State.RECORDING_ACCEPT, State.RECORDING_REJECT, State.RECORDING_RELEASE), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.RECORDING_HELD, State.RECORDING_LATCHED, State.ACCEPTING), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.CLEARING,), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.AWAITING_MEASURE, State.AWAITING_MEASURE_LAST, State.MEASURING_LAST), Event.INTERNAL_FAULT),
-    **dict.fromkeys((State.JUDGING, State.SETTLING, State.SETTLING_MEASURING), Event.INTERNAL_FAULT),
-    State.RECOVERING: Event.ARM_FAULT,
-}
-"""Whose fault it is where a single wait is too long; the gripper's in all other states."""
-
 
 class Service:
     """The cycle's performer, and the line's side of it.
@@ -375,14 +363,11 @@ class Service:
             return
         since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
         found = late(now.limits, self.state, self.conductor.in_state_s, since_s)
-        if found is None:
-            return
-        self._told_late = self.state
-        what = f"took {found.took_s:.1f} s, {found.allowed_s:.1f} s are allowed"
-        if found.phase is None:
-            self.conductor.post(Event.LATE, f"the inspection {what}")
-        else:
-            self.conductor.post(_WAITED_FOR.get(self.state, Event.GRIPPER_FAULT), f"{self.state.value} {what}")
+        if found is not None:
+            self._told_late = self.state
+            what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
+            why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
+            self.conductor.post(found.event, why)
 
     def _in_background(self, work: Awaitable[Event | None]) -> None:
         task = asyncio.ensure_future(work)
