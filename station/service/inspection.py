@@ -88,8 +88,10 @@ class Inspection:
         verdict, onset_mm = self.verdict, self.onset_mm
         deciding = verdict.deciding if verdict is not None else None
         found = [finding.reason for finding in verdict.findings] if verdict is not None else []
+        if self.interruptions and not self.seen:
+            found = []  # that nothing was touched is no news where nothing was looked at
         reasons = tuple(dict.fromkeys([*self.interruptions, *found]))
-        sentences = [finding.sentence for finding in verdict.findings] if verdict is not None else []
+        sentences = [finding.sentence for finding in verdict.findings if finding.reason in found] if verdict else []
         return InspectionRecord(
             outcome=self.outcome_name,
             reasons=() if self.outcome_name == "PASS" else tuple(map(str, reasons)),

@@ -38,6 +38,8 @@ CYCLE = "cycle"
 _LEASE_S = 2.0
 _MEASURE_S = 1.0
 _FRAMES_PER_S = 30.0
+_FRAMES_LOST = 3
+"""Of so many frames one may be good before the camera counts as failed."""
 _RECORD_NO_RESULT_S = 1.0
 
 
@@ -119,7 +121,7 @@ class Service:
                 self.active.snapshot,
                 self._crew.simulated,
             )
-            limits = deadlines(self.active.recipe, self._pace())
+            limits = deadlines(self.active.recipe, self.pace())
             if self._settings.inspection_deadline_s is not None:
                 limits = limits._replace(inspection_s=min(limits.inspection_s, self._settings.inspection_deadline_s))
             now = Inspection(trigger, self.active, limits, self._configuration.camera.mm_per_px)
@@ -344,10 +346,11 @@ class Service:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
 
-    def _pace(self) -> Pace:
+    def pace(self) -> Pace:
+        """What the deadlines follow from on this cell."""
         arm = self._configuration.arm
         return Pace(
-            frames_per_s=self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S,
+            frames_per_s=(self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S) / _FRAMES_LOST,
             arm_move_s=0.0 if self._crew.cell.arm is None else longest_move_s(arm),
             stroke_mm=self._crew.cell.gripper.max_width_mm,
             record_s=self._configuration.records.deadline_s,

@@ -47,6 +47,8 @@ class Station:
         self.boot = uuid.uuid4().hex
         self._configuration, self._broken = configuration, broken
         self._stop = asyncio.Event()
+        self.service: Service | None = None
+        """The cycle, once `run` has put it together."""
 
     def stop(self) -> None:
         """Ask for an orderly end; asking again changes nothing."""
@@ -61,85 +63,72 @@ class Station:
         Raises:
             StationError: the station cannot even begin: an address is in use.
         """
+        async with contextlib.AsyncExitStack() as stack:
+            tasks, port = await self._put_together(stack)
+            on_started(port)
+            await self._until_asked(tasks)
+            await self._end()
+
+    async def _put_together(self, stack: contextlib.AsyncExitStack) -> tuple[tuple[asyncio.Task[None], ...], int]:
         configuration, settings = self._configuration, self._configuration.service
         versions = {PROGRAM: version(PROGRAM)}
-        liveness = Liveness()
-        metrics = Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
-        kept = Kept(configuration.home)
+        liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
+        kept, alarms = Kept(configuration.home), AlarmDesk(metrics)
+        eye = Eye(Golden(kept), settings.reference)
+        stack.callback(eye.close)
+        records = Records(configuration.home / "records", configuration.records, self.boot)
+        stack.push_async_callback(records.close)
+        metrics.watch_records(records.status)
+
+        def device_changed(name: str, fault: StationError | None) -> None:
+            alarms.device(name, crew.watches[name].told_fault)
+            service.device_changed(fault)
+
+        def progress(name: str) -> None:
+            liveness.progress(name)
+            if crew.watches[name].fault is None:
+                metrics.heard(name)
+
+        crew = Crew(configuration, device_changed, progress)
+        inspector = Inspector(crew, eye, settings)
+        self.service = service = Service(configuration, records, crew, inspector, alarms, metrics, liveness, versions)
+        try:
+            await records.reopen()
+            await alarms.recall(records)
+        except RecordsError as error:
+            service.records_fault = error
         book = RecipeBook(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
-        alarms = AlarmDesk(metrics)
-        async with contextlib.AsyncExitStack() as stack:
-            eye = Eye(Golden(kept), settings.reference)
-            stack.callback(eye.close)
-            records = Records(configuration.home / "records", configuration.records, self.boot)
-            stack.push_async_callback(records.close)
-            service: Service | None = None
-
-            def device_changed(name: str, fault: StationError | None) -> None:
-                alarms.device(name, crew.watches[name].told_fault)
-                if service is not None:
-                    service.device_changed(fault)
-
-            def progress(name: str) -> None:
-                liveness.progress(name)
-                if crew.watches[name].fault is None:
-                    metrics.heard(name)
-
-            crew = Crew(configuration, device_changed, progress)
-            service = Service(
-                configuration,
-                records,
-                crew,
-                Inspector(crew, eye, settings),
-                alarms,
-                metrics,
-                liveness,
-                versions,
-            )
-            try:
-                await records.reopen()
-                await alarms.recall(records)
-            except RecordsError as error:
-                service.records_fault = error
-            metrics.watch_records(records.status)
-            service.active = book.last_active()
-            orders = Orders(service, crew, book, metrics)
-            gate = Gate(self.boot, service, crew, orders, book, liveness)
-            upkeep = Upkeep(
-                service,
-                crew,
-                gate,
-                orders,
-                book,
-                metrics,
-                liveness,
-                broken=self._broken,
-                reserve_mb=configuration.records.free_reserve_mb,
-                longest_pause_s=settings.retry_longest_s,
-            )
-            endpoint = line_endpoint(configuration.handshake, configuration.home)
-            if endpoint.startswith("ipc://"):
-                Path(endpoint.removeprefix("ipc://")).parent.mkdir(parents=True, exist_ok=True)
-            line = LineServer(endpoint, service, orders, gate)
-            line_task = self._begin(stack, line.serve(), "line server")
-            health = HealthServer(
-                configuration.metrics.host, configuration.metrics.port, metrics, liveness, gate.readiness, versions
-            )
-            port = await health.start()
-            stack.push_async_callback(health.close)
-            stack.push_async_callback(crew.close)
-            await crew.open()
-            for name in crew.watches:
-                liveness.watch(name, settings.progress_s)
-            cycle_task = self._begin(stack, service.conductor.run(), CYCLE)
-            upkeep_task = self._begin(stack, upkeep.run(), UPKEEP)
-            self._begin(stack, alarms.keep(records), "alarms' records")
-            for name in (CYCLE, UPKEEP):
-                liveness.watch(name, settings.progress_s)
-            on_started(port)
-            await self._until_asked((line_task, cycle_task, upkeep_task))
-            await self._end(service)
+        service.active = book.last_active()
+        orders = Orders(service, crew, book, metrics)
+        gate = Gate(self.boot, service, crew, orders, book, liveness)
+        upkeep = Upkeep(
+            service,
+            crew,
+            gate,
+            orders,
+            book,
+            metrics,
+            liveness,
+            broken=self._broken,
+            reserve_mb=configuration.records.free_reserve_mb,
+            longest_pause_s=settings.retry_longest_s,
+        )
+        line = LineServer(
+            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate
+        )
+        tasks = [self._begin(stack, line.serve(), "line server")]
+        address = configuration.metrics
+        health = HealthServer(address.host, address.port, metrics, liveness, gate.readiness, versions)
+        port = await health.start()
+        stack.push_async_callback(health.close)
+        stack.push_async_callback(crew.close)
+        await crew.open()
+        tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
+        self._begin(stack, alarms.keep(records), "alarms' records")
+        for name in (*crew.watches, CYCLE, UPKEEP):
+            liveness.watch(name, settings.progress_s)
+        return tuple(tasks), port
 
     async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
         """Wait for the order to end; a task that nothing works without and that ended by a bug ends the process."""
@@ -153,7 +142,11 @@ class Station:
             asked.cancel()
             await asyncio.gather(asked, return_exceptions=True)
 
-    async def _end(self, service: Service) -> None:
+    async def _end(self) -> None:
+        """Let the running inspection come to its outcome, the jaws open and the arm go home."""
+        service = self.service
+        if service is None:
+            return
         service.stop_asked = True
         limit_s = self._configuration.service.clean_up_deadline_s
         try:
@@ -172,3 +165,10 @@ class Station:
 
         stack.push_async_callback(end)
         return task
+
+
+def _made_room_for(endpoint: str) -> str:
+    """The endpoint, with its folder made where it is a socket file; only this user may reach it there."""
+    if endpoint.startswith("ipc://"):
+        Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return endpoint
