@@ -1,9 +1,25 @@
-"""How long a phase and an inspection may take, from the recipe; late is a comparison of values."""
+"""How long each phase and a whole inspection may take, from the recipe; late is a comparison of values."""
 
 from typing import NamedTuple
 
+from station.errors import BadInputError
+from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.settings.recipe_model import Recipe
+
+PHASE_MARGIN, INSPECTION_MARGIN = 3.0, 1.5
+"""Factors on the time that is expected. A phase alone may be far off before it is a fault; of many phases the
+deviations cancel, so the whole is known better than its parts."""
+GRACE_S = 1.0
+"""Added to each: a busy machine's scheduler, and a gripper's or an arm's answer."""
+LONGEST_S = 600.0
+"""What the PLC can be told."""
+_RAMP_S = 0.2
+"""Acceleration, braking and arrival of one motion of the gripper; 9 ms on the twin (docs/gripper.md), with room for
+fingers that have mass and for a slow line. Unverified on hardware."""
+_SLOWEST_OPENING_MM_S = 20.0
+_RECOVERY_S = 20.0
+"""Power, brakes and program of an arm."""
 
 
 class Pace(NamedTuple):
@@ -11,7 +27,7 @@ class Pace(NamedTuple):
 
     frames_per_s: float
     arm_move_s: float
-    """The longest motion of the arm between two of its places."""
+    """The longest motion of the arm between two of its places; 0 on a bench without an arm."""
     stroke_mm: float
     """Width of the open jaws."""
     record_s: float
@@ -26,16 +42,55 @@ class Deadlines(NamedTuple):
     phases_s: dict[State, float]
     """For every state in which something is waited for."""
     inspection_s: float
-    """From the accepted trigger to the durable outcome."""
+    """From the accepted trigger to the durable outcome; past it the outcome is NO_RESULT."""
 
 
 class Late(NamedTuple):
-    """A deadline that has passed."""
+    """A deadline that has passed, as the event that the cycle takes."""
 
-    phase: State | None
-    """None for the whole inspection."""
+    event: Event
+    """`LATE` for the whole inspection, else the fault of what was waited for."""
+    state: State
     took_s: float
     allowed_s: float
+
+
+_WAITS_FOR = {
+    Event.ARM_FAULT: (State.APPROACHING, State.RETREATING, State.HOMING, State.HOMING_UNRECORDED, State.RECOVERING),
+    Event.GRIPPER_FAULT: (
+        State.CLOSING_TO_ONSET,
+        State.MOVING,
+        State.MOVING_MEASURING,
+        State.RELEASING,
+        State.RESETTING,
+        State.OPENING_TO_CLEAR,
+        State.OPENING_HELD,
+        State.OPENING_UNRECORDED,
+        State.PLACING_ACCEPT,
+        State.PLACING_REJECT,
+    ),
+    Event.CAMERA_FAULT: (State.REFERENCE, State.CAPTURING, State.CAPTURING_MEASURING),
+    Event.RECORDS_FAULT: (
+        State.ACCEPTING,
+        State.CLEARING,
+        State.RECORDING_ACCEPT,
+        State.RECORDING_REJECT,
+        State.RECORDING_RELEASE,
+        State.RECORDING_HELD,
+        State.RECORDING_LATCHED,
+    ),
+    Event.INTERNAL_FAULT: (
+        State.SETTLING,
+        State.SETTLING_MEASURING,
+        State.AWAITING_MEASURE,
+        State.AWAITING_MEASURE_LAST,
+        State.MEASURING_LAST,
+        State.JUDGING,
+        State.CHECKING,
+    ),
+}
+FAULT_OF: dict[State, Event] = {state: event for event, states in _WAITS_FOR.items() for state in states}
+"""Whose fault it is when a state lasts too long."""
 
 
 def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
@@ -44,17 +99,76 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     Args:
         recipe: steps, speeds, settling and frames.
         pace: the cell's.
+
+    Raises:
+        BadInputError: the inspection would take longer than the PLC can be told.
     """
-    raise NotImplementedError
+    expected_s = _expected(recipe, pace)
+    step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
+    inspection_s = GRACE_S + INSPECTION_MARGIN * (
+        expected_s[State.REFERENCE]
+        + expected_s[State.APPROACHING]
+        + expected_s[State.CLOSING_TO_ONSET]
+        + recipe.steps.number * max(step_s, pace.measure_s)
+        + expected_s[State.MEASURING_LAST]
+        + pace.record_s
+    )
+    if inspection_s > LONGEST_S:
+        raise BadInputError(
+            f"recipe {recipe.name}: an inspection may take {inspection_s:.0f} s here, expected at most "
+            f"{LONGEST_S:g} s; take fewer steps, a shorter settle time or fewer frames"
+        )
+    phases_s = {state: GRACE_S + PHASE_MARGIN * expected_s.get(state, 0.0) for state in FAULT_OF}
+    return Deadlines(phases_s, inspection_s)
 
 
-def late(limits: Deadlines, phase: State, in_phase_s: float, since_trigger_s: float | None) -> Late | None:
+def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: float | None) -> Late | None:
     """What is late now, the inspection before the phase.
 
     Args:
         limits: from `deadlines`.
-        phase: the cycle's state now.
-        in_phase_s: time since it was entered.
-        since_trigger_s: time since the trigger was accepted; None outside an inspection.
+        state: the cycle's state now.
+        in_state_s: time since it was entered.
+        since_trigger_s: time since the trigger was accepted; None once its outcome is durable, and outside an
+            inspection.
     """
-    raise NotImplementedError
+    if since_trigger_s is not None and since_trigger_s > limits.inspection_s:
+        return Late(Event.LATE, state, since_trigger_s, limits.inspection_s)
+    allowed_s = limits.phases_s.get(state)
+    if allowed_s is not None and in_state_s > allowed_s:
+        return Late(FAULT_OF[state], state, in_state_s, allowed_s)
+    return None
+
+
+def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
+    """What a state takes where all is well; what is not listed takes a moment."""
+    steps, imaging = recipe.steps, recipe.imaging
+    moving_s = steps.step_mm / recipe.gripper.speed_mm_s + _RAMP_S
+    capturing_s = imaging.frames_per_step / pace.frames_per_s
+    opening_s = pace.stroke_mm / _SLOWEST_OPENING_MM_S + _RAMP_S
+    searched = max(0.0, pace.stroke_mm - recipe.expected_width.smallest_mm) / steps.step_mm + 1
+    placing_s = 3 * pace.arm_move_s + opening_s
+    expected_s = {
+        State.REFERENCE: imaging.reference_frames / pace.frames_per_s,
+        State.APPROACHING: 2 * pace.arm_move_s,
+        State.CLOSING_TO_ONSET: searched * (moving_s + imaging.settle_s + capturing_s + pace.measure_s),
+        State.MOVING: moving_s,
+        State.MOVING_MEASURING: moving_s,
+        State.SETTLING: imaging.settle_s,
+        State.SETTLING_MEASURING: imaging.settle_s,
+        State.CAPTURING: capturing_s,
+        State.CAPTURING_MEASURING: capturing_s,
+        State.AWAITING_MEASURE: pace.measure_s,
+        State.AWAITING_MEASURE_LAST: pace.measure_s,
+        State.MEASURING_LAST: pace.measure_s,
+        State.PLACING_ACCEPT: placing_s,
+        State.PLACING_REJECT: placing_s,
+        State.RECOVERING: _RECOVERY_S,
+    }
+    expected_s |= dict.fromkeys(_opening_states(), opening_s)
+    expected_s |= dict.fromkeys((State.RETREATING, State.HOMING, State.HOMING_UNRECORDED), 2 * pace.arm_move_s)
+    return expected_s | dict.fromkeys(_WAITS_FOR[Event.RECORDS_FAULT], pace.record_s)
+
+
+def _opening_states() -> tuple[State, ...]:
+    return (State.RELEASING, State.RESETTING, State.OPENING_TO_CLEAR, State.OPENING_HELD, State.OPENING_UNRECORDED)

@@ -1,9 +1,16 @@
-"""The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with every reason in a sentence."""
+"""The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with every reason in a sentence.
 
-from dataclasses import dataclass
+PASS is said only of a fruit all of whose limits were measured, by trusted points, to be kept with the uncertainty on
+top. FAIL needs a trusted proof. All else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as
+they are: docs/decisions/0015.
+"""
 
-from station.inspection.press import Measured, Press
-from station.settings.recipe_model import Recipe
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from station.inspection.evidence import Evidence, Growth
+from station.inspection.press import Flag, Measured, Press
+from station.settings.recipe_model import AreaThreshold, Recipe
 from station.vocabulary import OutcomeName, Reason
 
 
@@ -14,11 +21,11 @@ class Finding:
     reason: Reason
     sentence: str
     """For the quality manager: the value, its limit and the closing."""
-    proves: bool
-    """It alone proves the fruit damaged; else it keeps the measurement from being trusted."""
     value: float | None = None
     limit: float | None = None
     closing_mm: float | None = None
+    proves: bool = False
+    """It alone proves the fruit damaged; else it keeps the measurement from being trusted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,29 +41,22 @@ class AreaAt:
 
 
 @dataclass(frozen=True, slots=True)
-class Growth:
-    """The steepest growth of the area over a few steps."""
-
-    mm2_per_mm: float
-    uncertainty_mm2_per_mm: float
-    from_closing_mm: float
-    to_closing_mm: float
-
-
-@dataclass(frozen=True, slots=True)
 class Verdict:
     """The judgement of one press."""
 
     outcome: OutcomeName
     findings: tuple[Finding, ...]
-    """In the order of the reasons; empty just for PASS."""
+    """In the order of the reasons; empty just for PASS. Of FAIL only what proves it, and an early stop."""
     deciding: Measured | None
-    """The measured point that decided, or the last with an area; None where nothing valid was measured."""
+    """The measured point that decided, or the last trusted one; None where nothing valid was measured."""
     areas: tuple[AreaAt, ...]
+    """At each of the recipe's results' closings."""
     growth: Growth | None
-    """None with fewer than two points in contact."""
+    """The steepest over a few steps; None with fewer than two points beyond a light touch."""
     partial: bool
-    """Ended before the recipe's last step."""
+    """A result's closing was not reached."""
+    stopped: Finding | None
+    """Why the steps ended early, also where the fruit passes: what was left is no criterion."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
@@ -65,18 +65,67 @@ class Verdict:
         return tuple(reason for reason in Reason if reason in found)
 
 
+_INTERRUPTED = {
+    Reason.REFERENCE_BAD: "The reference images were not usable, so nothing could be compared with them.",
+    Reason.IMAGE_STALE: "No image as new as the step came in time.",
+    Reason.LATE: "The inspection did not end within its deadline.",
+    Reason.CALLED_OFF: "The inspection was called off.",
+    Reason.ARM_FAULT: "The arm failed or was stopped during the inspection.",
+    Reason.GRIPPER_FAULT: "The gripper failed during the inspection.",
+    Reason.CAMERA_FAULT: "The camera failed during the inspection.",
+    Reason.RECORDS_FAULT: "The records could not be written.",
+    Reason.STATION_LOST: "The station was restarted during the inspection.",
+    Reason.INTERNAL_FAULT: "The station's own software failed; its log says where.",
+    Reason.NO_CONTACT: "Nothing was touched: no fruit in the nest, or one narrower than the recipe expects.",
+}
+_DOUBTS = {
+    Flag.NO_CONTACT: (Reason.CONTACT_LOST, "the contact was lost"),
+    Flag.UNDECIDED: (Reason.LOW_CONFIDENCE, "something bent the gel, but no edge of a contact was found"),
+    Flag.CUT_BY_BORDER: (
+        Reason.CUT_BY_BORDER,
+        "the image's border cuts the contact, so its area is only a lower bound",
+    ),
+    Flag.SATURATED: (Reason.SATURATED, "much of the contact is at the end of the grey scale"),
+    Flag.LOW_CONFIDENCE: (Reason.LOW_CONFIDENCE, "the image supports the area too little"),
+    Flag.REFERENCE_MISMATCH: (Reason.REFERENCE_BAD, "the image does not fit its reference"),
+}
+_LATE_START = 0.25
+"""Share of the first damage threshold's closing by which the curve may seem to begin after the onset."""
+
+
 def judge(press: Press, recipe: Recipe) -> Verdict:
-    """Judge a press.
+    """Judge a press. The same for any order of the points, and for areas and limits in any one unit.
 
     Args:
         press: all measured points, in any order.
         recipe: limits and expectations.
     """
-    raise NotImplementedError
+    evidence = Evidence(press, recipe)
+    void = [*_void(press, recipe)]
+    stopped = early_stop(press, recipe)
+    findings = [] if press.onset_mm is None else [*_damage(evidence, recipe), *_distrust(evidence, recipe, stopped)]
+    proofs = [finding for finding in findings if finding.proves]
+    if proofs and not void:
+        outcome, findings = "FAIL", proofs + ([stopped] if stopped else [])
+    elif void or findings:
+        outcome, findings = "NO_RESULT", void + findings
+    else:
+        outcome = "PASS"
+    areas = tuple(_result(evidence, recipe, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
+    order = list(Reason)
+    return Verdict(
+        outcome=outcome,
+        findings=tuple(sorted(findings, key=lambda finding: order.index(finding.reason))),
+        deciding=_deciding(evidence, recipe, proofs),
+        areas=areas,
+        growth=max(evidence.growths, key=lambda growth: growth.mm2_per_mm, default=None),
+        partial=areas[-1].area_mm2 is None and not _almost(evidence, recipe),
+        stopped=stopped,
+    )
 
 
 def early_stop(press: Press, recipe: Recipe) -> Finding | None:
-    """Whether no further step is to be made, to spare fruit and gel.
+    """Whether no further step is to be made, to spare fruit and gel; also on what is not trusted.
 
     Args:
         press: what was measured so far.
@@ -85,4 +134,134 @@ def early_stop(press: Press, recipe: Recipe) -> Finding | None:
     Returns:
         Why, with reason `EARLY_STOP`; None where the next step may be made.
     """
-    raise NotImplementedError
+    points, limits = Evidence(press, recipe).points, recipe.early_stop
+    if not points:
+        return None
+    last, growth = points[-1], Evidence(press, recipe).latest_growth
+    place = f"No further step was made at {last.closing_mm:.1f} mm of closing"
+    over = max(points, key=lambda point: point.area_mm2)
+    if over.area_mm2 > limits.area_mm2:
+        sentence = f"{place}: the area, {over.area_mm2:.1f} mm², is over the early stop's {limits.area_mm2:g} mm²."
+        return Finding(Reason.EARLY_STOP, sentence, over.area_mm2, limits.area_mm2, over.closing_mm)
+    if growth is not None and growth.mm2_per_mm > limits.growth_mm2_per_mm:
+        sentence = (
+            f"{place}: the area grows by {growth.mm2_per_mm:.1f} mm² a millimetre, over the early stop's "
+            f"{limits.growth_mm2_per_mm:g}."
+        )
+        return Finding(Reason.EARLY_STOP, sentence, growth.mm2_per_mm, limits.growth_mm2_per_mm, growth.to_closing_mm)
+    limit_mm = recipe.steps.closing_limit_mm
+    if last.closing_mm >= limit_mm:
+        sentence = f"{place}: that is the recipe's closing limit of {limit_mm:g} mm."
+        return Finding(Reason.EARLY_STOP, sentence, last.closing_mm, limit_mm, last.closing_mm)
+    return None
+
+
+def _void(press: Press, recipe: Recipe) -> Iterator[Finding]:
+    """What makes the measurement no measurement of this recipe's fruit: nothing in it is a proof."""
+    for reason in dict.fromkeys(press.interruptions):
+        yield Finding(reason, _INTERRUPTED.get(reason, f"The inspection was interrupted: {reason}."))
+    if press.onset_mm is None:
+        if Reason.NO_CONTACT not in press.interruptions:
+            yield Finding(Reason.NO_CONTACT, _INTERRUPTED[Reason.NO_CONTACT])
+        return
+    expected = recipe.expected_width
+    if not expected.smallest_mm <= press.onset_mm <= expected.largest_mm:
+        beyond = expected.smallest_mm if press.onset_mm < expected.smallest_mm else expected.largest_mm
+        sentence = (
+            f"The fruit is {press.onset_mm:.1f} mm wide; {recipe.title} is meant for {expected.smallest_mm:g} to "
+            f"{expected.largest_mm:g} mm."
+        )
+        yield Finding(Reason.OUT_OF_RANGE, sentence, press.onset_mm, beyond, 0.0)
+
+
+def _damage(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
+    """Limits that are passed, or may be."""
+    for threshold in recipe.damage.area:
+        yield from _area(evidence, threshold)
+    limit = recipe.damage.growth_mm2_per_mm
+    proofs = [growth for growth in evidence.growths if growth.trusted and growth.least_mm2_per_mm > limit]
+    doubts = [growth for growth in evidence.growths if growth.most_mm2_per_mm > limit]
+    if not proofs and not doubts:
+        return
+    worst = max(proofs or doubts, key=lambda growth: growth.mm2_per_mm)
+    sentence = (
+        f"From {worst.from_closing_mm:.1f} to {worst.to_closing_mm:.1f} mm of closing the area grows by "
+        f"{worst.mm2_per_mm:.1f} ± {worst.uncertainty_mm2_per_mm:.1f} mm² a millimetre, "
+        f"{'' if proofs else 'which may be '}over the limit of {limit:g}."
+    )
+    yield Finding(Reason.GROWTH_OVER_LIMIT, sentence, worst.mm2_per_mm, limit, worst.to_closing_mm, proves=bool(proofs))
+
+
+def _area(evidence: Evidence, threshold: AreaThreshold) -> Iterator[Finding]:
+    """One area threshold."""
+    closing_mm, limit = threshold.closing_mm, threshold.area_mm2
+    least, area = evidence.least_area_mm2(closing_mm), evidence.area_at(closing_mm)
+    at = f"at {closing_mm:g} mm of closing"
+    if least is not None and least > limit:
+        sentence = f"The area {at} is at least {least:.1f} mm², over the limit of {limit:g} mm²."
+        yield Finding(Reason.AREA_OVER_LIMIT, sentence, least, limit, closing_mm, proves=True)
+    elif area is not None and sum(area) > limit:
+        sentence = f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be over the limit of {limit:g} mm²."
+        yield Finding(Reason.AREA_OVER_LIMIT, sentence, area[0], limit, closing_mm)
+
+
+def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:
+    """What a PASS would need and does not have."""
+    for flag, (reason, what) in _DOUBTS.items():
+        doubtful = [point for point in evidence.needed if flag in evidence.doubts(point)]
+        if doubtful:
+            worst = min(doubtful, key=lambda point: point.confidence or 0.0)
+            places = ", ".join(f"{point.closing_mm:.1f}" for point in doubtful)
+            value, limit, told = None, None, ""
+            if flag == Flag.LOW_CONFIDENCE:
+                value, limit = worst.confidence, recipe.segmentation.robust.least_confidence
+                told = "unknown" if value is None else f"{value:.2f}"
+                told = f" (confidence {told}, {limit:g} is asked for)"
+            yield Finding(reason, f"At {places} mm of closing {what}{told}.", value, limit, worst.closing_mm)
+    if falling := [point for point in evidence.falling if point in evidence.needed]:
+        places = ", ".join(f"{point.closing_mm:.1f} mm ({point.area_mm2:.1f} mm²)" for point in falling)
+        sentence = f"The area does not rise with the closing: {places} does not fit the other steps."
+        yield Finding(Reason.AREA_NOT_RISING, sentence, falling[0].area_mm2, None, falling[0].closing_mm)
+    yield from _onset(evidence, recipe)
+    yield from _reach(evidence, recipe, stopped)
+
+
+def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
+    """Whether the curve begins at the onset: one that was seen too soon makes every area look smaller than it is."""
+    begins_mm = evidence.begins_at_mm
+    allowed_mm = _LATE_START * recipe.damage.area[0].closing_mm
+    if evidence.needed and (begins_mm is None or begins_mm > allowed_mm):
+        seen = "does not rise" if begins_mm is None else f"rises as if the contact had begun at {begins_mm:.1f} mm"
+        sentence = f"The onset is doubtful: the area {seen}; up to {allowed_mm:g} mm of closing are allowed."
+        yield Finding(Reason.AREA_NOT_RISING, sentence, begins_mm, allowed_mm, 0.0)
+
+
+def _reach(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:
+    """Whether every damage threshold was reached, and whether the steps ended as they should."""
+    missing = [limit for limit in recipe.damage.area if evidence.area_at(limit.closing_mm) is None]
+    reached_mm = evidence.points[-1].closing_mm if evidence.points else 0.0
+    if stopped is None and (missing or not _almost(evidence, recipe)):
+        wanted_mm = missing[0].closing_mm if missing else recipe.steps.result_closings_mm[-1]
+        sentence = f"The steps ended at {reached_mm:.1f} mm of closing, before {wanted_mm:g} mm, and nothing says why."
+        yield Finding(Reason.INTERNAL_FAULT, sentence, reached_mm, wanted_mm, reached_mm)
+    elif missing and stopped is not None:
+        yield replace(stopped, sentence=f"{stopped.sentence} The area at {missing[0].closing_mm:g} mm is unknown.")
+
+
+def _almost(evidence: Evidence, recipe: Recipe) -> bool:
+    """Whether the last result's closing was reached but for less than a step: a gripper has counts."""
+    reached_mm = evidence.points[-1].closing_mm if evidence.points else 0.0
+    return reached_mm > recipe.steps.result_closings_mm[-1] - recipe.steps.step_mm
+
+
+def _result(evidence: Evidence, recipe: Recipe, closing_mm: float) -> AreaAt:
+    area, uncertainty = evidence.area_at(closing_mm) or (None, None)
+    limits = [threshold.area_mm2 for threshold in recipe.damage.area if threshold.closing_mm == closing_mm]
+    return AreaAt(closing_mm, area, uncertainty, limits[0] if limits else None)
+
+
+def _deciding(evidence: Evidence, recipe: Recipe, proofs: list[Finding]) -> Measured | None:
+    """The trusted point nearest to the first proof, or to the last damage threshold."""
+    trusted = [point for point in evidence.judged if evidence.bounds(point)]
+    place_mm = proofs[0].closing_mm if proofs else recipe.damage.area[-1].closing_mm
+    return min(trusted, key=lambda point: abs(point.closing_mm - (place_mm or 0.0)), default=None)

@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import isfinite
 
 from station.vocabulary import Reason
+
+RELATIVE_NOISE = 0.05
+"""By how much of itself a trusted area differs from another image's of the same contact; docs/measurement.md has the
+method's median errors, 0.04 to 0.06 on smooth fruit."""
 
 
 class Flag(StrEnum):
@@ -15,6 +20,15 @@ class Flag(StrEnum):
     SATURATED = "saturated"
     LOW_CONFIDENCE = "low_confidence"
     REFERENCE_MISMATCH = "reference_mismatch"
+
+
+def usual_uncertainty_mm2(area_mm2: float) -> float:
+    """The uncertainty of an area where its own images do not tell it, in mm².
+
+    Args:
+        area_mm2: the area.
+    """
+    return RELATIVE_NOISE * area_mm2
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +45,11 @@ class Measured:
     confidence: float | None
     """0 to 1; None where the method does not say, which is no trust."""
     flags: frozenset[Flag] = frozenset()
+
+    def __post_init__(self) -> None:
+        sizes = (self.area_mm2, self.area_px, self.area_uncertainty_mm2, self.confidence or 0.0)
+        if not isfinite(self.closing_mm) or not all(isfinite(size) and size >= 0 for size in sizes):
+            raise ValueError(f"expected finite values, and sizes that are not negative, got {self}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from station.devices.gripper.errors import (
 )
 from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
-from station.inspection.alarms import Alarm, Alarms, AlarmState
+from station.inspection.alarms import CAUSED, Alarms
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
@@ -40,7 +40,6 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
 }
 """What can be told of a device; all of it is cleared once the device is well."""
 
-_CAUSE_THERE = {AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED, AlarmState.SHELVED}
 _MOST_UNSAVED = 1000
 _ARM = {
     ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
@@ -133,16 +132,16 @@ class AlarmDesk:
         for alarm in OF_DEVICE[device]:
             self.show(alarm, str(fault) if alarm is told else "")
 
-    def acknowledge_gone(self) -> int:
-        """Acknowledge, and let go where latched, every alarm whose cause is gone.
+    def acknowledge_returned(self) -> None:
+        """Acknowledge every alarm whose cause is gone: what the PLC's command does."""
+        self._set_all(self._alarms.acknowledge_returned(), "acknowledged")
 
-        Returns:
-            How many are still active.
-        """
-        now_s = time.time()
-        for alarm in set(self._alarms.known) - self._present:
-            self._set(self._alarms.acknowledge(alarm, now_s).reset(alarm, now_s), alarm, "acknowledged", "")
-        return len(self._alarms.active())
+    def reset(self) -> None:
+        """Let go every latched alarm whose cause is gone: a person has reset the station."""
+        alarms = self._alarms
+        for alarm in self._alarms.known:
+            alarms = alarms.reset(alarm)
+        self._set_all(alarms, "reset")
 
     def tick(self) -> None:
         """Let time end what it ends; about once a second."""
@@ -157,16 +156,20 @@ class AlarmDesk:
         Args:
             records: as opened.
         """
-        known = {}
-        for row in await records.load_alarms():
-            if row.id in ALARMS and row.state in set(AlarmState):
-                alarm, state = AlarmId(row.id), AlarmState(row.state)
-                until_s = None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000
-                since_s, last_s = row.raised_utc_ms / 1000, row.changed_utc_ms / 1000
-                known[alarm] = Alarm(alarm, state, row.detail, since_s, 1, last_s, until_s)
-                if state in _CAUSE_THERE:
-                    self._present.add(alarm)
-        self._alarms = Alarms(known)
+        self._alarms = Alarms.from_data(
+            [
+                {
+                    "id": row.id,
+                    "state": row.state,
+                    "detail": row.detail,
+                    "since_s": row.raised_utc_ms / 1000,
+                    "raised": 1,
+                    "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
+                }
+                for row in await records.load_alarms()
+            ]
+        )
+        self._present = {alarm.id for alarm in self._alarms.known.values() if alarm.state in CAUSED}
         self._show()
 
     async def keep(self, records: Records) -> None:
@@ -184,7 +187,7 @@ class AlarmDesk:
                     alarm.id,
                     alarm.state,
                     round(1000 * alarm.since_s),
-                    round(1000 * alarm.last_raised_s),
+                    utc_ms(),
                     alarm.detail,
                     None if alarm.shelved_until_s is None else round(1000 * alarm.shelved_until_s),
                 )
@@ -206,6 +209,13 @@ class AlarmDesk:
         log.log(level, "alarm %s %s%s", alarm, change, f": {detail}" if detail else "")
         self._show()
 
+    def _set_all(self, alarms: Alarms, change: str) -> None:
+        for alarm, before in self._alarms.known.items():
+            if alarms.get(alarm) != before:
+                self._unsaved.append(AlarmEntry(utc_ms(), alarm, change))
+        self._alarms = alarms
+        self._show()
+
     def _show(self) -> None:
-        self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self._alarms.active())
+        self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self._alarms.active)
         self._changed.set()

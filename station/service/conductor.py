@@ -49,6 +49,9 @@ _ON_THE_DISK = {Action.RECORD}
 """What HALT does not touch: it is no motion, and what follows waits for it."""
 
 
+Work = Callable[[], Awaitable[Event | None]]
+
+
 class Happened(NamedTuple):
     """An event on its way to the table."""
 
@@ -61,8 +64,8 @@ class Happened(NamedTuple):
 class Performer(Protocol):
     """Who carries the actions out."""
 
-    def perform(self, action: Action, because: Happened) -> Awaitable[Event | None] | None:
-        """Begin an action; what is to be awaited runs beside everything else and ends with its event.
+    def perform(self, action: Action, because: Happened) -> Work | None:
+        """Carry an action out; where it takes time, give what runs beside everything else and ends with its event.
 
         Args:
             action: what to do; never HALT.
@@ -202,10 +205,10 @@ class Conductor:
             task = asyncio.create_task(self._end_with_event(action, work), name=f"action {action}")
             self._doing[task] = action
 
-    async def _end_with_event(self, action: Action, work: Awaitable[Event | None]) -> None:
+    async def _end_with_event(self, action: Action, work: Work) -> None:
         me = asyncio.current_task()
         try:
-            event, why = await work, ""
+            event, why = await work(), ""
         except StationError as fault:
             event, why = event_of(fault), str(fault)
             if event is Event.INTERNAL_FAULT:

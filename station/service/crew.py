@@ -24,6 +24,8 @@ CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
 STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """What the arm's safety controller decided and a person has to look at."""
 _BAD_FRAMES = 3
+_STALE_LOOKS = 3
+"""So often in a row a device may look ill before it counts: a moment's delay of this machine is no fault of its."""
 _OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
@@ -53,7 +55,8 @@ class Crew:
         )
         self.confirmed_clear = False
         """A person has said that nothing is between the jaws; used up by the next activation."""
-        self._bad_frames = 0
+        self._bad_frames, self._stale_looks = 0, 0
+        self._not_activated: StationError | None = None
         looks = {CAMERA: self._look_at_camera, GRIPPER: self._look_at_gripper}
         if arm is not None:
             looks[ARM] = self._look_at_arm
@@ -91,10 +94,8 @@ class Crew:
     @property
     def names(self) -> dict[str, str]:
         """Who takes part, for the records."""
-        names = {
-            CAMERA: self.cell.camera.description.name,
-            GRIPPER: f"Robotiq 2F-85 by {self._configuration.gripper.driver}",
-        }
+        camera, gripper = self.cell.camera.description.name, self._configuration.gripper.driver
+        names = {CAMERA: camera, GRIPPER: f"Robotiq 2F-85 by {gripper}"}
         return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
 
     @property
@@ -170,10 +171,15 @@ class Crew:
         reading = await self.cell.gripper.read()
         if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
             return
-        if not self.confirmed_clear:
-            await self._leave_the_nest(reading.width_mm)
-        self.confirmed_clear = False
-        await self.cell.gripper.activate()
+        try:
+            if not self.confirmed_clear:
+                await self._leave_the_nest(reading.width_mm)
+            self.confirmed_clear = False
+            await self.cell.gripper.activate()
+        except StationError as error:
+            self._not_activated = error
+            raise
+        self._not_activated = None
 
     async def _leave_the_nest(self, width_mm: float) -> None:
         refusal = GripperNotActiveError(
@@ -204,12 +210,16 @@ class Crew:
     async def _look_at_gripper(self) -> None:
         reading = await self.cell.gripper.read()
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
-            raise GripperFaultError(reading.fault_code)
+            raise self._not_activated or GripperFaultError(reading.fault_code)
         if not reading.active:
-            raise GripperNotActiveError("it is not activated", "wait: the station activates it where that is safe")
+            raise self._not_activated or GripperNotActiveError(
+                "it is not activated", "wait: the station activates it where that is safe"
+            )
 
     async def _look_at_arm(self) -> None:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
-        state = await self._arm.state()
-        if state.fault is not None:
-            raise state.fault
+        fault = (await self._arm.state()).fault
+        stale = fault is not None and fault.cause is ArmCause.STALE
+        self._stale_looks = self._stale_looks + 1 if stale else 0
+        if fault is not None and not 0 < self._stale_looks < _STALE_LOOKS:
+            raise fault

@@ -1,4 +1,4 @@
-"""The parts of a grip: sound frames, width steps, the approach, letting go. Who grips what, and why, is not known here."""
+"""The parts of a grip: sound frames, width steps, the approach, letting go. Why it grips is not known here."""
 
 import asyncio
 import time

@@ -6,16 +6,12 @@ from dataclasses import dataclass, field
 from station.channel.line import Outcome
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.eye import Seen
 from station.service.grip import GripStep
 from station.service.recipe_book import Active
 from station.vocabulary import OutcomeName, Reason
-
-_UNCERTAINTY_SHARE = 0.06
-"""Median error of the robust method's areas on the twin, docs/measurement.md."""
-_LEAST_UNCERTAINTY_MM2 = 1.0
 
 
 def utc_ms() -> int:
@@ -80,18 +76,22 @@ class Inspection:
         onset_mm = self.onset_mm
         if onset_mm is None:
             return Press(None, 0.0, (), tuple(self.interruptions))
-        before = [s.step.move.width_mm for s in self.seen if s.step.move.width_mm > onset_mm]
-        earlier_mm = min([*before, *([] if self.before_onset_mm is None else [self.before_onset_mm])], default=onset_mm)
+        untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
+        if self.before_onset_mm is not None:
+            untouched.append(self.before_onset_mm)
+        sooner_mm = min(untouched) - onset_mm if untouched else 0.0
         points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
-        return Press(onset_mm, max(0.0, earlier_mm - onset_mm), points, tuple(self.interruptions))
+        return Press(onset_mm, sooner_mm, points, tuple(self.interruptions))
 
     def record(self) -> InspectionRecord:
         """What is to be made durable."""
         verdict, onset_mm = self.verdict, self.onset_mm
         deciding = verdict.deciding if verdict is not None else None
         found = [finding.reason for finding in verdict.findings] if verdict is not None else []
+        if self.interruptions and not self.seen:
+            found = []  # that nothing was touched is no news where nothing was looked at
         reasons = tuple(dict.fromkeys([*self.interruptions, *found]))
-        sentences = [finding.sentence for finding in verdict.findings] if verdict is not None else []
+        sentences = [finding.sentence for finding in verdict.findings if finding.reason in found] if verdict else []
         return InspectionRecord(
             outcome=self.outcome_name,
             reasons=() if self.outcome_name == "PASS" else tuple(map(str, reasons)),
@@ -117,7 +117,7 @@ class Inspection:
             closing_mm=onset_mm - seen.step.move.width_mm,
             area_mm2=area_mm2,
             area_px=contact.area_px,
-            area_uncertainty_mm2=max(_LEAST_UNCERTAINTY_MM2, _UNCERTAINTY_SHARE * area_mm2),
+            area_uncertainty_mm2=usual_uncertainty_mm2(area_mm2),
             confidence=contact.confidence,
             flags=frozenset(Flag(flag.value) for flag in contact.flags),
         )

@@ -54,7 +54,7 @@ class Inspector:
         if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
             now.interrupt(
                 Reason.REFERENCE_BAD,
-                f"the jaws stand at {opened.width_mm:.1f} mm instead of open: something may touch the gel; look at them",
+                f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at them",
             )
             return Event.REFERENCE_BAD
         self._crew.watches[GRIPPER].heard()
@@ -133,7 +133,7 @@ class Inspector:
             )
         now.verdict = judge(now.press(), now.active.recipe)
         now.outcome_name = now.verdict.outcome
-        return Event.JUDGED_PASS if now.outcome_name == "PASS" else Event.JUDGED_DIVERT
+        return Event.JUDGED_ACCEPT if now.outcome_name == "PASS" else Event.JUDGED_REJECT
 
     async def place(self, now: Inspection) -> Event:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""

@@ -6,8 +6,10 @@ import time
 
 from station.channel.line import Command, CommandDone, CommandName, Line
 from station.devices.arm.faults import ArmFault
+from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, Event
+from station.inspection.deadlines import deadlines
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
 from station.service.metrics import Metrics
@@ -109,7 +111,7 @@ class Orders:
                 self.mode = command.argument
                 return ""
             case CommandName.CLEAR_ALARMS:
-                self._service.alarms.acknowledge_gone()
+                self._service.alarms.acknowledge_returned()
                 return ""
 
     async def _change_recipe(self, number: int) -> str:
@@ -121,6 +123,10 @@ class Orders:
         widest_mm = self._crew.cell.gripper.max_width_mm
         if found.recipe.expected_width.smallest_mm >= widest_mm:
             return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
+        try:
+            deadlines(found.recipe, self._service.pace())
+        except BadInputError as error:
+            return str(error)
         self.recipe_changing = True
         try:
             await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
@@ -174,7 +180,10 @@ class Orders:
         reached = await service.conductor.until(
             lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
         )
-        return "" if reached is State.IDLE else self._sentence()
+        if reached is not State.IDLE:
+            return self._sentence()
+        service.alarms.reset()
+        return ""
 
     def _sentence(self) -> str:
         faults = list(self._crew.faults.values())

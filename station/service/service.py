@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Awaitable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 from station.channel.line import Begin, Begun, Open, Outcome
@@ -18,7 +19,7 @@ from station.records.errors import RecordsError
 from station.records.model import InspectionRecord, Trigger
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
-from station.service.conductor import Conductor, Happened, event_of
+from station.service.conductor import Conductor, Happened, Work, event_of
 from station.service.crew import Crew
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
@@ -37,19 +38,9 @@ CYCLE = "cycle"
 _LEASE_S = 2.0
 _MEASURE_S = 1.0
 _FRAMES_PER_S = 30.0
+_FRAMES_LOST = 3
+"""Of so many frames one may be good before the camera counts as failed."""
 _RECORD_NO_RESULT_S = 1.0
-
-_WAITED_FOR: dict[State, Event] = {
-    **dict.fromkeys((State.APPROACHING, State.HOMING, State.RETREATING, State.HOMING_UNRECORDED), Event.ARM_FAULT),
-    **dict.fromkeys((State.REFERENCE, State.CAPTURING, State.CAPTURING_MEASURING), Event.CAMERA_FAULT),
-    **dict.fromkeys((State.RECORDING_ACCEPT, State.RECORDING_REJECT, State.RECORDING_RELEASE), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.RECORDING_HELD, State.RECORDING_LATCHED, State.ACCEPTING), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.CLEARING,), Event.RECORDS_FAULT),
-    **dict.fromkeys((State.AWAITING_MEASURE, State.AWAITING_MEASURE_LAST, State.MEASURING_LAST), Event.INTERNAL_FAULT),
-    **dict.fromkeys((State.JUDGING, State.SETTLING, State.SETTLING_MEASURING), Event.INTERNAL_FAULT),
-    State.RECOVERING: Event.ARM_FAULT,
-}
-"""Whose fault it is where a single wait is too long; the gripper's in all other states."""
 
 
 class Service:
@@ -94,7 +85,7 @@ class Service:
         self.records_fault: RecordsError | None = None
         """Why the records are not to be relied on, until they were opened again."""
         self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
-        self._background: set[asyncio.Task[None]] = set()
+        self._background: set[asyncio.Future[Event | None]] = set()
         self._told_late: State | None = None
 
     @property
@@ -130,7 +121,7 @@ class Service:
                 self.active.snapshot,
                 self._crew.simulated,
             )
-            limits = deadlines(self.active.recipe, self._pace())
+            limits = deadlines(self.active.recipe, self.pace())
             if self._settings.inspection_deadline_s is not None:
                 limits = limits._replace(inspection_s=min(limits.inspection_s, self._settings.inspection_deadline_s))
             now = Inspection(trigger, self.active, limits, self._configuration.camera.mm_per_px)
@@ -172,21 +163,21 @@ class Service:
 
     # What the cycle asks: see `Performer`.
 
-    def perform(self, action: Action, because: Happened) -> Awaitable[Event | None] | None:  # noqa: C901, PLR0911, PLR0912
-        """Begin an action of the cycle."""
+    def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
+        """Carry an action of the cycle out."""
         match action:
             case Action.OPEN_JAWS:
-                return self._inspector.open_jaws()
+                return self._inspector.open_jaws
             case Action.GO_HOME:
-                return self._inspector.go_home()
+                return self._inspector.go_home
             case Action.CHECK_DEVICES:
-                return self._check()
+                return self._check
             case Action.CLOSE_UNFINISHED:
-                return self._close_unfinished()
+                return self._close_unfinished
             case Action.RECOVER_ARM:
-                return self._recover_arm()
+                return self._recover_arm
             case Action.RECORD_TRIGGER:
-                return self._record_trigger()
+                return self._record_trigger
             case Action.ACCEPT_TRIGGER:
                 self._accept()
                 return None
@@ -205,14 +196,14 @@ class Service:
                 self._inspector.close_as_no_result(now, because.event, because.why)
                 return None
             case Action.RECORD:
-                return self._record(now)
+                return partial(self._record, now)
             case Action.PUBLISH:
                 self._publish(now)
                 return None
             case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
-                return self._inspector.place(now)
+                return partial(self._inspector.place, now)
             case _:
-                return getattr(self._inspector, action.value)(now)
+                return partial(getattr(self._inspector, action.value), now)
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
@@ -231,14 +222,10 @@ class Service:
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Keep the phases' times, and what hangs on a state."""
         self._told_late = None
-        if self._now is not None:
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state is not State.ACCEPTING
         self._crew.use(by_inspection=inspecting_now)
-        if not inspecting_now and self._now is not None and state is not State.ACCEPTING:
-            if self._now.standing is None:
-                self._unrecorded.append(self._now)
-            self._now = None
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
@@ -338,14 +325,13 @@ class Service:
 
     async def _close_unfinished(self) -> Event:
         async with self._closing:
-            while self._unrecorded:
-                now = self._unrecorded[0]
+            while (now := self.running) is not None:
                 now.outcome_name = "NO_RESULT"
                 if not now.interruptions:
                     now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
                 await self._record(now)
                 self._publish(now)
-                self._unrecorded.remove(now)
+            self._unrecorded.clear()
         return Event.UNFINISHED_CLOSED
 
     # Small parts.
@@ -360,10 +346,11 @@ class Service:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
 
-    def _pace(self) -> Pace:
+    def pace(self) -> Pace:
+        """What the deadlines follow from on this cell."""
         arm = self._configuration.arm
         return Pace(
-            frames_per_s=self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S,
+            frames_per_s=(self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S) / _FRAMES_LOST,
             arm_move_s=0.0 if self._crew.cell.arm is None else longest_move_s(arm),
             stroke_mm=self._crew.cell.gripper.max_width_mm,
             record_s=self._configuration.records.deadline_s,
@@ -377,16 +364,13 @@ class Service:
         now = self._now
         if now is None or now.accepted_s is None or self._told_late is self.state:
             return
-        since_s = time.monotonic() - now.accepted_s
+        since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
         found = late(now.limits, self.state, self.conductor.in_state_s, since_s)
-        if found is None:
-            return
-        self._told_late = self.state
-        what = f"took {found.took_s:.1f} s, {found.allowed_s:.1f} s are allowed"
-        if found.phase is None:
-            self.conductor.post(Event.LATE, f"the inspection {what}")
-        else:
-            self.conductor.post(_WAITED_FOR.get(self.state, Event.GRIPPER_FAULT), f"{self.state.value} {what}")
+        if found is not None:
+            self._told_late = self.state
+            what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
+            why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
+            self.conductor.post(found.event, why)
 
     def _in_background(self, work: Awaitable[Event | None]) -> None:
         task = asyncio.ensure_future(work)

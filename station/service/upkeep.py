@@ -1,7 +1,7 @@
 """Looks after what an inspection needs, outside of inspections: brings it back where that is safe, raises alarms."""
 
 import asyncio
-import logging
+import contextlib
 import time
 
 from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
@@ -17,8 +17,6 @@ from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-
-log = logging.getLogger(__name__)
 
 UPKEEP = "upkeep"
 PERIOD_S = 0.2
@@ -82,10 +80,13 @@ class Upkeep:
 
     async def _bring_back(self) -> None:
         service, now_s = self._service, time.monotonic()
-        if now_s >= self._again_s and (service.records_fault is not None or self._activation_is_lost):
+        activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
+        if now_s >= self._again_s and (service.records_fault is not None or activate):
             self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
             await self._open_records_again()
-            await self._activate()
+            if activate:
+                with contextlib.suppress(StationError):  # the gripper's watch says why it could not be
+                    await self._crew.activate_if_safe()
             self._again_s = time.monotonic() + self._pause_s
         entered_s = service.conductor.entered_s
         if service.records_fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
@@ -108,23 +109,11 @@ class Upkeep:
         except RecordsError as error:
             service.records_fault = error
 
-    async def _activate(self) -> None:
-        if not self._activation_is_lost or not self._others_are_well:
-            return
-        try:
-            await self._crew.activate_if_safe()
-        except StationError as error:
-            self._crew.watches[GRIPPER].refused(error)
-
-    @property
-    def _others_are_well(self) -> bool:
-        return set(self._crew.faults) <= {GRIPPER}
-
     def _show_conditions(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
         for name, watch in self._crew.watches.items():
-            alarms.device(name, watch.fault if watch.was_heard_or_tried else None)
+            alarms.device(name, watch.told_fault)
         fault = service.records_fault
         alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
         free_mb = service.records.status().free_bytes / _MB
@@ -136,7 +125,9 @@ class Upkeep:
         )
         alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
         alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
-        alarms.show(AlarmId.NO_RECIPE, "" if service.active is not None else self._gate.refusal()[1])
+        alarms.show(
+            AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
+        )
         self._orders.show_line()
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:

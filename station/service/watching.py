@@ -9,6 +9,7 @@ from station.errors import StationError
 
 PERIOD_S = 0.25
 FIRST_PAUSE_S = 0.25
+MEETING_S = 15.0
 
 log = logging.getLogger(__name__)
 
@@ -48,6 +49,12 @@ class DeviceWatch:
         self._look, self._longest_pause_s = look, longest_pause_s
         self._on_change, self._on_progress = on_change, on_progress
         self._again = asyncio.Event()
+        self._began_s = time.monotonic()
+
+    @property
+    def told_fault(self) -> StationError | None:
+        """What is wrong, where an operator is to know: a device that is only just being met has its time."""
+        return None if self.heard_s is None and time.monotonic() < self._began_s + MEETING_S else self.fault
 
     @property
     def age_s(self) -> float | None:

@@ -26,8 +26,8 @@ class ReferenceSettings(Settings):
     least_sharpness: float = setting(
         0.7,
         title="Least sharpness",
-        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where 0.4 of "
-        "its worst fog reaches it.",
+        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where 0.4 "
+        "of its worst fog reaches it.",
         gt=0.0,
         le=1.0,
     )
@@ -65,8 +65,8 @@ class ServiceSettings(Settings):
     inspection_deadline_s: float | None = setting(
         None,
         title="Inspection's deadline",
-        description="From trigger to outcome, where the line wants it sooner than the recipe's steps need at most; what "
-        "is not judged by then is NO_RESULT with the reason late. Null for the recipe's own.",
+        description="From trigger to outcome, where the line wants it sooner than the recipe's steps need at most; "
+        "what is not judged by then is NO_RESULT with the reason late. Null for the recipe's own.",
         unit="s",
         ge=1.0,
         le=600.0,

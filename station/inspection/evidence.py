@@ -1,0 +1,204 @@
+"""What a press says about its fruit in numbers: areas at given closings, the growth, and where the curve does not rise.
+
+Every number is asked for twice: as the most that it may be, from all points, and as the least that it surely is,
+from trusted points alone. The first keeps a fruit from PASS, the second proves a FAIL.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby, pairwise
+from statistics import median
+
+from station.inspection.monotone import wrong_frames
+from station.inspection.press import RELATIVE_NOISE, Flag, Measured, Press
+from station.settings.recipe_model import Recipe
+
+LIGHT_TOUCH = 0.5
+"""Below this share of the first damage threshold's closing a contact is too light to say anything for or against: a
+seed is outlined in place of the body (docs/robust.md, limits)."""
+
+_WINDOW_POINTS = 4
+"""Of which the median of pairwise slopes bears one that is wrong."""
+_WINDOW_MM = 2.0
+_LEAST_NOISE = 0.02
+"""Share of the largest area threshold below which a falling area is noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """The growth of the area over a few steps."""
+
+    mm2_per_mm: float
+    uncertainty_mm2_per_mm: float
+    from_closing_mm: float
+    to_closing_mm: float
+    trusted: bool
+    """It is at least a lower bound: every point in it is trusted."""
+
+    @property
+    def least_mm2_per_mm(self) -> float:
+        """What it is at least."""
+        return self.mm2_per_mm - self.uncertainty_mm2_per_mm
+
+    @property
+    def most_mm2_per_mm(self) -> float:
+        """What it may be."""
+        return self.mm2_per_mm + self.uncertainty_mm2_per_mm
+
+
+class Evidence:
+    """A press in the order of its closing, beside its recipe."""
+
+    def __init__(self, press: Press, recipe: Recipe) -> None:
+        self._recipe = recipe
+        self._onset_uncertainty_mm = press.onset_uncertainty_mm
+        self.points = _in_order(press.points)
+
+    @property
+    def judged_from_mm(self) -> float:
+        """The closing from which the curve says something."""
+        return LIGHT_TOUCH * self._recipe.damage.area[0].closing_mm
+
+    @cached_property
+    def judged(self) -> list[Measured]:
+        """All points but those of light touches."""
+        return [point for point in self.points if point.closing_mm >= self.judged_from_mm]
+
+    @cached_property
+    def needed(self) -> list[Measured]:
+        """The judged points up to the first that reaches the last damage threshold's closing."""
+        last_mm = self._recipe.damage.area[-1].closing_mm
+        before = [point for point in self.judged if point.closing_mm < last_mm]
+        return self.judged[: len(before) + 1]
+
+    def bounds(self, point: Measured) -> bool:
+        """Whether the area is surely no smaller: a contact that the border cuts is larger still."""
+        return self.doubts(point) <= {Flag.CUT_BY_BORDER} and point not in self.falling
+
+    def doubts(self, point: Measured) -> frozenset[Flag]:
+        """The point's flags, with those that follow from its values."""
+        doubts = set(point.flags)
+        if point.confidence is None or point.confidence < self._recipe.segmentation.robust.least_confidence:
+            doubts.add(Flag.LOW_CONFIDENCE)
+        if point.area_mm2 == 0 and Flag.UNDECIDED not in doubts:
+            doubts.add(Flag.NO_CONTACT)
+        return frozenset(doubts)
+
+    @cached_property
+    def falling(self) -> list[Measured]:
+        """Judged points whose area does not fit a closing gripper."""
+        areas = [point.area_mm2 for point in self.judged]
+        least_noise = _LEAST_NOISE * self._recipe.damage.area[-1].area_mm2
+        widths = [-point.closing_mm for point in self.judged]
+        return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, RELATIVE_NOISE, least_noise)]
+
+    def area_at(self, closing_mm: float) -> tuple[float, float] | None:
+        """Area and uncertainty between the two points around a closing, mm²; None where it was not reached.
+
+        Args:
+            closing_mm: where.
+        """
+        return _between(self.points, closing_mm)
+
+    def least_area_mm2(self, closing_mm: float) -> float | None:
+        """The area that is surely reached at a closing; None where nothing trusted was measured up to it.
+
+        The true closing may be more than the measured one by the onset's uncertainty, so it is looked for that much
+        sooner. Beyond the last trusted point the area is at least that point's, since it rises.
+
+        Args:
+            closing_mm: where.
+        """
+        place_mm = closing_mm - self._onset_uncertainty_mm
+        for before, after in pairwise(self.judged):
+            if before.closing_mm <= place_mm <= after.closing_mm and self.bounds(before) and self.bounds(after):
+                area, uncertainty = _between((before, after), place_mm) or (0.0, 0.0)
+                return area - uncertainty
+        trusted = [point for point in self.judged if point.closing_mm <= place_mm and self.bounds(point)]
+        return trusted[-1].area_mm2 - trusted[-1].area_uncertainty_mm2 if trusted else None
+
+    @cached_property
+    def growths(self) -> list[Growth]:
+        """The growth over every run of judged steps."""
+        return [self._growth(window) for window in _windows(self.judged)]
+
+    @property
+    def latest_growth(self) -> Growth | None:
+        """The growth over the last steps, light touches too; None before there are enough."""
+        windows = _windows([point for point in self.points if point.closing_mm >= 0])
+        return self._growth(windows[-1]) if windows and len(windows[-1]) >= _WINDOW_POINTS else None
+
+    @property
+    def begins_at_mm(self) -> float | None:
+        """Where the needed points' own line starts from no area; None where they show none."""
+        steps = _slopes(self.needed)
+        slope = median(steps) if steps else 0.0
+        if slope <= 0:
+            return None
+        return median(point.closing_mm - point.area_mm2 / slope for point in self.needed)
+
+    def _growth(self, window: Sequence[Measured]) -> Growth:
+        """Theil and Sen's slope; its uncertainty is that of a fitted line through points equally uncertain.
+
+        Sen, Journal of the American Statistical Association 63 (1968) 1379.
+        """
+        slope = median(_slopes(window))
+        middle_mm = sum(point.closing_mm for point in window) / len(window)
+        spread_mm = sum((point.closing_mm - middle_mm) ** 2 for point in window) ** 0.5
+        uncertainty = max(point.area_uncertainty_mm2 for point in window) / spread_mm
+        trusted = all(self.bounds(point) for point in window)
+        return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, trusted)
+
+
+def _in_order(points: Sequence[Measured]) -> list[Measured]:
+    """The points by closing, with those of one closing made one: the gripper has counts, so two steps may share it."""
+    ordered = sorted(points, key=lambda point: point.closing_mm)
+    return [_one(list(group)) for _, group in groupby(ordered, key=lambda point: point.closing_mm)]
+
+
+def _one(points: list[Measured]) -> Measured:
+    """One point for several of one closing: the largest area, the least trust."""
+    areas = [point.area_mm2 for point in points]
+    largest = max(points, key=lambda point: (point.area_mm2, point.area_px))
+    confidences = [point.confidence for point in points]
+    return replace(
+        largest,
+        area_uncertainty_mm2=max(*(point.area_uncertainty_mm2 for point in points), max(areas) - min(areas)),
+        confidence=None if None in confidences else min(c for c in confidences if c is not None),
+        flags=frozenset[Flag]().union(*(point.flags for point in points)),
+    )
+
+
+def _between(points: Sequence[Measured], closing_mm: float) -> tuple[float, float] | None:
+    for point in points:
+        if point.closing_mm == closing_mm:
+            return point.area_mm2, point.area_uncertainty_mm2
+    for before, after in pairwise(points):
+        if before.closing_mm < closing_mm < after.closing_mm:
+            share = (closing_mm - before.closing_mm) / (after.closing_mm - before.closing_mm)
+            area = before.area_mm2 + share * (after.area_mm2 - before.area_mm2)
+            return area, max(before.area_uncertainty_mm2, after.area_uncertainty_mm2)
+    return None
+
+
+def _windows(points: Sequence[Measured]) -> list[Sequence[Measured]]:
+    """Runs of at least four points and two millimetres; all of fewer points where there are two."""
+    windows: list[Sequence[Measured]] = []
+    for end in range(len(points), 0, -1):
+        start = end - _WINDOW_POINTS
+        while start > 0 and points[end - 1].closing_mm - points[start].closing_mm < _WINDOW_MM:
+            start -= 1
+        if start < 0:
+            break
+        windows.append(points[start:end])
+    return windows[::-1] or ([points] if len(points) > 1 else [])
+
+
+def _slopes(points: Sequence[Measured]) -> list[float]:
+    """Between every two points, mm²/mm."""
+    return [
+        (after.area_mm2 - before.area_mm2) / (after.closing_mm - before.closing_mm)
+        for place, before in enumerate(points)
+        for after in points[place + 1 :]
+    ]

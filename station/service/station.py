@@ -1,0 +1,174 @@
+"""The station's process: everything put together, begun and ended in order."""
+
+import asyncio
+import contextlib
+import logging
+import uuid
+from collections.abc import Callable, Coroutine
+from importlib.metadata import version
+from pathlib import Path
+
+from station.errors import StationError
+from station.inspection.states import STATES
+from station.records.errors import RecordsError
+from station.records.records import Records
+from station.service.alarm_desk import AlarmDesk
+from station.service.crew import Crew
+from station.service.eye import Eye
+from station.service.health import HealthServer, Liveness
+from station.service.inspector import Inspector
+from station.service.keeping import Kept
+from station.service.line_server import LineServer
+from station.service.metrics import Metrics
+from station.service.orders import Orders
+from station.service.readiness import Gate
+from station.service.recipe_book import RecipeBook
+from station.service.reference import Golden
+from station.service.service import CYCLE, Service
+from station.service.upkeep import UPKEEP, Upkeep
+from station.settings.configuration import Configuration
+from station.settings.plc import line_endpoint
+
+log = logging.getLogger(__name__)
+
+PROGRAM = "fruit-station"
+_USUAL_DEADLINE_S = 30.0
+
+
+class Station:
+    """One start of the station.
+
+    Args:
+        configuration: the site's, or its last good form.
+        broken: what was wrong with the configuration's files; empty for nothing.
+    """
+
+    def __init__(self, configuration: Configuration, broken: str = "") -> None:
+        self.boot = uuid.uuid4().hex
+        self._configuration, self._broken = configuration, broken
+        self._stop = asyncio.Event()
+        self.service: Service | None = None
+        """The cycle, once `run` has put it together."""
+
+    def stop(self) -> None:
+        """Ask for an orderly end; asking again changes nothing."""
+        self._stop.set()
+
+    async def run(self, on_started: Callable[[int], None]) -> None:
+        """Run until `stop` is called; by then the running inspection has its outcome and the jaws are open.
+
+        Args:
+            on_started: told the port of metrics and health once all is served. Devices may still be away.
+
+        Raises:
+            StationError: the station cannot even begin: an address is in use.
+        """
+        async with contextlib.AsyncExitStack() as stack:
+            tasks, port = await self._put_together(stack)
+            on_started(port)
+            await self._until_asked(tasks)
+            await self._end()
+
+    async def _put_together(self, stack: contextlib.AsyncExitStack) -> tuple[tuple[asyncio.Task[None], ...], int]:
+        configuration, settings = self._configuration, self._configuration.service
+        versions = {PROGRAM: version(PROGRAM)}
+        liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
+        kept, alarms = Kept(configuration.home), AlarmDesk(metrics)
+        eye = Eye(Golden(kept), settings.reference)
+        stack.callback(eye.close)
+        records = Records(configuration.home / "records", configuration.records, self.boot)
+        stack.push_async_callback(records.close)
+        metrics.watch_records(records.status)
+
+        def device_changed(name: str, fault: StationError | None) -> None:
+            alarms.device(name, crew.watches[name].told_fault)
+            service.device_changed(fault)
+
+        def progress(name: str) -> None:
+            liveness.progress(name)
+            if crew.watches[name].fault is None:
+                metrics.heard(name)
+
+        crew = Crew(configuration, device_changed, progress)
+        inspector = Inspector(crew, eye, settings)
+        self.service = service = Service(configuration, records, crew, inspector, alarms, metrics, liveness, versions)
+        try:
+            await records.reopen()
+            await alarms.recall(records)
+        except RecordsError as error:
+            service.records_fault = error
+        book = RecipeBook(configuration.recipes_folder, kept)
+        await asyncio.to_thread(book.read)
+        service.active = book.last_active()
+        orders = Orders(service, crew, book, metrics)
+        gate = Gate(self.boot, service, crew, orders, book, liveness)
+        upkeep = Upkeep(
+            service,
+            crew,
+            gate,
+            orders,
+            book,
+            metrics,
+            liveness,
+            broken=self._broken,
+            reserve_mb=configuration.records.free_reserve_mb,
+            longest_pause_s=settings.retry_longest_s,
+        )
+        line = LineServer(
+            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate
+        )
+        tasks = [self._begin(stack, line.serve(), "line server")]
+        address = configuration.metrics
+        health = HealthServer(address.host, address.port, metrics, liveness, gate.readiness, versions)
+        port = await health.start()
+        stack.push_async_callback(health.close)
+        stack.push_async_callback(crew.close)
+        await crew.open()
+        tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
+        self._begin(stack, alarms.keep(records), "alarms' records")
+        for name in (*crew.watches, CYCLE, UPKEEP):
+            liveness.watch(name, settings.progress_s)
+        return tuple(tasks), port
+
+    async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
+        """Wait for the order to end; a task that nothing works without and that ended by a bug ends the process."""
+        asked = asyncio.create_task(self._stop.wait(), name="order to end")
+        try:
+            done, _ = await asyncio.wait({asked, *needed}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done - {asked}:
+                task.result()
+                raise StationError(f"{task.get_name()} has ended by itself; start the station again")
+        finally:
+            asked.cancel()
+            await asyncio.gather(asked, return_exceptions=True)
+
+    async def _end(self) -> None:
+        """Let the running inspection come to its outcome, the jaws open and the arm go home."""
+        service = self.service
+        if service is None:
+            return
+        service.stop_asked = True
+        limit_s = self._configuration.service.clean_up_deadline_s
+        try:
+            async with asyncio.timeout(limit_s):
+                await service.conductor.until(lambda state: STATES[state].may_exit)
+        except TimeoutError:
+            log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].sentence)
+
+    @staticmethod
+    def _begin(stack: contextlib.AsyncExitStack, work: Coroutine[None, None, None], name: str) -> asyncio.Task[None]:
+        task = asyncio.create_task(work, name=name)
+
+        async def end() -> None:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+        stack.push_async_callback(end)
+        return task
+
+
+def _made_room_for(endpoint: str) -> str:
+    """The endpoint, with its folder made where it is a socket file; only this user may reach it there."""
+    if endpoint.startswith("ipc://"):
+        Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return endpoint

@@ -1,0 +1,90 @@
+"""Deadlines as values."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from station.channel.line import Begun
+from station.errors import BadInputError
+from station.inspection.cycle import TABLE, Event
+from station.inspection.deadlines import FAULT_OF, LONGEST_S, Pace, deadlines, late
+from station.inspection.states import STATES, State
+from station.settings.recipe import load_recipe
+from station.vocabulary import Refusal
+
+ROOT = Path(__file__).resolve().parents[2]
+RECIPE = load_recipe(ROOT / "recipes" / "strawberry.yaml")
+PACE = Pace(frames_per_s=30.0, arm_move_s=2.0, stroke_mm=53.0, record_s=0.1, measure_s=0.05)
+WAITING = {State.UNKNOWN, State.STOPPED, State.IDLE, State.HELD, State.CARRIED, State.LATCHED}
+
+
+def changed(**imaging_or_steps: object):
+    """The recipe with some fields of its steps or its imaging changed."""
+    parts = {
+        name: getattr(RECIPE, name).model_copy(
+            update={k: v for k, v in imaging_or_steps.items() if k in type(getattr(RECIPE, name)).model_fields}
+        )
+        for name in ("steps", "imaging")
+    }
+    return RECIPE.model_copy(update=parts)
+
+
+def test_every_state_that_waits_for_something_has_a_deadline_that_the_cycle_answers():
+    limits = deadlines(RECIPE, PACE)
+    assert set(limits.phases_s) == set(State) - WAITING
+    for state, event in FAULT_OF.items():
+        following = TABLE[state, event].state
+        assert following != state, (state, event)
+        assert STATES[following].refusal is not None
+
+
+def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
+    limits = deadlines(RECIPE, PACE)
+    steps_s = 12 * (1 / 20 + 0.2 + 3 / 30)
+    assert 5 / 30 + 2 * 2.0 + steps_s < limits.inspection_s < 60
+    assert Begun(sequence=1, deadline_s=limits.inspection_s).refusal is None
+    assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * 0.2)
+
+
+@given(st.integers(1, 10), st.floats(0, 2), st.integers(1, 20), st.floats(0, 5), st.floats(15, 60), st.floats(0, 0.5))
+def test_more_to_do_never_has_a_nearer_deadline(frames, settle, steps, arm, rate, measure):
+    recipe = changed(frames_per_step=frames, settle_s=settle, number=steps)
+    pace = Pace(rate, arm, 53.0, 0.1, measure)
+    here = deadlines(recipe, pace)
+    more = (
+        deadlines(changed(frames_per_step=frames + 1, settle_s=settle, number=steps), pace),
+        deadlines(changed(frames_per_step=frames, settle_s=settle + 0.5, number=steps), pace),
+        deadlines(changed(frames_per_step=frames, settle_s=settle, number=steps + 1), pace),
+        deadlines(recipe, pace._replace(arm_move_s=arm + 1)),
+        deadlines(recipe, pace._replace(frames_per_s=rate / 2)),
+    )
+    for later in more:
+        assert later.inspection_s > here.inspection_s
+        assert all(later.phases_s[state] >= here.phases_s[state] for state in here.phases_s)
+
+
+def test_late_names_what_was_waited_for_and_the_inspection_first():
+    limits = deadlines(RECIPE, PACE)
+    allowed = limits.phases_s[State.MOVING]
+    assert late(limits, State.MOVING, allowed, 1.0) is None
+    slow = late(limits, State.MOVING, allowed + 0.1, 1.0)
+    assert slow is not None
+    assert (slow.event, slow.state, slow.allowed_s) == (Event.GRIPPER_FAULT, State.MOVING, allowed)
+    whole = late(limits, State.MOVING, allowed + 0.1, limits.inspection_s + 0.1)
+    assert whole is not None
+    assert whole.event == Event.LATE
+    assert late(limits, State.IDLE, 1e9, None) is None
+    assert late(limits, State.HELD, 1e9, None) is None
+
+
+def test_a_recipe_that_takes_longer_than_the_plc_can_be_told_is_refused():
+    with pytest.raises(BadInputError, match=r"recipe strawberry: an inspection may take \d+ s here.*shorter settle"):
+        deadlines(changed(settle_s=10.0, number=100), PACE)
+    assert Begun.model_fields["deadline_s"].metadata[1].le == LONGEST_S
+
+
+def test_an_inspections_phases_are_those_in_which_the_station_is_busy():
+    busy = {state for state, facts in STATES.items() if facts.refusal == Refusal.BUSY}
+    assert busy <= set(FAULT_OF)

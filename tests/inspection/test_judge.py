@@ -1,0 +1,315 @@
+"""The judge: what passes, what is proven damaged, and what is neither."""
+
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from station.inspection.judge import early_stop, judge
+from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.settings.recipe import load_recipe
+from station.settings.recipe_model import Recipe
+from station.vision.contact import Flag as MeasurementFlag
+from station.vocabulary import Reason
+
+ROOT = Path(__file__).resolve().parents[2]
+STRAWBERRY = load_recipe(ROOT / "recipes" / "strawberry.yaml")
+BLUEBERRY = load_recipe(ROOT / "recipes" / "blueberry.yaml")
+
+
+def point(closing_mm: float, area_mm2: float, *flags: Flag, confidence: float | None = 0.9) -> Measured:
+    """A step as a sound image gives it."""
+    px = round(area_mm2 / 0.0266**2)
+    return Measured(closing_mm, area_mm2, px, usual_uncertainty_mm2(area_mm2), confidence, frozenset(flags))
+
+
+def pressed(growth: float, to_mm: int = 12, **changes: object) -> Press:
+    """A strawberry whose area grows evenly, until the early stop ends it."""
+    points: list[Measured] = []
+    for closing in range(to_mm + 1):
+        points.append(point(float(closing), min(217.0, 2 + growth * closing)))
+        if early_stop(Press(35.0, 1.0, tuple(points)), STRAWBERRY):
+            break
+    return replace(Press(35.0, 1.0, tuple(points)), **changes)
+
+
+def spoilt(press: Press, closing_mm: float, *flags: Flag, **changes: object) -> Press:
+    """The press with one of its points changed."""
+    return replace(
+        press,
+        points=tuple(
+            replace(p, flags=p.flags | set(flags), **changes) if p.closing_mm == closing_mm else p for p in press.points
+        ),
+    )
+
+
+def test_a_sound_fruit_passes_with_its_areas_and_growth():
+    verdict = judge(pressed(15), STRAWBERRY)
+    assert (verdict.outcome, verdict.reasons, verdict.partial, verdict.stopped) == ("PASS", (), False, None)
+    assert [(area.closing_mm, area.area_mm2, area.limit_mm2) for area in verdict.areas] == [
+        (4, pytest.approx(62), 165), (8, pytest.approx(122), None), (12, pytest.approx(182), None)
+    ]  # fmt: skip
+    assert verdict.growth
+    assert verdict.growth.mm2_per_mm == pytest.approx(15)
+    assert verdict.deciding
+    assert verdict.deciding.closing_mm == 4
+
+
+def test_a_full_field_after_the_last_threshold_spares_a_sound_fruit_and_passes_it():
+    verdict = judge(pressed(27), STRAWBERRY)
+    assert verdict.outcome == "PASS"
+    assert verdict.partial
+    assert verdict.stopped
+    assert verdict.stopped.sentence == (
+        "No further step was made at 7.0 mm of closing: the area, 191.0 mm², is over the early stop's 190 mm²."
+    )
+    assert verdict.areas[-1].area_mm2 is None
+
+
+def test_a_soft_fruit_fails_with_value_limit_and_closing():
+    verdict = judge(pressed(48), STRAWBERRY)
+    assert verdict.outcome == "FAIL"
+    assert verdict.reasons == (Reason.GROWTH_OVER_LIMIT, Reason.EARLY_STOP)
+    growth = verdict.findings[0]
+    assert (growth.value, growth.limit, growth.closing_mm) == (pytest.approx(48), 41, 4)
+    assert growth.sentence == (
+        "From 2.0 to 4.0 mm of closing the area grows by 48.0 ± 6.9 mm² a millimetre, over the limit of 41."
+    )
+
+
+def test_an_early_stop_before_the_threshold_proves_the_area_over_it():
+    points = tuple(point(0.5 * step, 70.0 * 0.5 * step) for step in range(7))
+    verdict = judge(Press(35.0, 0.2, points), STRAWBERRY)
+    assert verdict.outcome == "FAIL"
+    assert Reason.AREA_OVER_LIMIT in verdict.reasons
+    assert "is at least 199.5 mm², over the limit of 165 mm²" in verdict.findings[0].sentence
+    assert verdict.deciding == points[-1]
+
+
+@pytest.mark.parametrize(("area", "outcome"), [(155.0, "PASS"), (160.0, "NO_RESULT"), (200.0, "FAIL")])
+def test_an_area_about_its_limit_neither_passes_nor_fails(area, outcome):
+    recipe = STRAWBERRY.model_copy(
+        update={
+            "damage": STRAWBERRY.damage.model_copy(update={"growth_mm2_per_mm": 100.0}),
+            "early_stop": STRAWBERRY.early_stop.model_copy(update={"area_mm2": 260.0, "growth_mm2_per_mm": 100.0}),
+        }
+    )
+    press = Press(35.0, 0.0, tuple(point(float(c), area + (c - 4) * area / 4) for c in range(5)))
+    press = replace(press, points=(*press.points, *(point(float(c), area + 5 * (c - 4)) for c in range(5, 13))))
+    verdict = judge(press, recipe)
+    assert verdict.outcome == outcome
+    assert (Reason.AREA_OVER_LIMIT in verdict.reasons) == (outcome != "PASS")
+
+
+@pytest.mark.parametrize(
+    ("flag", "reason"),
+    [
+        (Flag.NO_CONTACT, Reason.CONTACT_LOST),
+        (Flag.UNDECIDED, Reason.LOW_CONFIDENCE),
+        (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER),
+        (Flag.SATURATED, Reason.SATURATED),
+        (Flag.LOW_CONFIDENCE, Reason.LOW_CONFIDENCE),
+        (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD),
+    ],
+)
+def test_a_step_that_is_not_trusted_is_no_pass(flag, reason):
+    verdict = judge(spoilt(pressed(20), 3.0, flag), STRAWBERRY)
+    assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (reason,))
+    assert "At 3.0 mm of closing" in verdict.findings[0].sentence
+    # Beyond the last damage threshold, and on a light touch, it is no criterion.
+    for closing in (1.0, 9.0):
+        assert judge(spoilt(pressed(15), closing, flag), STRAWBERRY).outcome == "PASS"
+
+
+@pytest.mark.parametrize("confidence", [None, 0.49])
+def test_a_confidence_that_is_low_or_unknown_is_no_pass(confidence):
+    verdict = judge(spoilt(pressed(20), 4.0, confidence=confidence), STRAWBERRY)
+    assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
+    assert "0.5 is asked for" in verdict.findings[0].sentence
+
+
+def test_a_contact_cut_by_the_border_is_a_lower_bound():
+    over = Press(35.0, 0.0, tuple(point(float(c), 45.0 * c, *[Flag.CUT_BY_BORDER][: c > 1]) for c in range(6)))
+    assert judge(over, STRAWBERRY).outcome == "FAIL"
+    assert judge(spoilt(pressed(20), 4.0, Flag.CUT_BY_BORDER), STRAWBERRY).outcome == "NO_RESULT"
+
+
+def test_a_contact_that_is_lost_or_does_not_rise_is_no_result():
+    lost = judge(spoilt(pressed(20), 3.0, area_mm2=0.0, area_px=0), STRAWBERRY)
+    assert lost.outcome == "NO_RESULT"
+    assert {Reason.CONTACT_LOST, Reason.AREA_NOT_RISING} <= set(lost.reasons)
+    fallen = judge(spoilt(pressed(20), 4.0, area_mm2=30.0), STRAWBERRY)
+    assert (fallen.outcome, fallen.reasons) == ("NO_RESULT", (Reason.AREA_NOT_RISING,))
+    assert "4.0 mm (30.0 mm²) does not fit the other steps" in fallen.findings[0].sentence
+
+
+def test_an_onset_seen_too_soon_does_not_make_a_soft_fruit_pass():
+    late = Press(37.0, 0.4, tuple(point(float(c), max(0.5, 34.0 * (c - 2))) for c in range(7)))
+    verdict = judge(late, STRAWBERRY)
+    assert verdict.outcome == "NO_RESULT"
+    assert "rises as if the contact had begun at 2.0 mm" in verdict.findings[0].sentence
+
+
+def test_nothing_touched_and_a_wrong_fruit():
+    nothing = judge(Press(None, 0.0, ()), STRAWBERRY)
+    assert (nothing.outcome, nothing.reasons, nothing.deciding) == ("NO_RESULT", (Reason.NO_CONTACT,), None)
+    for width in (15.0, 60.0):
+        wrong = judge(pressed(48, onset_mm=width), STRAWBERRY)
+        assert wrong.outcome == "NO_RESULT"
+        assert Reason.OUT_OF_RANGE in wrong.reasons
+        assert "Strawberry is meant for 22 to 53 mm" in " ".join(finding.sentence for finding in wrong.findings)
+
+
+@pytest.mark.parametrize("reason", [Reason.LATE, Reason.CALLED_OFF, Reason.CAMERA_FAULT, Reason.REFERENCE_BAD])
+def test_an_interruption_is_no_result_whatever_was_measured(reason):
+    for growth in (15, 48):
+        verdict = judge(pressed(growth, interruptions=(reason,)), STRAWBERRY)
+        assert verdict.outcome == "NO_RESULT"
+        assert reason in verdict.reasons
+
+
+def test_steps_that_end_for_no_reason_are_not_taken_for_a_pass():
+    short = judge(pressed(20, to_mm=6), STRAWBERRY)
+    assert (short.outcome, short.reasons) == ("NO_RESULT", (Reason.INTERNAL_FAULT,))
+    assert "ended at 6.0 mm of closing, before 12 mm" in short.findings[0].sentence
+    missing = judge(pressed(20, to_mm=3, interruptions=(Reason.CALLED_OFF,)), STRAWBERRY)
+    assert missing.partial
+    assert missing.areas[0].area_mm2 is None
+
+
+def test_the_closing_limit_ends_the_steps():
+    press = pressed(15)
+    assert early_stop(press, STRAWBERRY) is None
+    finding = early_stop(replace(press, points=(*press.points, point(12.5, 190.0))), STRAWBERRY)
+    assert finding
+    assert "closing limit of 12.5 mm" in finding.sentence
+
+
+def test_steps_that_share_a_closing_are_one_of_the_least_trust():
+    press = pressed(20)
+    doubled = replace(press, points=(*press.points, point(4.0, 120.0, confidence=0.2)))
+    verdict = judge(doubled, STRAWBERRY)
+    assert Reason.LOW_CONFIDENCE in verdict.reasons
+    assert verdict.areas[0].area_mm2 == 120.0
+
+
+def test_a_point_that_is_no_number_is_refused():
+    with pytest.raises(ValueError, match="finite"):
+        replace(point(1.0, 1.0), area_mm2=float("nan"))
+    with pytest.raises(ValueError, match="negative"):
+        replace(point(1.0, 1.0), area_px=-1)
+
+
+def test_the_judges_flags_are_the_measurements():
+    assert [(flag.name, flag.value) for flag in Flag] == [(flag.name, flag.value) for flag in MeasurementFlag]
+
+
+FLAGS = st.sets(st.sampled_from(list(Flag)), max_size=1)
+STEPS = st.tuples(st.floats(0, 60), st.one_of(st.just(0.9), st.floats(0, 1), st.none()), st.just(set()) | FLAGS)
+
+
+@st.composite
+def presses(draw: st.DrawFn) -> Press:
+    """Mostly rising curves of plain or of doubtful steps."""
+    steps = draw(st.lists(STEPS, min_size=0, max_size=18))
+    steep, area = draw(st.sampled_from([0.3, 1.0])), 0.0
+    points: list[Measured] = []
+    for number, (growth, confidence, flags) in enumerate(steps):
+        area += growth * steep
+        points.append(point(number * draw(st.sampled_from([1.0, 0.97])), area, *flags, confidence=confidence))
+    onset = draw(st.sampled_from([15.0, 15.0, 30.0, None]))
+    late = draw(st.sampled_from([(), (), (Reason.LATE,)]))
+    return Press(onset, draw(st.sampled_from([0.0, 0.4, 1.0])), tuple(points), late)
+
+
+RECIPES = st.sampled_from([STRAWBERRY, BLUEBERRY])
+EVEN = st.floats(3, 60).map(lambda growth: Press(15.0, 0.4, tuple(point(float(c), growth * c) for c in range(17))))
+PRESSES = presses() | EVEN
+
+
+@given(PRESSES, RECIPES, st.lists(st.floats(0, 20), min_size=18, max_size=18))
+def test_more_area_never_turns_fail_into_pass(press, recipe, more):
+    added, points = 0.0, []
+    for step, extra in zip(sorted(press.points, key=lambda p: p.closing_mm), more, strict=False):
+        added += extra
+        points.append(replace(step, area_mm2=step.area_mm2 + added))
+    if judge(press, recipe).outcome == "FAIL":
+        assert judge(replace(press, points=tuple(points)), recipe).outcome != "PASS"
+
+
+@given(PRESSES, RECIPES, st.floats(1, 3))
+def test_a_larger_press_never_turns_fail_into_pass(press, recipe, factor):
+    larger = tuple(
+        replace(p, area_mm2=p.area_mm2 * factor, area_uncertainty_mm2=p.area_uncertainty_mm2 * factor)
+        for p in press.points
+    )
+    if judge(press, recipe).outcome == "FAIL":
+        assert judge(replace(press, points=larger), recipe).outcome != "PASS"
+
+
+@given(PRESSES, RECIPES, st.integers(0, 17), st.sampled_from([*Flag, None]), st.sampled_from([*Reason, None]))
+def test_less_trust_never_gives_a_pass(press, recipe, number, flag, reason):
+    points = list(press.points)
+    if number < len(points):
+        doubted = replace(points[number], flags=points[number].flags | ({flag} if flag else set()), confidence=0.0)
+        points[number] = doubted
+    interruptions = (*press.interruptions, *([reason] if reason else []))
+    doubtful = replace(press, points=tuple(points), interruptions=interruptions)
+    if judge(press, recipe).outcome != "PASS":
+        assert judge(doubtful, recipe).outcome != "PASS"
+    if reason:
+        assert judge(doubtful, recipe).outcome == "NO_RESULT"
+
+
+@given(PRESSES, RECIPES, st.integers())
+def test_the_order_of_the_points_does_not_matter(press, recipe, seed):
+    shuffled = list(press.points)
+    Random(seed).shuffle(shuffled)
+    assert judge(replace(press, points=tuple(shuffled)), recipe) == judge(press, recipe)
+
+
+def in_other_units(recipe: Recipe, factor: float) -> Recipe:
+    """The recipe with its areas in a unit `factor` times smaller."""
+    damage, stop = recipe.damage, recipe.early_stop
+    area = tuple(limit.model_copy(update={"area_mm2": limit.area_mm2 * factor}) for limit in damage.area)
+    growth = damage.growth_mm2_per_mm * factor
+    limits = {"area_mm2": stop.area_mm2 * factor, "growth_mm2_per_mm": stop.growth_mm2_per_mm * factor}
+    return recipe.model_copy(
+        update={
+            "damage": damage.model_copy(update={"area": area, "growth_mm2_per_mm": growth}),
+            "early_stop": stop.model_copy(update=limits),
+        }
+    )
+
+
+@given(PRESSES, RECIPES, st.sampled_from([0.25, 4.0, 1024.0]))
+def test_the_unit_of_the_areas_does_not_matter(press, recipe, factor):
+    scaled = tuple(
+        replace(p, area_mm2=p.area_mm2 * factor, area_uncertainty_mm2=p.area_uncertainty_mm2 * factor)
+        for p in press.points
+    )
+    there, here = judge(replace(press, points=scaled), in_other_units(recipe, factor)), judge(press, recipe)
+    assert (there.outcome, there.reasons, there.partial) == (here.outcome, here.reasons, here.partial)
+
+
+@given(PRESSES, RECIPES)
+def test_every_verdict_explains_itself(press, recipe):
+    verdict = judge(press, recipe)
+    assert (verdict.outcome == "PASS") == (not verdict.findings)
+    if verdict.outcome == "FAIL":
+        assert any(finding.proves for finding in verdict.findings)
+    for finding in verdict.findings:
+        assert finding.sentence[0].isupper()
+        assert finding.sentence.endswith(".")
+        if finding.limit is not None and finding.value is not None:
+            assert any(f"{finding.limit:{form}}" in finding.sentence for form in ("g", ".1f"))
+    assert early_stop(press, recipe) == verdict.stopped
+
+
+def test_both_passes_and_fails_are_drawn():
+    outcomes = {judge(Press(15.0, 0.4, tuple(point(float(c), g * c) for c in range(17))), BLUEBERRY).outcome
+                for g in (8.0, 16.5, 30.0)}  # fmt: skip
+    assert outcomes == {"PASS", "NO_RESULT", "FAIL"}

@@ -1,0 +1,216 @@
+"""The station's own process, in this one, on a simulated bench: real drivers, a channel client in the PLC's place."""
+
+import asyncio
+import contextlib
+import itertools
+import json
+import os
+import socket
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    CommandName,
+    Line,
+    Noted,
+    Open,
+    Outcome,
+    Published,
+    Resume,
+    StationState,
+)
+from station.inspection.states import State
+from station.service.station import Station
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.plc import line_endpoint
+from station.settings.recipe import load_recipes
+from station.twin.process import Twin, TwinOptions
+
+PATIENCE_S = 60.0
+NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
+_HOSTS = itertools.count(1)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+async def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+    """Poll until something is so."""
+    deadline_s = time.monotonic() + patience_s
+    while True:
+        value = what()
+        if asyncio.iscoroutine(value):
+            value = await value
+        if value:
+            return value
+        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
+        await asyncio.sleep(0.02)
+
+
+@dataclass
+class LineClient:
+    """What the PLC interface does, by hand."""
+
+    client: ChannelClient
+    said: Line = Line(
+        plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=()
+    )
+    ids: Any = field(default_factory=lambda: itertools.count(1))
+
+    async def state(self) -> StationState:
+        return await self.client.ask(self.said, StationState, deadline_s=20)
+
+    async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
+        return await self.client.ask(Command(command=command, argument=argument), CommandDone, deadline_s=40)
+
+    async def begin(self, trigger_id: int | None = None) -> Begun:
+        request = Begin(trigger_id=trigger_id or next(self.ids), encoder=7, lot="LOT 1")
+        return await self.client.ask(request, Begun, deadline_s=20)
+
+    async def outcome(self, sequence: int | None) -> Outcome:
+        assert sequence is not None
+        return await self.client.ask(AwaitOutcome(sequence=sequence), Outcome, deadline_s=PATIENCE_S)
+
+    async def publish(self, outcome: Outcome) -> None:
+        await self.client.ask(Published(outcome=outcome), Noted, deadline_s=20)
+        await self.client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
+
+    async def open(self) -> Open:
+        return await self.client.ask(Resume(), Open, deadline_s=20)
+
+    async def ready(self) -> StationState:
+        async def look() -> StationState | None:
+            state = await self.state()
+            return state if state.ready else None
+
+        return await eventually(look)
+
+    async def inspect(self) -> Outcome:
+        """One fruit, from a ready station to an acknowledged outcome."""
+        await self.ready()
+        begun = await self.begin()
+        assert begun.refusal is None, await self.state()
+        outcome = await self.outcome(begun.sequence)
+        await self.publish(outcome)
+        return outcome
+
+
+@dataclass
+class Bench:
+    """A simulated bench and the station on it."""
+
+    twin: Twin
+    station: Station
+    line: LineClient
+    configuration: Configuration
+    running: asyncio.Task[None]
+
+    @property
+    def phase(self) -> State:
+        assert self.station.service is not None
+        return self.station.service.state
+
+    def lay(self, kind: str, seed: int = 1, *, bruised: bool = False) -> None:
+        self.twin._lay({"kind": kind, "seed": seed, "bruised": bruised})
+
+    async def reach(self, *phases: State) -> None:
+        await eventually(lambda: self.phase in phases)
+
+    async def choose(self, kind: str) -> None:
+        """A ready station with a recipe; on a bench a person first says that the jaws are clear."""
+        self.twin.world.remove()
+        await eventually(lambda: self.phase in {State.UNKNOWN, State.HELD, State.IDLE})
+        done = await self.line.order(CommandName.RESET)
+        assert done.done, done.why
+        done = await self.line.order(CommandName.CHANGE_RECIPE, NUMBERS[kind])
+        assert done.done, done.why
+        self.lay(kind)
+
+
+def quick_recipes(folder: Path) -> Path:
+    """The shipped recipes with few, hasty steps."""
+    folder.mkdir(exist_ok=True)
+    for name in NUMBERS:
+        values = load_recipes()[name].model_dump(mode="json")
+        values["steps"] |= {"number": 4, "result_closings_mm": [3], "closing_limit_mm": 4.5}
+        values["imaging"] |= {"settle_s": 0.02, "frames_per_step": 1, "reference_frames": 3}
+        values["damage"]["area"] = [{"closing_mm": 3, "area_mm2": 110}]
+        values["damage"]["growth_mm2_per_mm"] = 60
+        values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
+        width = values["expected_width"]
+        width["largest_mm"] = min(width["largest_mm"], 42.0)
+        (folder / f"{name}.yaml").write_text(json.dumps(values))
+    return folder
+
+
+@pytest.fixture
+def settings_file(tmp_path: Path) -> Callable[..., Path]:
+    """Write a station.yaml for addresses of its own; the station's patience is that of a busy machine."""
+
+    def write(**service: Any) -> Path:
+        host = f"127.78.{os.getpid() % 250 + 1}.{next(_HOSTS) % 250 + 1}"
+        values = {
+            "home": str(tmp_path / "home"),
+            "recipes_folder": str(quick_recipes(tmp_path / "recipes")),
+            "arm": {"host": host, "stale_after_s": 0.5, "link_lost_after_s": 2.0, "watchdog_hz": 0.5},
+            "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 1.0},
+            "camera": {"oldest_s": 1.0, "twin": {"port": free_port()}},
+            "metrics": {"port": free_port()},
+            "records": {"free_reserve_mb": 1},
+            "service": {"bench": True, "retry_longest_s": 0.5, **service},
+        }
+        file = tmp_path / "station.yaml"
+        file.write_text(json.dumps(values))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
+    """Start a simulated bench and a station on it, in this process; both end with the block."""
+
+    @contextlib.asynccontextmanager
+    async def begin(file: Path | None = None, broken: str = "", **service: Any) -> AsyncIterator[Bench]:
+        configuration = load_configuration(file or settings_file(**service), {})
+        twin = Twin(
+            TwinOptions(
+                bench=True,
+                arm=configuration.arm,
+                gripper=configuration.gripper,
+                camera=configuration.camera.twin,
+                console_port=0,
+            )
+        )
+        await twin.start()
+        station = Station(configuration, broken)
+        started = asyncio.Event()
+        running = asyncio.create_task(station.run(lambda _port: started.set()), name="station")
+        try:
+            await asyncio.wait({running, asyncio.create_task(started.wait())}, return_when=asyncio.FIRST_COMPLETED)
+            if running.done():
+                running.result()
+            endpoint = line_endpoint(configuration.handshake, configuration.home)
+            async with ChannelClient(endpoint, "the station") as client:
+                yield Bench(twin, station, LineClient(client), configuration, running)
+        finally:
+            station.stop()
+            await running
+            await twin.stop()
+
+    return begin
