@@ -15,6 +15,7 @@ from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.server import ModbusServer
 from station.settings.configuration import Configuration
 from station.settings.plc import line_endpoint
+from station.supervision.notify import feed_watchdog, notify
 
 JOURNAL_FOLDER = "plc"
 GOODBYE_S = 0.3
@@ -52,16 +53,21 @@ async def serve(configuration: Configuration) -> None:
     )
     interface = Interface(handshake, endpoint, image, journal, output)
     server = ModbusServer(modbus, image, interface.on_write, interface.on_writer)
+    feeding: asyncio.Task[None] | None = None
     try:
         await server.start()
         interface.start(server.statistics)
         await output.start()
+        feeding = asyncio.create_task(feed_watchdog(lambda: True))
+        notify("READY=1")
         log.info("Modbus TCP is served on %s, port %d, unit %d", modbus.host, modbus.port, modbus.unit)
         await ended.wait()
         log.info("told to end: the PLC reads offline, then its connection closes")
         interface.leave()
         await asyncio.sleep(GOODBYE_S)
     finally:
+        if feeding is not None:
+            feeding.cancel()
         await server.stop()
         await interface.stop()
         await output.stop()

@@ -28,6 +28,7 @@ from station.service.service import CYCLE, Service
 from station.service.upkeep import UPKEEP, Upkeep
 from station.settings.configuration import Configuration
 from station.settings.plc import line_endpoint
+from station.supervision.notify import feed_watchdog, notify
 
 log = logging.getLogger(__name__)
 
@@ -66,6 +67,7 @@ class Station:
         async with contextlib.AsyncExitStack() as stack:
             tasks, port = await self._put_together(stack)
             on_started(port)
+            notify("READY=1")
             await self._until_asked(tasks)
             await self._end()
 
@@ -128,6 +130,7 @@ class Station:
         self._begin(stack, alarms.keep(records), "alarms' records")
         for name in (*crew.watches, CYCLE, UPKEEP):
             liveness.watch(name, settings.progress_s)
+        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
         return tuple(tasks), port
 
     async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
