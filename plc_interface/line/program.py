@@ -116,7 +116,7 @@ class LineProgram:
     def __init__(self, plan: FaultPlan | None = None, lot: str = "") -> None:
         self.stage = Stage.CLAIMING
         self._lot, self._lot_wanted = lot, False
-        self._ready = False
+        self._ready = self._jaws_open = False
         self._recipe = self._command_sequence = 0
         self.counters = Counters()
         self._plan = plan or FaultPlan()
@@ -137,7 +137,7 @@ class LineProgram:
     @property
     def free(self) -> bool:
         """Whether the next fruit may enter the nest: the one before is decided, and the jaws are open."""
-        return self.stage is Stage.WAITING_FOR_FRUIT and self._fruit is None and self._ready
+        return self.stage is Stage.WAITING_FOR_FRUIT and self._fruit is None and self._jaws_open
 
     def take_passages(self) -> list[Passage]:
         """The fruits decided since the last call."""
@@ -159,7 +159,7 @@ class LineProgram:
         Returns:
             The control block to write.
         """
-        self.cut_wanted = self._ready = False
+        self.cut_wanted = self._ready = self._jaws_open = False
         if inputs is None or not self._alive(inputs, now_s):
             self._lose(now_s)
         else:
@@ -180,6 +180,7 @@ class LineProgram:
     def _step(self, inputs: Values, now_s: float, recipe: int | None) -> None:
         status = BY_NAME["status"].names(int(inputs["status"]))
         self._ready = "trigger_ready" in status
+        self._jaws_open = self._ready or not inputs["active_recipe"]  # without a recipe nothing was ever gripped
         if not {"writer_owned", "online"} <= status and self.stage is not Stage.CLAIMING:
             self._lose(now_s)
             return
@@ -234,7 +235,7 @@ class LineProgram:
         if inputs["command_sequence_echo"] != self._command_sequence:
             return
         result = BY_NAME["command_result"].codes[int(inputs["command_result"])].name
-        if result == "executing":
+        if result == "executing" or (result == "done" and inputs["active_recipe"] != self._recipe):
             return
         if result != "done":
             self._decide(Decision.REFUSED, now_s, reasons=(f"recipe change: {result}",))

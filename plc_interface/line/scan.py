@@ -1,5 +1,6 @@
 """The scan loop: every few milliseconds one Modbus exchange, as a PLC's Modbus block does it."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Self
 
@@ -11,6 +12,7 @@ from plc_interface.register import Register
 from plc_interface.register_map import CONTROL, GROUP_BY_NAME, RESULT, STATUS
 
 ANSWER_LIMIT_S = 1.0
+logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it has to say is said by `trouble`
 _READ = (*STATUS, *RESULT)
 _FIRST = GROUP_BY_NAME["status"].address
 

@@ -1,7 +1,6 @@
 """`station demo`: the whole station against the simulated world, fruit after fruit, on the real protocols."""
 
 import asyncio
-import contextlib
 import os
 import signal
 
@@ -103,11 +102,12 @@ async def _inspect(
             waiting = asyncio.create_task(ended.wait())
             try:
                 await asyncio.wait([running, waiting], return_when=asyncio.FIRST_COMPLETED)
+                if not ended.is_set():
+                    await running
             finally:
                 waiting.cancel()
                 running.cancel()
-                with contextlib.suppress(asyncio.CancelledError):
-                    await running
+                await asyncio.gather(running, return_exceptions=True)
         click.echo(summary_line(simulator.summary))
         click.echo(f"why a fruit was diverted: STATION_HOME={site.home} ./run station records show NUMBER")
 

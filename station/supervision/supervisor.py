@@ -121,6 +121,13 @@ class _Child:
             os.killpg(process.pid, signal.SIGKILL)
         await process.wait()
 
+    def last_words(self) -> str:
+        """What the process wrote last, or where to look for it."""
+        if self.program.output is None:
+            return "see its messages above"
+        lines = self.program.output.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        return f"{lines[-1] if lines else 'without a word'} (see {self.program.output})"
+
     def close(self) -> None:
         self._listening.close()
 
@@ -181,10 +188,10 @@ class Supervisor:
             child.listen()
             if child.process is not None and child.process.returncode is not None:
                 raise SupervisionError(
-                    f"the process {child.program.name} {child.trouble()} before it was ready: see its message above"
+                    f"the process {child.program.name} {child.trouble()} before it was ready: {child.last_words()}"
                 )
             if trouble := child.trouble():
-                raise SupervisionError(f"the process {child.program.name} {trouble}: see its messages above")
+                raise SupervisionError(f"the process {child.program.name} {trouble}: {child.last_words()}")
             await self._look(self._children, ended)
 
     async def _keep(self, ended: asyncio.Event) -> None:

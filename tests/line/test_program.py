@@ -34,6 +34,7 @@ class Station:
             self.values["latched_lot_checksum"] = zlib.crc32(outputs["lot"].encode())
         if "execute_command" in rising:
             self.values["active_recipe"] = outputs["command_argument"]
+            self.bits.add("trigger_ready")
             self.values["command_sequence_echo"] = outputs["command_sequence"]
             self.values["command_result"] = BY_NAME["command_result"].code("done")
         if "trigger" in rising and self.answers:
@@ -211,8 +212,11 @@ def test_the_lot_is_latched_before_the_first_fruit():
     assert "latch_lot" not in line.bits
 
 
-def test_the_recipe_is_changed_where_the_fruit_needs_another_one():
+@pytest.mark.parametrize("active", [0, 1])
+def test_the_recipe_is_changed_where_the_fruit_needs_another_one(active):
     line = Line(Station())
+    line.station.values["active_recipe"] = active
+    line.station.bits -= set() if active else {"trigger_ready"}
     line.recipe = 3
     assert line.inspect().decision is Decision.PASS
     assert line.station.values["active_recipe"] == 3
