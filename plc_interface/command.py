@@ -1,16 +1,30 @@
 """`station plc`: the interface to the line's PLC."""
 
+import asyncio
 from pathlib import Path
 
 import click
 
 from plc_interface.generate.files import DOCUMENTS, drifted_files, write_files
+from plc_interface.process import log_to_stderr, serve
 from station.errors import StationError
+from station.settings.configuration import load_configuration
 
 
 @click.group("plc")
 def plc() -> None:
     """Talk to the line's PLC, and make its documents."""
+
+
+@plc.command("run")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def run(config: Path | None) -> None:
+    """Serve the line's PLC until Ctrl-C: registers, handshake, and the reject gate where CAN is enabled.
+
+    The station may come and go meanwhile: while it does not answer, the PLC reads so and its triggers are refused.
+    """
+    log_to_stderr()
+    asyncio.run(serve(load_configuration(config)))
 
 
 @plc.command("docs")

@@ -9,8 +9,10 @@ from plc_interface.handshake.events import (
     BeginFailed,
     CommandAnswered,
     CommandFailed,
+    Leaving,
     OpenTold,
     OutcomeCame,
+    OutcomeFailed,
     OutcomeNoted,
     PlcWrote,
     RequestFailed,
@@ -63,6 +65,13 @@ def _outcome_came(work: Work, event: OutcomeCame) -> None:
 def _request_failed(work: Work, event: RequestFailed) -> None:
     work.say(f"the station did not answer as it has to: {event.what}")
     work.signals.append(Signal.CHANNEL_FAILED)
+
+
+def _outcome_failed(work: Work, event: OutcomeFailed) -> None:
+    running = work.state.running
+    if running is not None and running.sequence == event.sequence:
+        work.say(f"inspection {event.sequence}: the station did not give its outcome: {event.what}")
+        work.signals.append(Signal.CHANNEL_FAILED)
 
 
 def _open_told(work: Work, event: OpenTold) -> None:
@@ -161,9 +170,11 @@ _TAKERS: dict[type, Callable[[Work, Any], None]] = {
     BeginAnswered: _begin_answered,
     BeginFailed: _begin_answered,
     OutcomeCame: _outcome_came,
+    OutcomeFailed: _outcome_failed,
     RequestFailed: _request_failed,
     OpenTold: _open_told,
     OutcomeNoted: _outcome_noted,
     CommandAnswered: _command_answered,
     CommandFailed: _command_answered,
+    Leaving: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
 }

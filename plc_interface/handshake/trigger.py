@@ -25,7 +25,7 @@ def refusal(state: State) -> Refusal | None:
 
     A doubled id is told as such whatever else holds: no other refusal then names an id that was accepted.
     """
-    if state.inputs.trigger_id in {0, state.journal.accepted_id}:
+    if state.inputs.trigger_id in {0, state.journal.accepted_id, state.asked.trigger_id if state.asked else 0}:
         return Refusal.BAD_TRIGGER_ID
     return obstacle(state)
 
@@ -56,11 +56,6 @@ def refuse(work: Work) -> None:
     note_refusal(work, refusal(work.state) or Refusal.NOT_READY, work.state.inputs.trigger_id)
 
 
-def refuse_busy(work: Work) -> None:
-    """Refuse as busy."""
-    note_refusal(work, Refusal.BUSY, work.state.inputs.trigger_id)
-
-
 def watch(work: Work) -> None:
     """Start the trigger's time-out."""
     work.start(Signal.TRIGGER_TIMEOUT, work.settings.handshake_timeout_s)
@@ -88,7 +83,7 @@ ROWS = (
     row(Trigger.ASKED, Signal.WRITER_LOST, to=Trigger.PULSED),
     row(Trigger.PULSED, Signal.ACCEPTED, watch, to=Trigger.HELD),
     row(Trigger.PULSED, Signal.REFUSED, watch, to=Trigger.HELD),
-    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse_busy, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse, to=Trigger.ASKED),
     row(Trigger.PULSED, Signal.TRIGGER_HELD, to=Trigger.ASKED),
     row(Trigger.PULSED, Signal.TRIGGER_OFF),
     row(Trigger.PULSED, Signal.WRITER_LOST),

@@ -16,7 +16,7 @@ from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.machine import step
-from plc_interface.handshake.modes import Link
+from plc_interface.handshake.modes import Arming, Link
 from plc_interface.handshake.state import State, restarted
 from plc_interface.handshake.view import view
 from plc_interface.register_map import BY_NAME
@@ -149,11 +149,15 @@ class Handshake(RuleBasedStateMachine):
         self.control: set[str] = set()
         self.inputs = ev.Inputs()
         self.next_id = 1
-        self.asked_ids: dict[int, str] = {}
-        self.shown: dict[int, dict[str, object]] = {}
+        self.refused: set[Any] = set()
+        self.missed: tuple[Any, ...] = ()
+        self.shown: dict[int, dict[str, Any]] = {}
         self.taken: set[int] = set()
         self.accepted: set[int] = set()
+        self.commands: set[int | None] = set()
         self.boot()
+        self.heal()
+        self.rearm("")
 
     # the interface's process
 
@@ -198,6 +202,10 @@ class Handshake(RuleBasedStateMachine):
                 self.send(action, within_s)
             case do.AskOpen():
                 self.send(action, 1.0)
+            case do.AskCommand():
+                assert self.state.journal.command_sequence not in self.commands, "a command is carried out twice"
+                self.commands.add(self.state.journal.command_sequence)
+                self.send(action, 2.0)
             case do.TellPublished() | do.TellAcknowledged():
                 self.tells.append(action)
                 self.next_tell()
@@ -216,9 +224,13 @@ class Handshake(RuleBasedStateMachine):
         match request.action:
             case do.AskBegin(number=number):
                 self.feed(ev.BeginFailed(self.at(), number))
+            case do.AskCommand(number=number):
+                self.feed(ev.CommandFailed(self.at(), number))
             case do.TellPublished() | do.TellAcknowledged():
                 self.tells.clear()
                 self.feed(ev.RequestFailed(self.at(), "a note"))
+            case do.AskOutcome(sequence=sequence):
+                self.feed(ev.OutcomeFailed(self.at(), sequence, "no answer"))
             case _:
                 self.feed(ev.RequestFailed(self.at(), "a question"))
 
@@ -232,6 +244,8 @@ class Handshake(RuleBasedStateMachine):
                 self.settle(lambda a: isinstance(a, do.AskOpen) and a.number == number)
             case ev.OutcomeCame(outcome=told):
                 self.settle(lambda a: isinstance(a, do.AskOutcome) and a.sequence == told.sequence)
+            case ev.CommandAnswered(number=number):
+                self.settle(lambda a: isinstance(a, do.AskCommand) and a.number == number)
             case ev.OutcomeNoted(sequence=sequence):
                 self.settle(lambda a: isinstance(a, do.TellPublished) and a.outcome.sequence == sequence)
             case ev.Tick():
@@ -254,6 +268,8 @@ class Handshake(RuleBasedStateMachine):
             case do.AskOutcome(sequence=sequence):
                 station.waiting.add(sequence)
                 self.tell_outcomes()
+            case do.AskCommand(number=number, argument=argument):
+                self.answers.append(ev.CommandAnswered(at, number, done=argument % 2 == 0, why="no"))
             case do.AskOpen(number=number):
                 self.answers.append(ev.OpenTold(at, number, station.open()))
             case do.TellPublished(outcome=told):
@@ -286,10 +302,14 @@ class Handshake(RuleBasedStateMachine):
         assert isinstance(accepted, int)
         if accepted:
             self.accepted.add(accepted)
-        if seen["last_refusal"] and seen["last_refusal"] != BY_NAME["last_refusal"].code("bad_trigger_id"):
-            refused = seen["last_refused_trigger_id"]
-            assert isinstance(refused, int)
-            self.asked_ids[refused] = "refused"
+            self.refused.discard(accepted)  # a PLC may ask again for what was refused
+        missed = (seen["interface_boots"], seen["counters_epoch"], seen["count_missed"])
+        if missed != self.missed and self.bit("missed"):
+            self.missed = missed
+            if seen["last_refusal"] != BY_NAME["last_refusal"].code("bad_trigger_id"):
+                refused = seen["last_refused_trigger_id"]
+                assert refused not in self.accepted, "a trigger that was accepted is told as refused"
+                self.refused.add(refused)
         if not self.bit("result_valid"):
             assert seen["result_sequence"] == seen["result_outcome"] == 0
             return
@@ -303,7 +323,7 @@ class Handshake(RuleBasedStateMachine):
         assert self.shown.setdefault(sequence, block) == block, "two outcomes under one sequence"
         record = self.station.records[sequence]
         assert block["result_trigger_id"] == record.trigger_id, "a wrong id"
-        assert self.asked_ids.get(record.trigger_id) != "refused", "a result of a trigger that was refused"
+        assert record.trigger_id not in self.refused, "a result of a trigger that was refused"
         flags = block["result_flags"]
         assert isinstance(flags, int)
         if block["result_outcome"] != BY_NAME["result_outcome"].code("NO_RESULT"):
@@ -343,8 +363,13 @@ class Handshake(RuleBasedStateMachine):
         self.write(control=set())
         self.write(control={"enable", "buffer_results"}, lot=lot)
 
-    @rule()
-    def trigger(self) -> None:
+    @rule(armed=st.sampled_from([True, True, True, False]), link=st.booleans())
+    def trigger(self, armed: bool, link: bool) -> None:
+        """With a new id; mostly a PLC that arms first, and often with a station that is there."""
+        if link and self.state.link is not Link.UP:
+            self.heal()
+        if armed and self.state.arming is not Arming.ARMED:
+            self.rearm("")
         self.write(control=self.control - {"trigger"})
         trigger_id, self.next_id = self.next_id, self.next_id + 1
         self.write(control=self.control | {"trigger"}, trigger_id=trigger_id)
@@ -381,6 +406,20 @@ class Handshake(RuleBasedStateMachine):
     @rule()
     def beat_of_the_plc(self) -> None:
         self.write(plc_heartbeat=(self.inputs.plc_heartbeat + 1) % 2**16)
+
+    @rule(code=st.integers(0, 5), repeated=st.booleans())
+    def command(self, code: int, repeated: bool) -> None:
+        self.write(control=self.control - {"execute_command"})
+        sequence = (self.inputs.command_sequence + (not repeated)) % 2**16
+        self.write(control=self.control | {"execute_command"}, command_code=code, command_sequence=sequence)
+
+    @rule()
+    def drop_execute(self) -> None:
+        self.write(control=self.control - {"execute_command"})
+
+    @rule()
+    def writer_goes(self) -> None:
+        self.feed(ev.WriterWent(self.at()))
 
     @rule()
     def reconnect(self) -> None:
@@ -449,11 +488,10 @@ class Handshake(RuleBasedStateMachine):
     def whole_cycle(self) -> None:
         """A good moment, so that what follows starts somewhere interesting."""
         self.heal()
-        self.beat_of_the_plc()
-        self.rearm("")
-        self.trigger()
+        self.trigger(armed=True, link=True)
         self.everything_arrives()
 
+    @precondition(lambda self: self.station.up)
     @rule()
     def station_dies(self) -> None:
         self.station.up = False
@@ -496,7 +534,7 @@ class Handshake(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         """In the end everything that was accepted has been shown once, and the station knows what was shown."""
-        if not hasattr(self, "now_s"):
+        if not hasattr(self, "commands"):
             return
         self.crash_after = None
         self.heal()
