@@ -111,7 +111,7 @@ RESULT = (
     _u32("result_recipe_checksum", 144, "CRC-32 of that recipe's canonical JSON"),
     _u32("result_duration_ms", 146, "Time from trigger to outcome, by the monotonic clock", RO, "ms"),
     _number("result_ended_utc_ms", 148, Kind.U64, RO, "ms", 0, U64_MAX, "End of the inspection, UTC since 1970-01-01"),
-    _u32("result_encoder", 152, "The line's encoder as given with the trigger", RO, "counts"),
+    _u32("result_encoder", 152, "The line's encoder at the trigger, as given with it or read over CAN", RO, "counts"),
     _u32("result_lot_checksum", 154, "CRC-32 of the lot id of this inspection"),
     _u32("result_sequence_again", 156, "As result_sequence: where they differ the block was read torn, read again"),
 )  # fmt: skip
