@@ -131,16 +131,22 @@ class StationClient(RegisterLink):
         return taken
 
     async def acknowledge(self, sequence: int) -> None:
-        """Say that the result with this sequence was taken; returns once it is not shown any more. Idempotent.
+        """Say that the result with this sequence was taken; returns once the station has noted it. Idempotent.
 
         Raises:
-            DeadlineMissedError: it stays: it is not the sequence that is shown.
+            NotReadyError: another result is shown, or none.
+            DeadlineMissedError: the station does not note it.
         """
+        now = await self.scan()
+        if now["acknowledged_sequence_echo"] == sequence:
+            return
+        if now["result_sequence"] != sequence:
+            raise NotReadyError(f"result {sequence} is not the one shown, which is {now['result_sequence'] or 'none'}")
         await self.write({"acknowledged_sequence": sequence})
         await self._raise("acknowledge")
         try:
             await self._until(
-                lambda now: now["acknowledged_sequence_echo"] == sequence or now["result_sequence"] != sequence,
+                lambda now: now["acknowledged_sequence_echo"] == sequence,
                 time.monotonic() + ANSWER_DEADLINE_S,
                 f"the acknowledgement of result {sequence}",
             )

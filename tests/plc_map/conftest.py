@@ -1,6 +1,9 @@
 """The real server and the real handshake on a port, with a station behind them that a test makes up."""
 
 import asyncio
+import os
+import re
+import shutil
 import socket
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -10,6 +13,7 @@ from typing import Any
 import pytest
 
 from plc_interface.codec import WordOrder
+from plc_interface.generate.structured_text import function_block
 from plc_interface.handshake import actions, events
 from plc_interface.handshake.events import Inputs, Moment
 from plc_interface.handshake.journal import Journal
@@ -20,7 +24,7 @@ from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.server import ModbusServer
-from plc_interface.register_map import BY_NAME
+from plc_interface.register_map import BY_NAME, REGISTERS
 from station.channel.line import Begun, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.modbus import ModbusSettings
 from station.settings.plc import HandshakeSettings
@@ -38,6 +42,7 @@ class Rig:
     def __init__(self, port: int, order: WordOrder) -> None:
         self.port = port
         self.inspection_s = 0.05
+        self.first_sequence = 0x00010001
         self.answers = True
         """The station answers beats."""
         self.refusal: Refusal | None = None
@@ -95,7 +100,7 @@ class Rig:
                 begun = Begun(refusal=self.refusal)
                 if self.refusal is None:
                     self.begun.append((action.trigger_id, action.encoder, action.lot))
-                    begun = Begun(sequence=0x00010000 + len(self.begun), deadline_s=5.0)
+                    begun = Begun(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
                 self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, begun))
             case actions.AskOutcome():
                 self.soon(self.inspection_s, lambda: events.OutcomeCame(now(), self._made(action.sequence)))
@@ -111,7 +116,7 @@ class Rig:
                 pass
 
     def _made(self, sequence: int) -> Outcome:
-        trigger_id, encoder, lot = self.begun[sequence - 0x00010001]
+        trigger_id, encoder, lot = self.begun[sequence - self.first_sequence]
         made: dict[str, Any] = {
             "sequence": sequence, "trigger_id": trigger_id, "outcome": "PASS", "reasons": (), "late": False,
             "partial": False, "simulated": True, "area_mm2": 12.34, "area_px": 70_001, "closing_mm": 0.75,
@@ -152,6 +157,27 @@ async def serving(order: WordOrder = WordOrder.HIGH_FIRST) -> AsyncIterator[Rig]
 @pytest.fixture
 def serve() -> Callable[..., AbstractAsyncContextManager[Rig]]:
     return serving
+
+
+@pytest.fixture
+def mbpoll() -> str:
+    """The path of the Modbus client."""
+    path = shutil.which("mbpoll")
+    if path is None and os.environ.get("CI") == "true":
+        pytest.fail("mbpoll is missing, and CI=true says that nothing may be", pytrace=False)
+    if path is None:
+        pytest.skip("mbpoll is missing on this machine")
+    return path
+
+
+@pytest.fixture
+def vocabulary() -> set[str]:
+    """Every name that a document may put into code."""
+    words = {*WordOrder, *re.findall(r"\w+", function_block())}
+    words |= {field for settings in (ModbusSettings, HandshakeSettings) for field in settings.model_fields}
+    for register in REGISTERS:
+        words |= {register.name, *(bit.name for bit in register.bits), *(code.name for code in register.codes.values())}
+    return words
 
 
 @pytest.fixture

@@ -99,6 +99,10 @@ def test_a_result_that_comes_too_late_is_not_the_next_fruits(serve):
                     await asyncio.sleep(0.01)
             with pytest.raises(NotReadyError, match="result 65537 of trigger 7 waits"):
                 await client.inspect(8)
+            with pytest.raises(NotReadyError, match="result 3 is not the one shown, which is 65537"):
+                await client.acknowledge(3)
+            assert await client.shown() == late
+            await client.acknowledge(late.sequence)
             await client.acknowledge(late.sequence)
             rig.inspection_s = 0.05
             return late, await client.inspect(8)

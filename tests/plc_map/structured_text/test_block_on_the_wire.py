@@ -52,7 +52,11 @@ def test_fruits_recipe_refusal_and_a_station_that_dies(serve, make_plc, no_conta
             assert await client.connect()
             loop = Loop(plc, client)
             plc.inputs.update(accept_simulated=True, heartbeat_timeout=1.0)
-            for fruit, outcome in ((7, {}), (8, no_contact), (9, {"outcome": "FAIL", "reasons": (Reason.AREA_OVER_LIMIT,)})):
+            for fruit, outcome in (
+                (7, {}),
+                (8, no_contact),
+                (9, {"outcome": "FAIL", "reasons": (Reason.AREA_OVER_LIMIT,)}),
+            ):
                 rig.outcome = outcome
                 await loop.until("ready", inspect=False)
                 await loop.until("done", inspect=True, fruit_id=fruit, encoder=fruit << 16)
