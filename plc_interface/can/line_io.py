@@ -328,6 +328,8 @@ class LineIo:
         deadline_s = time.monotonic() + max(_NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
         while not condition():
             link.check()
+            if not self._healthy:
+                raise BringUpError(_UNHEALTHY)
             if time.monotonic() > deadline_s:
                 raise BringUpError(why)
             await asyncio.sleep(_POLL_S)
