@@ -265,6 +265,21 @@ def test_a_bug_is_logged_and_does_not_end_the_driver(on_bus, monkeypatch, caplog
     on_bus(scenario)
 
 
+def test_a_station_that_falls_ill_during_the_bring_up_ends_it_and_blames_nobody(on_bus):
+    async def scenario(rig):
+        rig.faults.set("gate_silent")
+        rig.io.renew_health(40)
+        await rig.until(lambda: rig.io._link)
+        rig.io.renew_health(0)
+        await rig.until(lambda: rig.io._link is None)
+        assert rig.io.faults == ()
+        assert "bring_up_failures" not in rig.io.counters
+        rig.faults.clear()
+        await rig.ready()
+
+    on_bus(scenario)
+
+
 def test_stopping_in_the_middle_of_the_bring_up_leaves_nothing(on_bus):
     async def scenario(rig):
         for delay_s in (0.0, 0.02, 0.1, 0.3):
