@@ -36,7 +36,7 @@ class Serving:
         self.server: ModbusServer
         self.loop = asyncio.new_event_loop()
         self.again: asyncio.Handle | None = None
-        self._thread = threading.Thread(target=self.loop.run_forever, name="modbus server")
+        self._thread = threading.Thread(target=self.loop.run_forever, name="modbus server", daemon=True)
 
     def start(self) -> None:
         self._thread.start()

@@ -173,7 +173,7 @@ class GoodClient(threading.Thread):
     """Asks the same question over and over, and wants the right answer each time."""
 
     def __init__(self, wire) -> None:
-        super().__init__(name="good client")
+        super().__init__(name="good client", daemon=True)
         self.wire, self.answers, self.wrong = wire, 0, None
         self.enough = threading.Event()
 
