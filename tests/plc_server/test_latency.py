@@ -12,8 +12,8 @@ policy = os.sched_getscheduler(0)
 assert got == (policy == os.SCHED_RR | os.SCHED_RESET_ON_FORK), policy
 assert gc.get_freeze_count() > 0
 if got:
-    os.setuid(65534)
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.setuid(65534)
 assert not favour_latency()
 """
 
