@@ -20,7 +20,7 @@ from plc_interface.handshake.events import (
     WriterCame,
     WriterWent,
 )
-from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.work import Work
 
 EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
@@ -127,14 +127,20 @@ def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
 
 
 def _acknowledged(work: Work, event: PlcWrote, *, changed: bool, rose: frozenset[str]) -> None:
-    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none."""
+    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none.
+
+    A PLC that writes the sequence first and raises its bit then waits for result_valid to fall all the same.
+    """
     state, sequence = work.state, event.inputs.acknowledged_sequence
     by_bit, written = "acknowledge" in rose, "acknowledged_sequence" in event.written
     if not (by_bit or written):
         return
-    if state.result is Result.SHOWN and sequence == state.queue[0].sequence:
+    if state.queue and sequence == state.queue[0].sequence == state.shown:
         work.signals.append(Signal.ACKNOWLEDGED)
-    elif (by_bit or changed) and sequence != state.journal.acknowledged and (by_bit or sequence):
+    elif sequence == state.journal.acknowledged:
+        if by_bit:
+            work.signals.append(Signal.ACKNOWLEDGE_AFTER)
+    elif by_bit or (changed and sequence):
         work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)
 
 

@@ -98,6 +98,8 @@ class State:
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first is the one shown."""
+    shown: int = 0
+    """The sequence of the last result shown."""
     toggle: bool = False
 
     # commands
@@ -153,6 +155,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         journal=journal.model_copy(update=changes),
         queue=journal.queue,
         result=Result.SHOWN if journal.queue else Result.EMPTY,
+        shown=journal.queue[0].sequence if journal.queue else 0,
     )
     if journal.asked_id is not None:
         state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True

@@ -341,6 +341,8 @@ class Handshake(RuleBasedStateMachine):
         if "control" in values:
             self.control = set(values["control"])
             values["control"] = frozenset(self.control)
+        if not self.state.writer:
+            self.feed(ev.WriterCame(self.at()))
         self.inputs = replace(self.inputs, **values)
         shown = self.seen["result_sequence"]
         boots = self.state.journal.boots
@@ -384,6 +386,13 @@ class Handshake(RuleBasedStateMachine):
     def drop_trigger(self) -> None:
         self.write(control=self.control - {"trigger"})
 
+    @rule()
+    def acknowledge_by_sequence_and_then_by_bit(self) -> None:
+        if self.bit("result_valid") and "acknowledge" not in self.control:
+            self.write(acknowledged_sequence=self.seen["result_sequence"])
+            self.write(control=self.control | {"acknowledge"})
+            assert not self.bit("result_valid")
+
     @rule(by_bit=st.booleans())
     def acknowledge(self, by_bit: bool) -> None:
         sequence = self.seen["result_sequence"]
@@ -391,6 +400,7 @@ class Handshake(RuleBasedStateMachine):
             return
         if by_bit:
             self.write(control=self.control | {"acknowledge"}, acknowledged_sequence=sequence)
+            assert not self.bit("result_valid") or self.state.acknowledge_stuck
         else:
             self.write(acknowledged_sequence=sequence)
 
