@@ -31,6 +31,7 @@ def take(work: Work) -> None:
     """Take it from the queue, `Acknowledged`."""
     taken, *rest = work.state.queue
     work.state.queue = tuple(rest)
+    work.state.unconfirmed = 0 if bit_is_high(work) else taken.sequence
     acknowledge(work, taken.sequence)
     pass_over_hidden(work)
 

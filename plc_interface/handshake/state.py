@@ -75,6 +75,8 @@ class State:
     inputs: Inputs = field(default_factory=Inputs)
     seen: frozenset[str] | None = None
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    unconfirmed: int = 0
+    """The sequence taken by its number alone; the bit may still follow."""
     acknowledge_stuck: bool = False
     """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
     last_refusal: Refusal | None = None

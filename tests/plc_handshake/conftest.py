@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,11 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from plc_interface.codec import WordOrder, decode, encode
+from plc_interface.handshake import actions as do
+from plc_interface.handshake import events as ev
+from plc_interface.handshake.journal import Journal
+from plc_interface.handshake.machine import step
+from plc_interface.handshake.state import restarted
 from plc_interface.register_map import BY_NAME, GROUP_BY_NAME
 from station.channel.line import (
     Acknowledged,
@@ -36,6 +42,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.server import ChannelServer
+from station.settings.plc import HandshakeSettings
 
 PATIENCE_S = 30.0
 COMMAND = (sys.executable, "-m", "station", "plc", "run")
@@ -358,3 +365,75 @@ def cell(short_folder: Path, unused_port: int) -> Callable[..., contextlib.Abstr
 def eventually() -> Callable[..., Any]:
     """See `until`."""
     return until
+
+
+class Bench:
+    """The pure handshake with a clock that a test sets; answers are given by hand."""
+
+    def __init__(self, journal: Journal | None = None) -> None:
+        self.now_s = 100.0
+        self.settings = HandshakeSettings()
+        self.state = restarted(journal or Journal(), self.at(), self.settings.station_lost_after_s)
+        self.inputs = ev.Inputs()
+        self.actions: list[do.Action] = []
+
+    def at(self) -> ev.Moment:
+        return ev.Moment(self.now_s, round(1000 * self.now_s))
+
+    def feed(self, kind: Any, *arguments: Any, **named: Any) -> tuple[do.Action, ...]:
+        self.state, actions = step(self.state, kind(self.at(), *arguments, **named), self.settings)
+        self.actions += actions
+        return actions
+
+    def write(self, *bits: str, **values: Any) -> tuple[do.Action, ...]:
+        """The control bits as they are to be now, and other fields."""
+        self.inputs = replace(self.inputs, control=frozenset(bits), **values)
+        return self.feed(ev.PlcWrote, self.inputs, frozenset({"control", *values}))
+
+    def station_state(self, **changes: Any) -> StationState:
+        state = StationState(
+            boot="1",
+            healthy=True,
+            ready=True,
+            why_not_ready="",
+            packml_state=None,
+            mode=1,
+            recipe_number=0,
+            recipe_checksum=0,
+            error_code=0,
+            alarms=0,
+            simulated=False,
+        )
+        return state.model_copy(update=changes)
+
+    def link(self, opened: Open | None = None, **changes: Any) -> tuple[do.Action, ...]:
+        """A beat, and the answer to what it asks."""
+        self.feed(ev.Beat, self.station_state(**changes))
+        assert self.state.open_asked is not None
+        return self.feed(ev.OpenTold, self.state.open_asked, opened or Open(running=None, outcomes=()))
+
+    def armed(self, *bits: str) -> None:
+        self.feed(ev.WriterCame)
+        self.link()
+        self.write()
+        self.write("enable", *bits)
+
+    def run(self, trigger_id: int = 7, sequence: int = 41) -> None:
+        """An accepted trigger."""
+        self.armed()
+        self.write("enable", "trigger", trigger_id=trigger_id)
+        assert self.state.asked is not None
+        self.feed(ev.BeginAnswered, self.state.asked.number, Begun(sequence=sequence, deadline_s=2.0))
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        return [action for action in self.actions if isinstance(action, kind)]
+
+    def outcome(self, name: str = "PASS", *reasons: Reason, **changes: Any) -> Outcome:
+        running = ScriptedStation("")
+        running.running, running.begun = 41, {41: Begin(trigger_id=7, encoder=0, lot="")}
+        return running.finish(name, *reasons, **changes)
+
+
+@pytest.fixture
+def bench() -> type[Bench]:
+    return Bench

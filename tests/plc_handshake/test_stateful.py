@@ -348,7 +348,7 @@ class Handshake(RuleBasedStateMachine):
         boots = self.state.journal.boots
         self.feed(ev.PlcWrote(self.at(), self.inputs, frozenset(written)))
         same_run = self.state.journal.boots == boots
-        if same_run and shown and "acknowledged_sequence" in values and self.seen["result_sequence"] != shown:
+        if same_run and shown and values.get("acknowledged_sequence") == shown != self.seen["result_sequence"]:
             assert isinstance(shown, int)
             self.taken.add(shown)
 
@@ -388,19 +388,25 @@ class Handshake(RuleBasedStateMachine):
 
     @rule()
     def acknowledge_by_sequence_and_then_by_bit(self) -> None:
+        boots = self.state.journal.boots
         if self.bit("result_valid") and "acknowledge" not in self.control:
             self.write(acknowledged_sequence=self.seen["result_sequence"])
             self.write(control=self.control | {"acknowledge"})
+            self.falls_for_the_bit(boots)
+
+    def falls_for_the_bit(self, boots: int) -> None:
+        """A PLC that waits for result_valid to fall after its bit is not let down."""
+        if self.state.journal.boots == boots and not self.state.acknowledge_stuck:
             assert not self.bit("result_valid")
 
     @rule(by_bit=st.booleans())
     def acknowledge(self, by_bit: bool) -> None:
-        sequence = self.seen["result_sequence"]
+        sequence, boots = self.seen["result_sequence"], self.state.journal.boots
         if not self.bit("result_valid"):
             return
         if by_bit:
             self.write(control=self.control | {"acknowledge"}, acknowledged_sequence=sequence)
-            assert not self.bit("result_valid") or self.state.acknowledge_stuck
+            self.falls_for_the_bit(boots)
         else:
             self.write(acknowledged_sequence=sequence)
 
