@@ -95,6 +95,7 @@ class Signal(StrEnum):
     TRIGGER_HELD = "trigger still on after a reconnect"
     ACKNOWLEDGED = "sequence acknowledged"
     WRONG_ACKNOWLEDGEMENT = "another sequence acknowledged"
+    ACKNOWLEDGE_AFTER = "acknowledge on for the sequence just taken"
     ACKNOWLEDGE_OFF = "acknowledge off"
     EXECUTE_ON = "execute on"
     EXECUTE_OFF = "execute off"

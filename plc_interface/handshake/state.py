@@ -75,6 +75,8 @@ class State:
     inputs: Inputs = field(default_factory=Inputs)
     seen: frozenset[str] | None = None
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    unconfirmed: int = 0
+    """The sequence taken by its number alone; the bit may still follow."""
     acknowledge_stuck: bool = False
     """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
     last_refusal: Refusal | None = None
@@ -98,6 +100,8 @@ class State:
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first is the one shown."""
+    shown: int = 0
+    """The sequence of the last result shown."""
     toggle: bool = False
 
     # commands
@@ -153,6 +157,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         journal=journal.model_copy(update=changes),
         queue=journal.queue,
         result=Result.SHOWN if journal.queue else Result.EMPTY,
+        shown=journal.queue[0].sequence if journal.queue else 0,
     )
     if journal.asked_id is not None:
         state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True

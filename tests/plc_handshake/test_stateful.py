@@ -341,12 +341,14 @@ class Handshake(RuleBasedStateMachine):
         if "control" in values:
             self.control = set(values["control"])
             values["control"] = frozenset(self.control)
+        if not self.state.writer:
+            self.feed(ev.WriterCame(self.at()))
         self.inputs = replace(self.inputs, **values)
         shown = self.seen["result_sequence"]
         boots = self.state.journal.boots
         self.feed(ev.PlcWrote(self.at(), self.inputs, frozenset(written)))
         same_run = self.state.journal.boots == boots
-        if same_run and shown and "acknowledged_sequence" in values and self.seen["result_sequence"] != shown:
+        if same_run and shown and values.get("acknowledged_sequence") == shown != self.seen["result_sequence"]:
             assert isinstance(shown, int)
             self.taken.add(shown)
 
@@ -384,13 +386,27 @@ class Handshake(RuleBasedStateMachine):
     def drop_trigger(self) -> None:
         self.write(control=self.control - {"trigger"})
 
+    @rule()
+    def acknowledge_by_sequence_and_then_by_bit(self) -> None:
+        boots = self.state.journal.boots
+        if self.bit("result_valid") and "acknowledge" not in self.control:
+            self.write(acknowledged_sequence=self.seen["result_sequence"])
+            self.write(control=self.control | {"acknowledge"})
+            self.falls_for_the_bit(boots)
+
+    def falls_for_the_bit(self, boots: int) -> None:
+        """A PLC that waits for result_valid to fall after its bit is not let down."""
+        if self.state.journal.boots == boots and not self.state.acknowledge_stuck:
+            assert not self.bit("result_valid")
+
     @rule(by_bit=st.booleans())
     def acknowledge(self, by_bit: bool) -> None:
-        sequence = self.seen["result_sequence"]
+        sequence, boots = self.seen["result_sequence"], self.state.journal.boots
         if not self.bit("result_valid"):
             return
         if by_bit:
             self.write(control=self.control | {"acknowledge"}, acknowledged_sequence=sequence)
+            self.falls_for_the_bit(boots)
         else:
             self.write(acknowledged_sequence=sequence)
 
@@ -490,6 +506,27 @@ class Handshake(RuleBasedStateMachine):
         self.heal()
         self.trigger(armed=True, link=True)
         self.everything_arrives()
+
+    @rule(restarted=st.booleans())
+    def station_dies_over_a_fruit_and_then_the_interface(self, restarted: bool) -> None:
+        self.whole_cycle()
+        self.station_dies()
+        self.time_passes(1.1, beats=False)
+        if restarted:
+            self.station_restarts()
+        self.interface_restarts()
+
+    @rule(passed_s=st.sampled_from([0.0, 0.45, 1.1]), interface=st.booleans())
+    def begun_is_lost(self, passed_s: float, interface: bool) -> None:
+        """The station has begun; its answer never comes."""
+        self.heal()
+        self.trigger(armed=True, link=True)
+        while self.to_station:
+            self.serve(self.to_station.pop(0))
+        self.answers.clear()
+        self.time_passes(passed_s, beats=True)
+        if interface:
+            self.interface_restarts()
 
     @precondition(lambda self: self.station.up)
     @rule()
