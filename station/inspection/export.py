@@ -24,6 +24,35 @@ from station.inspection.states import STATES, State
 ROOT = Path(__file__).resolve().parents[2]
 MADE = "<!-- made by python -m station.inspection.export -->\n"
 
+CYCLE = f"""# The cycle
+
+{MADE}
+The station's cycle is one table in `station/inspection/cycle.py`: a state and an event lead to a state and actions.
+What it does not list is refused and counted. The service carries the actions out and reports what came of them as
+events.
+
+![The cycle](cycle.svg)
+
+The drawing leaves the disturbances out; the table below has them. A thick frame: an inspection that is not judged
+yet, which ends as NO_RESULT when it is disturbed. Red: only a person leads on. Where the arm or the gripper fails, the
+station waits in `held` until it was read again.
+
+What tests prove by walking through everything that the table can lead to, with a crash at any moment:
+
+- an accepted trigger has exactly one outcome, and the outcome is durable before it is published;
+- after a grip the arm does not move before the jaws are open, but to carry a judged fruit to its place;
+- nothing moves in a safety stop, and only a person's confirmation ends one;
+- after a fault nothing moves before every device was read;
+- from everywhere there is a way back to `idle`; where it needs a person, the state says so;
+- no row of the table is dead.
+"""
+ALARM = f"""# Alarms
+
+{MADE}
+An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and bit number - 1 of the PLC's
+alarm word is set while it is active.
+"""
+
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
     """What each file has to hold.
@@ -42,28 +71,7 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
 def cycle_document() -> str:
     """The cycle's states and its whole table."""
     parts = [
-        "# The cycle\n",
-        MADE,
-        (
-            "The station's cycle is one table in `station/inspection/cycle.py`: a state and an event lead to a state and "
-            "actions. What it does not list is refused and counted. The service carries the actions out and reports what "
-            "came of them as events.\n"
-        ),
-        "![The cycle](cycle.svg)\n",
-        (
-            "The drawing leaves the disturbances out; the table below has them. A thick frame: an inspection that is not "
-            "judged yet, which ends as NO_RESULT when it is disturbed. Red: only a person leads on. Where the arm or the "
-            "gripper fails, the station waits in `held` until it was read again.\n"
-        ),
-        "What tests prove by walking through everything that the table can lead to, with a crash at any moment:\n",
-        (
-            "- an accepted trigger has exactly one outcome, and the outcome is durable before it is published;\n"
-            "- after a grip the arm does not move before the jaws are open, but to carry a judged fruit to its place;\n"
-            "- nothing moves in a safety stop, and only a person's confirmation ends one;\n"
-            "- after a fault nothing moves before every device was read;\n"
-            "- from everywhere there is a way back to `idle`; where it needs a person, the state says so;\n"
-            "- no row of the table is dead.\n"
-        ),
+        CYCLE,
         "## States\n",
         _table(("state", "PackML", "a trigger is", "says", "the process may end here"), map(_state, STATES)),
         "## Table\n",
@@ -82,12 +90,7 @@ def cycle_document() -> str:
 def alarms_document() -> str:
     """Every alarm, and the life of one."""
     parts = [
-        "# Alarms\n",
-        MADE,
-        (
-            "An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and bit number - 1 "
-            "of the PLC's alarm word is set while it is active.\n"
-        ),
+        ALARM,
         _table(
             ("number", "alarm", "priority", "cause"),
             (
