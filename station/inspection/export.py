@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from station.inspection.alarm_table import ALARMS, AlarmId, Priority
+from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
 from station.inspection.alarms import (
     CHATTER_RAISES,
     CHATTER_S,
@@ -98,9 +98,7 @@ def alarms_document() -> str:
                 for alarm, row in ALARMS.items()
             ),
         ),
-        "Priorities: "
-        + ", ".join(f"{sum(row.priority == level for row in ALARMS.values())} {level}" for level in Priority)
-        + ".\n",
+        _table(("priority", "means", "alarms"), map(_priority, Priority)),
         *(part for alarm in ALARMS for part in _alarm(alarm)),
         "## Life of an alarm\n",
         (
@@ -143,6 +141,10 @@ def _acts(actions: Iterable[Act]) -> str:
         f"alarm [`{action.alarm}`](alarms.md#{_heading(action.alarm)})" if isinstance(action, Raise) else f"`{action}`"
         for action in actions
     )
+
+
+def _priority(priority: Priority) -> tuple[str, ...]:
+    return priority.value, PRIORITIES[priority], str(sum(row.priority == priority for row in ALARMS.values()))
 
 
 def _alarm(alarm: AlarmId) -> Iterable[str]:
