@@ -62,7 +62,9 @@ def scenario() -> Callable[[Callable[[], Awaitable[Any]]], Any]:
 @pytest.fixture
 def trigger() -> Trigger:
     recipe = RecipeSnapshot.of(find_recipe("strawberry").model_dump(mode="json"))
-    return Trigger(trigger_id=7, encoder=1234, lot="A-17", began_utc_ms=1_700_000_000_000, recipe=recipe, simulated=True)
+    return Trigger(
+        trigger_id=7, encoder=1234, lot="A-17", began_utc_ms=1_700_000_000_000, recipe=recipe, simulated=True
+    )
 
 
 @pytest.fixture

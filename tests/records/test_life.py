@@ -167,6 +167,18 @@ def test_a_malformed_record_is_refused_and_the_inspection_stays_open(opened, sce
     scenario(steps)
 
 
+def test_a_trigger_that_no_outcome_could_be_told_of_is_refused_at_the_door(opened, scenario, trigger):
+    async def steps():
+        async with opened() as records:
+            for change in ({"lot": "x" * 33}, {"trigger_id": 0}, {"encoder": -1}, {"began_utc_ms": -1}):
+                with pytest.raises(BadRecordError):
+                    await records.begin(replace(trigger, **change))
+        async with opened() as records:
+            assert records.lost == ()
+
+    scenario(steps)
+
+
 def test_an_odd_figure_costs_no_record(opened, scenario, trigger, passed):
     async def steps():
         async with opened() as records:
@@ -288,7 +300,9 @@ def test_closed_records_refuse_in_words(opened, scenario, trigger):
         max_size=25,
     )
 )
-def test_any_history_has_one_outcome_for_each_trigger(opened, scenario, tmp_path, trigger, passed, failed, history):
+def test_any_history_has_one_outcome_for_each_trigger(  # noqa: C901 (a model and its steps)
+    opened, scenario, tmp_path, trigger, passed, failed, history
+):
     """The records against a model of the contract: sequence to (judged, standing, told, taken)."""
     folder = tmp_path / f"{abs(hash(tuple(history)))}-{len(list(tmp_path.iterdir()))}"
     model: dict[int, list] = {}
