@@ -5,11 +5,11 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from sqlalchemy import Connection
 
@@ -190,7 +190,7 @@ class Records:
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
         reserved = wanted and opened.images.reserve()
         state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
-        accepted = PENDING if reserved and accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
+        accepted = state if accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
         future = opened.writer.submit(
             lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
         )
@@ -274,11 +274,11 @@ class Records:
         """The alarms that were saved last."""
         return await self._ask(read_alarms)
 
-    async def count(self, **by: int) -> dict[str, int]:
+    async def count(self, by: Mapping[str, int]) -> dict[str, int]:
         """Add to counters that outlive restarts and give all of them."""
         return await self._ask(lambda connection: add_counts(connection, by))
 
-    async def note_event(self, name: str, sequence: int | None = None, **details: float | str | bool | None) -> None:
+    async def note_event(self, name: str, details: Mapping[str, Any], sequence: int | None = None) -> None:
         """Append to the events, with the time."""
         await self._ask(lambda connection: add_event(connection, name, sequence, details))
 
@@ -330,5 +330,8 @@ class Records:
             with reading(self.folder) as connection:
                 return question(connection)
 
-        async with asyncio.timeout(READING_S):
-            return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
+        try:
+            async with asyncio.timeout(READING_S):
+                return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
+        except TimeoutError:
+            raise RecordsDeadlineError(f"no answer within {READING_S:g} s", "look at the disk, or ask again") from None
