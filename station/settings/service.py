@@ -71,6 +71,14 @@ class ServiceSettings(Settings):
         ge=1.0,
         le=600.0,
     )
+    patience: float = setting(
+        2.0,
+        title="Patience",
+        description="Factor on the time that each phase is expected to take, before it counts as a device's fault; more "
+        "for a machine that has other work.",
+        ge=1.0,
+        le=50.0,
+    )
     clean_up_deadline_s: float = setting(
         20.0,
         title="Clean-up's deadline",
