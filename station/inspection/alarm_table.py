@@ -5,12 +5,21 @@ from typing import NamedTuple
 
 
 class Priority(StrEnum):
-    """How soon an operator has to act; few are critical, most are low."""
+    """How soon an operator has to act; the fewer the higher."""
 
     CRITICAL = "critical"
     HIGH = "high"
     MEDIUM = "medium"
     LOW = "low"
+
+
+PRIORITIES: dict[Priority, str] = {
+    Priority.CRITICAL: "A safety stop stands.",
+    Priority.HIGH: "Bad fruit may be among the good, or the station cannot come back by itself.",
+    Priority.MEDIUM: "Inspections are not made, or good fruit is lost.",
+    Priority.LOW: "It can wait for the next pause.",
+}
+"""What each asks for."""
 
 
 class AlarmId(StrEnum):
@@ -115,7 +124,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.ARM_LINK_LOST: AlarmRow(
         5,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The arm's controller does not answer, or its state is old.",
         _REFUSED,
         "Check that the controller is on and its network cable is in; the station connects again by itself.",
@@ -123,7 +132,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.ARM_NOT_REMOTE: AlarmRow(
         6,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The arm is in local control, its program was stopped, or another client holds its registers.",
         _REFUSED,
         "Switch the pendant to remote control, then `station devices recover program`.",
@@ -131,7 +140,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.GRIPPER_LINK_LOST: AlarmRow(
         7,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The gripper does not answer.",
         _REFUSED,
         "Check the gripper's cable and power; the station connects again by itself.",
@@ -139,7 +148,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.GRIPPER_FAULT: AlarmRow(
         8,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The gripper reports a fault of its own.",
         _REFUSED,
         "Do what the alarm's detail says; clear the fingers before the gripper is activated again.",
@@ -147,7 +156,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.GRIPPER_JAM: AlarmRow(
         9,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The gripper answers, but its fingers did not get where they were sent in time.",
         _REFUSED,
         "Look for what blocks the fingers and take it out.",
@@ -155,7 +164,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.CAMERA_LOST: AlarmRow(
         10,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The tactile camera gives no frames, or none of its protocol.",
         _REFUSED,
         "Check the camera's cable; the station connects again by itself.",
@@ -163,7 +172,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.CAMERA_STALE: AlarmRow(
         11,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The camera repeats itself, or its frames come late.",
         _REFUSED,
         "Pull the camera's plug and put it in again; if it comes back, change the camera.",
@@ -171,7 +180,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.CAMERA_LED_DEAD: AlarmRow(
         12,
-        Priority.MEDIUM,
+        Priority.LOW,
         "One colour of the sensor's light is missing.",
         "Areas are less certain; more fruit becomes NO_RESULT.",
         "Change the sensor at the next pause.",
@@ -195,7 +204,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.REFERENCE_BAD: AlarmRow(
         15,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "A reference is not sharp, or not like the golden one: something touches the gel, or the gel is torn.",
         "The inspection became NO_RESULT, and so will the next.",
         "See that nothing touches the gel; look at the gel, and change it if it is torn.",
@@ -211,7 +220,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.PLC_HEARTBEAT_LOST: AlarmRow(
         17,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The line's PLC is connected, but its heartbeat stands still, or it is not connected.",
         "No triggers come; results wait.",
         "See that the PLC is in run, and that its program writes the heartbeat.",
@@ -219,7 +228,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.PLC_INTERFACE_LOST: AlarmRow(
         18,
-        Priority.HIGH,
+        Priority.MEDIUM,
         "The PLC interface's process does not ask any more.",
         "The PLC gets no results; they are kept until it asks again.",
         "Wait for its restart; if it stays away, read its log.",
@@ -259,7 +268,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.CONFIGURATION_BROKEN: AlarmRow(
         23,
-        Priority.MEDIUM,
+        Priority.LOW,
         "The configuration file has an error.",
         "The last good configuration is used.",
         "Mend the line that the detail names; `station devices check` says whether it is good.",
@@ -267,7 +276,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.RECIPE_BROKEN: AlarmRow(
         24,
-        Priority.MEDIUM,
+        Priority.LOW,
         "A recipe's file has an error.",
         "The recipe's last good version is used, or it cannot be chosen.",
         "Mend the line that the detail names; `station recipes check` says whether it is good.",
@@ -307,7 +316,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.REJECT_RATE: AlarmRow(
         29,
-        Priority.MEDIUM,
+        Priority.LOW,
         "Far more or fewer fruit are rejected than usual.",
         "The lot is bad, or the measurement is.",
         "Look at some rejected fruit; check the lot, the recipe and the gel.",
@@ -315,7 +324,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.DEADLINE_MISSED: AlarmRow(
         30,
-        Priority.MEDIUM,
+        Priority.LOW,
         "An inspection did not end within its deadline.",
         "Its outcome is NO_RESULT, and the line diverts the fruit.",
         "Look at which phase was slow; check the load of the machine and the arm's speed slider.",

@@ -62,13 +62,15 @@ class Event(StrEnum):
     PERSON_CONFIRMED = "person_confirmed"
     """A person at the panel says that the cell is safe and the jaws are clear."""
     RECOVERED = "recovered"
+    FRUIT_HELD = "fruit_held"
+    """Reading the devices found something between the jaws away from the nest: a start after a crash while placing."""
 
 
 class Action(StrEnum):
     """What the service has to do, and the events that it ends with beside the faults."""
 
     READ_DEVICES = "read_devices"
-    """Read every device until all answer: READY, or the stop that stands."""
+    """Read every device until all answer: READY, FRUIT_HELD, or the stop that stands."""
     CLOSE_UNFINISHED = "close_unfinished"
     """Give every accepted trigger that has no durable outcome its NO_RESULT, durable, and publish every outcome that
     was not: UNFINISHED_CLOSED. Idempotent."""
@@ -99,7 +101,7 @@ class Action(StrEnum):
     MEASURE = "measure"
     """Measure the captured image that is next in order: MEASURED or EARLY_STOP."""
     HALT = "halt"
-    """Stop arm and gripper where they are and forget what was under way: its events come no more."""
+    """Stop arm and gripper where they are and forget what was under way, but for a write: its events come no more."""
     JUDGE = "judge"
     """JUDGED_ACCEPT or JUDGED_REJECT."""
     CLOSE_AS_NO_RESULT = "close_as_no_result"
@@ -274,6 +276,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.LATCHED,), (E.PERSON_CONFIRMED,), S.RECOVERING, (A.RECOVER_ARM,)),
     Row((S.RECOVERING,), (E.RECOVERED,), S.UNKNOWN, (A.READ_DEVICES,)),
     Row((S.RECOVERING,), (*MOTION_FAULTS, E.INTERNAL_FAULT), S.LATCHED),
+    Row((S.UNKNOWN, S.HELD), (E.FRUIT_HELD,), S.CARRIED, (A.HALT, Raise(AlarmId.FRUIT_HELD))),
     Row((S.CARRIED,), (E.PERSON_CONFIRMED,), S.UNKNOWN, (A.READ_DEVICES,)),
     *_latched(),
     # What is expected and changes nothing: a wait is going on, or CHECKING will ask again.

@@ -64,7 +64,7 @@ class StateFacts(NamedTuple):
     """The process may end here: no inspection is under way."""
 
 
-_BUSY = "An inspection is under way; the next trigger is accepted once the station is ready again."
+_BUSY = "Wait until the station is ready again."
 
 
 def _inspecting(what: str, packml: PackmlState = PackmlState.EXECUTE) -> StateFacts:

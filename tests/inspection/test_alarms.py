@@ -37,6 +37,7 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
         assert row.provoked_by
     counts = [sum(row.priority == priority for row in ALARMS.values()) for priority in Priority]
     assert counts[0] <= 3
+    assert counts[0] + counts[1] <= len(ALARMS) / 3
 
 
 def test_what_provokes_an_alarm_is_a_fault_that_the_twin_has():

@@ -95,6 +95,16 @@ def test_no_state_is_without_an_answer_to_a_fault(event):
     assert {state for state in State if (state, event) not in TABLE} == set()
 
 
+def test_a_fruit_away_from_its_place_is_taken_out_by_a_person():
+    for state in (State.PLACING_ACCEPT, State.PLACING_REJECT):
+        for event in (Event.ARM_FAULT, Event.GRIPPER_FAULT, Event.INTERNAL_FAULT):
+            assert TABLE[state, event].state == State.CARRIED
+    for state in (State.UNKNOWN, State.HELD):
+        assert TABLE[state, Event.FRUIT_HELD].state == State.CARRIED
+    leaving = {e for (s, e), t in TABLE.items() if s == State.CARRIED and t.state not in (State.CARRIED, State.LATCHED)}
+    assert leaving == {Event.PERSON_CONFIRMED}
+
+
 def test_after_a_fault_nothing_moves_before_the_devices_were_read():
     for (state, event), transition in TABLE.items():
         if transition.state == State.HELD and state != State.HELD:

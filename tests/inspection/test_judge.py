@@ -146,6 +146,12 @@ def test_a_contact_that_is_lost_or_does_not_rise_is_no_result():
     assert "4.0 mm (30.0 mm²) does not fit the other steps" in fallen.findings[0].sentence
 
 
+def test_one_step_that_does_not_fit_the_others_proves_nothing():
+    verdict = judge(spoilt(pressed(20), 3.0, area_mm2=190.0), STRAWBERRY)
+    assert verdict.outcome == "NO_RESULT"
+    assert Reason.AREA_NOT_RISING in verdict.reasons
+
+
 def test_an_onset_seen_too_soon_does_not_make_a_soft_fruit_pass():
     late = Press(37.0, 0.4, tuple(point(float(c), max(0.5, 34.0 * (c - 2))) for c in range(7)))
     verdict = judge(late, STRAWBERRY)

@@ -1,0 +1,186 @@
+"""Write what is made from the domain's tables: `python -m station.inspection.export`, in a checkout.
+
+The documents of the cycle and of the alarms with the cycle's drawing; a test compares them.
+"""
+
+from collections.abc import Iterable
+from itertools import groupby
+from pathlib import Path
+
+from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
+from station.inspection.alarms import (
+    CHATTER_RAISES,
+    CHATTER_S,
+    LATCHED_LIFE,
+    LIFE,
+    LONGEST_SHELVED_S,
+    AlarmEvent,
+    AlarmState,
+)
+from station.inspection.cycle import REASONS, START, TABLE, Act, Event, Raise
+from station.inspection.diagram import diagram
+from station.inspection.states import STATES, State
+
+ROOT = Path(__file__).resolve().parents[2]
+MADE = "<!-- made by python -m station.inspection.export -->\n"
+
+CYCLE = f"""# The cycle
+
+{MADE}
+The station's cycle is one table in `station/inspection/cycle.py`: a state and an event lead to a state and actions.
+What it does not list is refused and counted. The service carries the actions out and reports what came of them as
+events.
+
+![The cycle](cycle.svg)
+
+The drawing leaves the disturbances out; the table below has them. A thick frame: an inspection that is not judged
+yet, which ends as NO_RESULT when it is disturbed. Red: only a person leads on. Where the arm or the gripper fails, the
+station waits in `held` until it was read again.
+
+What tests prove by walking through everything that the table can lead to, with a crash at any moment:
+
+- an accepted trigger has exactly one outcome, and the outcome is durable before it is published;
+- after a grip the arm does not move before the jaws are open, but to carry a judged fruit to its place;
+- nothing moves in a safety stop, and only a person's confirmation ends one;
+- after a fault nothing moves before every device was read;
+- from everywhere there is a way back to `idle`; where it needs a person, the state says so;
+- no row of the table is dead.
+"""
+ALARM = f"""# Alarms
+
+{MADE}
+An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and bit number - 1 of the PLC's
+alarm word is set while it is active.
+"""
+
+
+def exported(root: Path = ROOT) -> dict[Path, str]:
+    """What each file has to hold.
+
+    Args:
+        root: the checkout.
+    """
+    documents = root / "docs"
+    return {
+        documents / "cycle.md": cycle_document(),
+        documents / "cycle.svg": diagram(),
+        documents / "alarms.md": alarms_document(),
+    }
+
+
+def cycle_document() -> str:
+    """The cycle's states and its whole table."""
+    parts = [
+        CYCLE,
+        "## States\n",
+        _table(("state", "PackML", "a trigger is", "says", "the process may end here"), map(_state, STATES)),
+        "## Table\n",
+        (
+            f"It begins in `{START.state}` with {_acts(START.actions)}. Events with the same effect share a row; where "
+            "the state stays as it is, no next state is named.\n"
+        ),
+        *_transitions(),
+        "## Reasons\n",
+        "An inspection that an event closes as NO_RESULT has the event's reason.\n",
+        _table(("event", "reason"), ((f"`{event}`", f"`{reason}`") for event, reason in REASONS.items())),
+    ]
+    return "\n".join(parts)
+
+
+def alarms_document() -> str:
+    """Every alarm, and the life of one."""
+    parts = [
+        ALARM,
+        _table(
+            ("number", "alarm", "priority", "cause"),
+            (
+                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value, row.cause)
+                for alarm, row in ALARMS.items()
+            ),
+        ),
+        _table(("priority", "means", "alarms"), map(_priority, Priority)),
+        *(part for alarm in ALARMS for part in _alarm(alarm)),
+        "## Life of an alarm\n",
+        (
+            f"Shelving ends by itself, after {LONGEST_SHELVED_S / 3600:g} h at the latest. An alarm that is raised "
+            f"{CHATTER_RAISES} times within {CHATTER_S:g} s is told once, counted, and stays until it was quiet for "
+            f"{CHATTER_S:g} s. All of it is remembered over a restart.\n"
+        ),
+        _life(LIFE),
+        "Latched alarms are never shelved, and end only when a person has reset them after their cause is gone:\n",
+        _life(LATCHED_LIFE),
+    ]
+    return "\n".join(parts)
+
+
+def _state(state: State) -> tuple[str, ...]:
+    facts = STATES[state]
+    trigger = "accepted" if facts.refusal is None else f"refused: `{facts.refusal}`"
+    packml = "unknown" if facts.packml is None else facts.packml.value.upper()
+    return f"`{state}`", packml, trigger, facts.sentence, "yes" if facts.may_exit else ""
+
+
+def _transitions() -> Iterable[str]:
+    """A heading and a table for each state."""
+    for state, pairs in groupby(sorted(TABLE, key=lambda pair: list(State).index(pair[0])), key=lambda pair: pair[0]):
+        effects: dict[tuple[State, tuple[Act, ...]], list[Event]] = {}
+        for pair in sorted(pairs, key=lambda pair: list(Event).index(pair[1])):
+            effects.setdefault(TABLE[pair], []).append(pair[1])
+        yield f"### {state.value.replace('_', ' ')}\n"
+        yield _table(
+            ("event", "next", "actions"),
+            (
+                (", ".join(f"`{event}`" for event in events), "" if next_ == state else f"`{next_}`", _acts(actions))
+                for (next_, actions), events in effects.items()
+            ),
+        )
+
+
+def _acts(actions: Iterable[Act]) -> str:
+    return ", ".join(
+        f"alarm [`{action.alarm}`](alarms.md#{_heading(action.alarm)})" if isinstance(action, Raise) else f"`{action}`"
+        for action in actions
+    )
+
+
+def _priority(priority: Priority) -> tuple[str, ...]:
+    return priority.value, PRIORITIES[priority], str(sum(row.priority == priority for row in ALARMS.values()))
+
+
+def _alarm(alarm: AlarmId) -> Iterable[str]:
+    row = ALARMS[alarm]
+    yield f"## {alarm.value.replace('_', ' ')}\n"
+    yield f"Number {row.number}, {row.priority}{', latched' if row.latched else ''}.\n"
+    provoked = ", ".join(f"{device} `{fault}`" for device, fault in row.provoked_by)
+    yield _table(
+        ("", ""),
+        (("cause", row.cause), ("consequence", row.consequence), ("action", row.action), ("provoked by", provoked)),
+    )
+
+
+def _heading(alarm: AlarmId) -> str:
+    """A heading's anchor, as Git hosts make it."""
+    return alarm.value.replace("_", "-")
+
+
+def _life(life: dict[tuple[AlarmState, AlarmEvent], AlarmState]) -> str:
+    return _table(
+        ("state", "event", "next"),
+        ((f"`{state}`", f"`{event}`", f"`{next_}`") for (state, event), next_ in life.items()),
+    )
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table."""
+    lines = [head, ("---",) * len(head), *rows]
+    return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+
+
+def main() -> None:
+    """Write every file that is made from the tables."""
+    for path, text in exported().items():
+        path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
