@@ -25,6 +25,7 @@ COMMANDS = {
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
+    "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "service": Entry("station.commands.run:service", "Inspect fruit at the PLC's triggers."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }

@@ -28,6 +28,15 @@ CHECK_S = 5.0
 BUSY_MS = 1000
 
 
+def records_folder(home: Path) -> Path:
+    """The records' folder.
+
+    Args:
+        home: the station's home folder.
+    """
+    return home / "records"
+
+
 def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
     """Make an engine whose connections write ahead, durably, with real transactions.
 

@@ -22,6 +22,8 @@ _READ_ONLY = ("cannot be written", "make the folder and its files writable for t
 _LOCKED = ("another program holds the database", "close what has it open for writing")
 _DISK = ("the disk failed", "look at the system's log, and replace the disk if it says so")
 
+_NO_FOLDER = ("a file is where a folder has to be, or a folder where a file", "move it away, or set another home")
+
 _SQLITE: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
     sqlite3.SQLITE_FULL: (DiskFullError, _FULL),
     sqlite3.SQLITE_READONLY: (ReadOnlyError, _READ_ONLY),
@@ -42,6 +44,9 @@ _SYSTEM: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
     errno.EROFS: (ReadOnlyError, _READ_ONLY),
     errno.EACCES: (ReadOnlyError, _READ_ONLY),
     errno.EPERM: (ReadOnlyError, _READ_ONLY),
+    errno.EEXIST: (RecordsError, _NO_FOLDER),
+    errno.ENOTDIR: (RecordsError, _NO_FOLDER),
+    errno.EISDIR: (RecordsError, _NO_FOLDER),
 }
 
 

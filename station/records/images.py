@@ -154,7 +154,7 @@ class ImageStore:
         except (RecordsError, TimeoutError):
             self.results["failed"] += len(rows)
             return
-        self.results["kept"] += len(rows)
+        self.results.update({"kept": len(rows)} if rows else {})
 
     def _go_on(self) -> None:
         if self._stopping.is_set():

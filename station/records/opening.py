@@ -185,3 +185,27 @@ def _begin_again(connection: Connection, mark: SequenceMark, boot: str, notices:
     for notice in notices:
         add_event(connection, f"notice_{notice.code}", None, {"cause": notice.cause, "remedy": notice.remedy})
     return tuple(lost)
+
+
+def set_mark(folder: Path, number: int) -> None:
+    """Continue after this number, while no station has the folder.
+
+    Args:
+        folder: the records' folder.
+        number: the highest that was ever given.
+
+    Raises:
+        SequenceError: a higher one is known to have been given.
+        RecordsError: the folder is in use or cannot be written.
+    """
+    lock = lock_folder(folder)
+    try:
+        mark = SequenceMark(folder / MARK_NAME)
+        if number < mark.value:
+            raise SequenceError(f"{mark.value} was given already", f"give {mark.value} or a higher number")
+        mark.value = number
+        mark.save()
+    except OSError as error:
+        raise in_words(error, str(folder)) from error
+    finally:
+        os.close(lock)

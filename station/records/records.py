@@ -5,11 +5,11 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from sqlalchemy import Connection
 
@@ -274,11 +274,11 @@ class Records:
         """The alarms that were saved last."""
         return await self._ask(read_alarms)
 
-    async def count(self, **by: int) -> dict[str, int]:
+    async def count(self, by: Mapping[str, int]) -> dict[str, int]:
         """Add to counters that outlive restarts and give all of them."""
         return await self._ask(lambda connection: add_counts(connection, by))
 
-    async def note_event(self, name: str, sequence: int | None = None, **details: float | str | bool | None) -> None:
+    async def note_event(self, name: str, details: Mapping[str, Any], sequence: int | None = None) -> None:
         """Append to the events, with the time."""
         await self._ask(lambda connection: add_event(connection, name, sequence, details))
 

@@ -138,14 +138,17 @@ class Writer:
 
     def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
         """The work's result, or why it alone failed and was undone; what concerns all is raised."""
+        savepoint = connection.begin_nested()
         try:
-            with connection.begin_nested():
-                return work(connection)
+            result = work(connection)
         except Exception as error:
             told = in_words(error, self._place)
             if isinstance(told, CONCERNING_ALL):
-                raise
+                raise told from error  # SQLite may have undone all of it already, the savepoint too
+            savepoint.rollback()
             return told
+        savepoint.commit()
+        return result
 
     def _disconnect(self) -> None:
         if self._connection is not None:

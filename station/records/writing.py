@@ -33,7 +33,11 @@ def utc_ms() -> int:
 
 
 def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot: str) -> None:
-    """Begin an inspection."""
+    """Begin an inspection.
+
+    Raises:
+        BadRecordError: no outcome could ever be told of such a trigger.
+    """
     recipe = trigger.recipe
     if recipe is not None:
         snapshot = {
@@ -45,21 +49,19 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
             "text": recipe.text,
         }
         connection.execute(upsert(recipe_snapshots).values(snapshot).on_conflict_do_nothing())
-    connection.execute(
-        insert(inspections).values(
-            sequence=sequence,
-            boot=boot,
-            trigger_id=trigger.trigger_id,
-            encoder=trigger.encoder,
-            lot=trigger.lot,
-            recipe_sha256=recipe.sha256 if recipe else None,
-            recipe_number=recipe.number if recipe else 0,
-            recipe_checksum=recipe.checksum if recipe else 0,
-            simulated=trigger.simulated,
-            began_utc_ms=trigger.began_utc_ms,
-            images_state="",
-        )
-    )
+    begun = {
+        "sequence": sequence,
+        "trigger_id": trigger.trigger_id,
+        "encoder": trigger.encoder,
+        "lot": trigger.lot,
+        "recipe_number": recipe.number if recipe else 0,
+        "recipe_checksum": recipe.checksum if recipe else 0,
+        "simulated": trigger.simulated,
+        "began_utc_ms": trigger.began_utc_ms,
+    }
+    _lost(begun)
+    sha256 = recipe.sha256 if recipe else None
+    connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
 
 
 def withdraw(connection: Connection, sequence: int) -> None:
@@ -86,7 +88,7 @@ def conclude(
     standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
     if row.judged is not None and standing is not None:
         return standing, None
-    judged = _outcome(row, record)
+    judged = _judged(row._asdict(), record)
     standing = standing or judged
     passed = record.outcome == standing.outcome == "PASS"
     images_state = images_states["PASS" if passed else "other"]
@@ -160,26 +162,7 @@ def end_what_was_left(connection: Connection) -> list[int]:
         select(inspections).where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_(None))
     ).all()
     for row in rows:
-        lost = Outcome(
-            sequence=row.sequence,
-            trigger_id=row.trigger_id,
-            outcome="NO_RESULT",
-            reasons=(Reason.STATION_LOST,),
-            late=bool(row.late),
-            partial=row.judged is None or bool(row.partial),
-            simulated=row.simulated,
-            area_mm2=None,
-            area_px=None,
-            closing_mm=None,
-            confidence=None,
-            recipe_number=row.recipe_number,
-            recipe_checksum=row.recipe_checksum,
-            began_utc_ms=row.began_utc_ms,
-            ended_utc_ms=utc_ms() if row.ended_utc_ms is None else row.ended_utc_ms,
-            duration_ms=row.duration_ms or 0,
-            encoder=row.encoder,
-            lot=row.lot,
-        )
+        lost = _lost(row._asdict())
         connection.execute(
             update(inspections)
             .where(table.sequence == row.sequence)
@@ -251,33 +234,57 @@ def _row(connection: Connection, sequence: int) -> Any:
     return row
 
 
-def _outcome(row: Any, record: InspectionRecord) -> Outcome:
-    """What the PLC is to be told."""
+def _lost(begun: Mapping[str, Any]) -> Outcome:
+    """What the PLC is to be told of an inspection that was not surely delivered."""
+    return _outcome(
+        begun,
+        outcome="NO_RESULT",
+        reasons=(Reason.STATION_LOST,),
+        late=bool(begun.get("late")),
+        partial=begun.get("judged") is None or bool(begun.get("partial")),
+        area_mm2=None,
+        area_px=None,
+        closing_mm=None,
+        confidence=None,
+        ended_utc_ms=begun.get("ended_utc_ms") or utc_ms(),
+        duration_ms=begun.get("duration_ms") or 0,
+    )
+
+
+def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
+    """What the PLC is to be told of a record."""
     if bool(record.reasons) == (record.outcome == "PASS"):
-        raise BadRecordError(f"inspection {row.sequence}: {record.outcome} with {record.reasons}", "see the log")
+        raise BadRecordError(f"inspection {begun['sequence']}: {record.outcome} with {record.reasons}", "see the log")
+    return _outcome(
+        begun,
+        outcome=record.outcome,
+        reasons=tuple(Reason(reason) for reason in record.reasons),
+        late=record.late,
+        partial=record.partial,
+        area_mm2=None if record.area_mm2 is None else float(record.area_mm2),
+        area_px=None if record.area_px is None else int(record.area_px),
+        closing_mm=None if record.closing_mm is None else float(record.closing_mm),
+        confidence=None if record.confidence is None else float(record.confidence),
+        ended_utc_ms=record.ended_utc_ms,
+        duration_ms=record.duration_ms,
+    )
+
+
+def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
+    columns = (
+        "sequence",
+        "trigger_id",
+        "encoder",
+        "lot",
+        "recipe_number",
+        "recipe_checksum",
+        "simulated",
+        "began_utc_ms",
+    )
     try:
-        return Outcome(
-            sequence=row.sequence,
-            trigger_id=row.trigger_id,
-            outcome=record.outcome,
-            reasons=tuple(Reason(reason) for reason in record.reasons),
-            late=record.late,
-            partial=record.partial,
-            simulated=row.simulated,
-            area_mm2=None if record.area_mm2 is None else float(record.area_mm2),
-            area_px=None if record.area_px is None else int(record.area_px),
-            closing_mm=None if record.closing_mm is None else float(record.closing_mm),
-            confidence=None if record.confidence is None else float(record.confidence),
-            recipe_number=row.recipe_number,
-            recipe_checksum=row.recipe_checksum,
-            began_utc_ms=row.began_utc_ms,
-            ended_utc_ms=record.ended_utc_ms,
-            duration_ms=record.duration_ms,
-            encoder=row.encoder,
-            lot=row.lot,
-        )
-    except (ValidationError, ValueError) as error:
-        raise BadRecordError(f"the record of inspection {row.sequence} is malformed: {error}", "see the log") from error
+        return Outcome(**{name: begun[name] for name in columns}, **ended)
+    except ValidationError as error:
+        raise BadRecordError(f"inspection {begun['sequence']} is malformed: {error}", "see the log") from error
 
 
 def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:

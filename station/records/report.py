@@ -1,0 +1,171 @@
+"""Inspections as text for a terminal: why was fruit 4,711 rejected?"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from station.channel.line import Outcome
+from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
+from station.records.reading import Summary
+from station.records.wording import sentence, sparkline
+
+
+def described(record: FullRecord) -> str:
+    """All that is known of one inspection.
+
+    Args:
+        record: as the records give it.
+    """
+    return _printable("\n".join(_described(record)))
+
+
+def listed(summaries: Sequence[Summary]) -> str:
+    """A line for each inspection.
+
+    Args:
+        summaries: in the order of the lines.
+    """
+    rows = [("number", "begun (UTC)", "trigger", "lot", "fruit", "outcome", "s", "reasons", "curve")]
+    rows += [
+        (
+            str(summary.sequence),
+            _time(summary.began_utc_ms),
+            str(summary.trigger_id),
+            summary.lot or "-",
+            summary.fruit,
+            summary.outcome or "running",
+            "-" if summary.duration_ms is None else f"{summary.duration_ms / 1000:.2f}",
+            ", ".join(summary.reasons) or "-",
+            sparkline(summary.areas_mm2) or "-",
+        )
+        for summary in summaries
+    ]
+    return _printable(_columns(rows))
+
+
+def _described(record: FullRecord) -> Iterator[str]:
+    trigger, judged, standing = record.trigger, record.judged, record.standing
+    fruit = trigger.recipe.name if trigger.recipe else "no recipe"
+    yield f"inspection {record.sequence}: {fruit}, {standing.outcome if standing else 'running'}"
+    yield _field(
+        "trigger",
+        f"{trigger.trigger_id}, encoder {trigger.encoder}, lot {trigger.lot or 'not named'}, start {record.boot}",
+    )
+    ended = "" if judged is None else f", took {judged.duration_ms / 1000:.3f} s"
+    yield _field("begun", f"{_time(trigger.began_utc_ms)} UTC{ended}")
+    if trigger.simulated:
+        yield _field("simulated", "a twin's device took part")
+    yield from _why(judged, standing)
+    yield _field("told the PLC", _told(record))
+    if trigger.recipe:
+        yield from _recipe(trigger.recipe)
+    if judged:
+        yield from _judged(judged)
+    yield _field("images", record.images_state or "none")
+    for image in record.images:
+        step = "" if image.step is None else f" {image.step}"
+        yield f"  {image.kind}{step}: {image.path}"
+
+
+def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[str]:
+    if judged:
+        area = "no valid area" if judged.area_mm2 is None else f"area {judged.area_mm2:.1f} mm² ({judged.area_px} px)"
+        closing = "" if judged.closing_mm is None else f" at {judged.closing_mm:.2f} mm of closing"
+        late = ", late" if judged.late else ""
+        partial = ", ended before its last step" if judged.partial else ""
+        yield _field("judged", f"{judged.outcome}, {area}{closing}{late}{partial}")
+        for text in judged.explanation:
+            yield f"  {text}"
+        for reason in judged.reasons:
+            yield f"  {reason}: {sentence(reason)}"
+    else:
+        yield _field("judged", "not")
+    if standing and (judged is None or judged.outcome != standing.outcome or judged.reasons != standing.reasons):
+        yield _field("stands", standing.outcome)
+        for reason in standing.reasons:
+            yield f"  {reason}: {sentence(reason)}"
+
+
+def _told(record: FullRecord) -> str:
+    if record.standing is None or record.published_utc_ms is None:
+        return "not yet"
+    told = f"{record.standing.outcome} at {_time(record.published_utc_ms)} UTC"
+    if record.acknowledged_utc_ms is None:
+        return f"{told}, not acknowledged"
+    return f"{told}, acknowledged at {_time(record.acknowledged_utc_ms)} UTC"
+
+
+def _recipe(recipe: RecipeSnapshot) -> Iterator[str]:
+    revision = f", revision {recipe.revision}" if recipe.revision else ""
+    yield _field("recipe", f"{recipe.name}, number {recipe.number}{revision}, SHA-256 {recipe.sha256[:16]}…")
+    try:
+        yield from _limits(json.loads(recipe.text))
+    except (KeyError, TypeError):  # of another form than today's
+        yield f"  {recipe.text}"
+
+
+def _limits(recipe: Any) -> Iterator[str]:
+    damage, early = recipe["damage"], recipe["early_stop"]
+    for limit in damage["area"]:
+        yield f"  fails above {limit['area_mm2']:g} mm² at {limit['closing_mm']:g} mm of closing"
+    yield f"  fails above {damage['growth_mm2_per_mm']:g} mm² of growth per mm"
+    yield f"  stops early above {early['area_mm2']:g} mm², or {early['growth_mm2_per_mm']:g} mm² of growth per mm"
+
+
+def _judged(judged: InspectionRecord) -> Iterator[str]:
+    if judged.curve:
+        yield _field("curve", sparkline([point.area_mm2 for point in judged.curve]))
+        yield "\n".join(f"  {line}" for line in _columns(_curve_rows(judged.curve)).splitlines())
+    for title, values in (("measures", judged.measures), ("phases, s", judged.phases_s)):
+        if values:
+            yield _field(title, _pairs(values))
+    for title, values in (("devices", judged.devices), ("versions", judged.versions)):
+        if values:
+            yield _field(title, _pairs(values))
+
+
+def _curve_rows(curve: Sequence[CurvePoint]) -> list[tuple[str, ...]]:
+    rows = [("step", "width mm", "closing mm", "area mm²", "px", "confidence", "flags")]
+    rows += [
+        (
+            str(point.step),
+            f"{point.width_mm:.2f}",
+            _number(point.closing_mm, ".2f"),
+            _number(point.area_mm2, ".1f"),
+            _number(point.area_px, "d"),
+            _number(point.confidence, ".2f"),
+            ", ".join(point.flags) or "-",
+        )
+        for point in curve
+    ]
+    return rows
+
+
+def _pairs(values: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{name} {_number(value, '.4g') if isinstance(value, float) else value}" for name, value in values.items()
+    )
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
+
+
+def _printable(text: str) -> str:
+    """Without what would command the terminal: a lot's name comes from outside."""
+    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
+
+
+def _field(title: str, text: str) -> str:
+    return f"{title + ':':14}{text}"
+
+
+def _time(utc_ms: int) -> str:
+    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+
+
+def _columns(rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines)

@@ -1,0 +1,121 @@
+"""Log lines for machines and for people."""
+
+import asyncio
+import io
+import json
+import logging
+from typing import Literal
+
+import pytest
+import structlog
+
+from station.channel.line import Reason
+from station.service.logs import configure_logging, fruit_line, inspecting
+
+
+@pytest.fixture
+def logged():
+    """Log to a text of the test's own, and put everything back."""
+    root = logging.getLogger()
+    before, level = list(root.handlers), root.level
+    stream = io.StringIO()
+
+    def start(style: Literal["json", "human"] = "json", **options):
+        configure_logging("station", style, stream=stream, **options)
+        return stream
+
+    yield start
+    for handler in set(root.handlers) - set(before):
+        root.removeHandler(handler)
+    root.setLevel(level)
+    structlog.reset_defaults()
+
+
+def lines(stream):
+    return [json.loads(line) for line in stream.getvalue().splitlines()]
+
+
+def test_each_line_is_json_with_event_time_process_and_inspection(logged):
+    stream = logged()
+    with inspecting(4711):
+        structlog.get_logger("cycle").info("fruit_judged", outcome="PASS", area_mm2=3.5)
+        logging.getLogger("uvicorn.error").info("chatter")
+        logging.getLogger("station.x").warning("in %d words", 3, extra={"who": "me"})
+    logging.getLogger("station.x").warning("after")
+    first, second, third = lines(stream)
+    assert first["event"] == "fruit_judged"
+    assert (first["outcome"], first["area_mm2"], first["sequence"], first["process"]) == ("PASS", 3.5, 4711, "station")
+    assert first["time"].endswith("Z")
+    assert (second["event"], second["who"], second["sequence"], second["level"]) == (
+        "in 3 words",
+        "me",
+        4711,
+        "warning",
+    )
+    assert "sequence" not in third
+
+
+def test_a_task_begun_inside_keeps_the_inspection(logged):
+    stream = logged()
+
+    async def one(sequence):
+        with inspecting(sequence):
+            await asyncio.gather(*(asyncio.create_task(deeper(sequence)) for _ in range(2)))
+
+    async def deeper(sequence):
+        await asyncio.sleep(0)
+        structlog.get_logger("x").info("deeper", wanted=sequence)
+
+    async def both():
+        await asyncio.gather(one(1), one(2))
+
+    asyncio.run(both())
+    assert len(lines(stream)) == 4
+    assert all(line["sequence"] == line["wanted"] for line in lines(stream))
+
+
+def test_secrets_are_hidden_in_fields_and_in_tracebacks(logged):
+    stream = logged()
+
+    def fails(password):
+        raise RuntimeError("no access")
+
+    structlog.get_logger("x").info("login", api_key="hunter2", user="ann", pin="hunter2", spinning=1)
+    logging.getLogger("y").warning("login", extra={"token": "hunter2"})
+    try:
+        fails("hunter" + "2")
+    except RuntimeError:
+        logging.getLogger("y").exception("failed")
+    assert "hunter2" not in stream.getvalue()
+    login, _, failed = lines(stream)
+    assert (login["user"], login["spinning"], login["api_key"]) == ("ann", 1, "(hidden)")
+    assert "RuntimeError: no access" in failed["exception"]
+
+
+def test_a_second_configuration_replaces_the_first(logged):
+    logged()
+    stream = logged(level="WARNING")
+    structlog.get_logger("x").info("quiet")
+    logging.getLogger("y").warning("once")
+    assert [line["event"] for line in lines(stream)] == ["once"]
+
+
+def test_lines_for_a_person(logged):
+    stream = logged("human")
+    with inspecting(7):
+        structlog.get_logger("x").info("fruit_judged", outcome="PASS")
+    (line,) = stream.getvalue().splitlines()
+    assert "fruit_judged" in line
+    assert "sequence=7" in line
+    assert not line.startswith("{")
+
+
+def test_one_line_a_fruit(outcome):
+    areas = [0.0, 10.0, None, 31.5]
+    assert fruit_line(outcome, "strawberry", (), areas) == (
+        "fruit 4711  trigger 12  strawberry  ▁▃·█  PASS  31.5 mm² at 4.0 mm  3.21 s"
+    )
+    late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "closing_mm": None}
+    assert fruit_line(outcome.model_copy(update=late), "", ("the deadline of 8 s was over",), []) == (
+        "fruit 4711  trigger 12  no recipe  -  NO_RESULT  no area  3.21 s  late  the deadline of 8 s was over"
+    )

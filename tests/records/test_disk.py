@@ -1,0 +1,352 @@
+"""Full, read-only, locked, damaged and missing: said in words, and got over where that is safe."""
+
+import asyncio
+import contextlib
+import os
+import random
+import resource
+import sqlite3
+import subprocess
+import threading
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from sqlalchemy import event
+
+from station.cli import cli
+from station.records.database import FILE_NAME, open_engine
+from station.records.errors import (
+    DamagedError,
+    DiskFullError,
+    LockedError,
+    ReadOnlyError,
+    RecordsDeadlineError,
+    RecordsError,
+    SequenceError,
+)
+from station.records.model import RecipeSnapshot, Trigger
+from station.records.opening import MARK_NAME
+from station.records.records import Records
+from station.records.sequence_mark import SequenceMark
+
+
+def bulky(trigger: Trigger, size_bytes: int) -> Trigger:
+    """A trigger that takes so much space."""
+    return replace(trigger, recipe=RecipeSnapshot("bulky", 1, "", random.Random().randbytes(size_bytes // 2).hex()))
+
+
+async def begin_many(records: Records, triggers: Iterable[Trigger]) -> None:
+    for trigger in triggers:
+        await records.begin(trigger)
+        await records.open_inspections()
+
+
+def fill(path: Path) -> None:
+    """Take all the space that is left."""
+    with contextlib.suppress(OSError), path.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+
+
+def test_a_full_disk_refuses_and_takes_again_when_there_is_space(opened, scenario, trigger, passed, small_disk):
+    async def steps():
+        async with opened(small_disk) as records:
+            sequence = await records.begin(trigger)
+            filler = small_disk / "filler"
+            fill(filler)
+            with pytest.raises(DiskFullError, match="less than the reserve"):
+                await records.begin(trigger)
+            large = replace(passed, explanation=("x" * 8_000_000,))
+            with pytest.raises(DiskFullError, match="the disk is full"):
+                await records.conclude(sequence, large)
+            assert records.status().failures["disk_full"] == 2
+            assert "the disk is full" in records.status().error
+            filler.unlink()
+            assert (await records.conclude(sequence, passed)).outcome == "PASS"
+            assert await records.begin(trigger) > sequence
+            assert records.status().error == ""
+
+    scenario(steps)
+
+
+def test_a_full_database_is_a_full_disk(opened, scenario, trigger, monkeypatch):
+    """SQLite's own SQLITE_FULL, without a disk of the test's."""
+    monkeypatch.setattr("station.records.opening.open_engine", _limited)
+
+    async def steps():
+        async with opened() as records:
+            with pytest.raises(DiskFullError):
+                await begin_many(records, (bulky(trigger, 100_000) for _ in range(100)))
+            assert await records.begin(replace(trigger, recipe=None)) > 1, "a small one still fits"
+
+    scenario(steps)
+
+
+def _limited(path, mode):
+    engine = open_engine(path, mode)
+    event.listen(engine, "connect", lambda connection, _: connection.execute("PRAGMA max_page_count = 120"))
+    return engine
+
+
+def test_a_file_size_limit_is_told_and_nothing_is_lost(opened, scenario, trigger):
+    """The kernel refuses to let any file grow (EFBIG), in the middle of the work."""
+
+    async def steps():
+        async with opened() as records:
+            before = resource.getrlimit(resource.RLIMIT_FSIZE)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, before[1]))
+            try:
+                with pytest.raises(RecordsError, match="the disk"):
+                    await begin_many(records, (bulky(trigger, 40_000) for _ in range(100)))
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, before)
+            begun = len((await records.open_inspections()).running)
+            assert begun > 0
+            sequence = await records.begin(trigger)
+            running = (await records.open_inspections()).running
+            assert running == (*((number, 7) for number in range(1, begun + 1)), (sequence, 7))
+
+    scenario(steps)
+
+
+def test_a_read_only_disk_is_told(opened, scenario, trigger, passed, small_disk):
+    def remount(how):
+        subprocess.run(["mount", "-o", f"remount,{how}", small_disk], check=True)
+
+    async def steps():
+        async with opened(small_disk) as records:
+            await records.begin(trigger)
+        remount("ro")
+        with pytest.raises(ReadOnlyError, match="cannot be written"):
+            async with opened(small_disk):
+                pass
+        remount("rw")
+        async with opened(small_disk) as records:
+            assert records.lost == (1,)
+
+    scenario(steps)
+
+
+def test_a_database_that_becomes_read_only_is_told_and_got_over(opened, scenario, trigger):
+    async def steps():
+        async with opened() as records:
+            await _run_in_writer(records, lambda connection: connection.exec_driver_sql("PRAGMA query_only = 1"))
+            with pytest.raises(ReadOnlyError, match="readonly"):
+                await records.begin(trigger)
+            assert await records.begin(trigger), "the next one has a new connection"
+            assert records.status().failures == {"read_only": 1}
+
+    scenario(steps)
+
+
+async def _run_in_writer(records, work):
+    return await asyncio.wrap_future(records._opened.writer.submit(work))
+
+
+@pytest.mark.parametrize("name", ["", "lock"])
+def test_something_else_in_the_place_of_the_records_is_told(opened, scenario, folder, name):
+    place = folder / name
+    if name:
+        place.mkdir(parents=True)
+    else:
+        place.write_text("a file")
+
+    async def steps():
+        with pytest.raises(RecordsError, match="move it away, or set another home"):
+            async with opened():
+                pass
+
+    scenario(steps)
+
+
+def test_a_locked_database_is_told_and_waits_for_nobody_for_ever(opened, scenario, trigger, folder):
+    async def steps():
+        async with opened() as records:
+            other = sqlite3.connect(folder / FILE_NAME, isolation_level=None)
+            other.execute("BEGIN IMMEDIATE")
+            with pytest.raises(LockedError, match="another program holds the database"):
+                await records.begin(trigger)
+            other.execute("ROLLBACK")
+            other.close()
+            assert await records.begin(trigger)
+
+    scenario(steps)
+
+
+def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
+    async def steps():
+        async with opened(deadline_s=0.2) as records:
+            gate = threading.Event()
+            waiting = asyncio.create_task(_run_in_writer(records, lambda _: gate.wait(30)))
+            await asyncio.sleep(0)
+            under_way = asyncio.create_task(records.begin(trigger))
+            with pytest.raises(RecordsDeadlineError, match="it within"):
+                await under_way
+            gate.set()
+            await waiting
+        async with opened() as records:
+            assert records.lost == ()
+            assert (await records.open_inspections()).running == ()
+
+    scenario(steps)
+
+
+def test_a_begin_whose_caller_has_gone_is_withdrawn_even_when_it_is_durable(opened, scenario, trigger, monkeypatch):
+    inserted, gate = threading.Event(), threading.Event()
+    save = SequenceMark.save
+
+    def slow(self):
+        inserted.set()
+        gate.wait(30)
+        save(self)
+
+    async def steps():
+        async with opened() as records:
+            monkeypatch.setattr(SequenceMark, "save", slow)
+            caller = asyncio.create_task(records.begin(trigger))
+            while not inserted.is_set():
+                await asyncio.sleep(0.005)
+            caller.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await caller
+            gate.set()
+            assert await records.begin(trigger) == 2, "its number is not given again"
+            assert (await records.open_inspections()).running == ((2, 7),)
+
+    scenario(steps)
+
+
+def _damage_middle(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[4096:] = random.Random(3).randbytes(len(content) - 4096)
+    path.write_bytes(content)
+
+
+DAMAGES = {
+    "middle": _damage_middle,
+    "head": lambda path: path.write_bytes(b"no database at all" * 1000),
+    "cut": lambda path: os.truncate(path, path.stat().st_size // 2 + 100),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_database_is_moved_aside_and_the_numbers_go_on(
+    opened, scenario, trigger, failed, folder, noise, settled, damage
+):
+    async def steps():
+        async with opened() as records:
+            for _ in range(3):
+                sequence = await records.begin(trigger)
+                await records.conclude(sequence, replace(failed, images=(noise(),)))
+            await settled(records)
+        DAMAGES[damage](folder / FILE_NAME)
+        async with opened() as records:
+            (notice,) = records.notices
+            assert notice.code == "damaged"
+            assert "after number 3" in notice.cause
+            (aside,) = (folder / "aside").iterdir()
+            assert str(aside) in notice.remedy
+            assert (aside / FILE_NAME).exists()
+            assert len(list((aside / "images").glob("*/*.png"))) == 3, "their images are evidence"
+            assert await records.begin(trigger) == 4
+        async with opened() as records:
+            assert records.notices == ()
+            assert await records.begin(trigger) == 5
+
+    scenario(steps)
+
+
+def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(opened, scenario, trigger, failed, folder):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            outcome = await records.conclude(sequence, failed)
+            for file in folder.glob(f"{FILE_NAME}*"):
+                file.unlink()
+            for _ in range(2):
+                with pytest.raises(DamagedError, match="was removed or replaced"):
+                    await records.begin(trigger)
+            await records.reopen()
+            (notice,) = records.notices
+            assert "there was none, though" in notice.cause
+            assert await records.published(outcome), "what only the interface still knows is taken from it"
+            full = await records.inspection(sequence)
+            assert (full.standing, full.judged, full.trigger.lot) == (outcome, None, "A-17")
+            assert await records.begin(trigger) > sequence
+
+    scenario(steps)
+
+
+def test_damage_found_while_running_is_told_and_got_over_by_reopening(opened, scenario, trigger, folder):
+    async def steps():
+        async with opened() as records:
+            for _ in range(40):
+                await records.begin(bulky(trigger, 4000))
+            await records.reopen()
+            with (folder / FILE_NAME).open("r+b") as file:
+                file.seek(4096)
+                file.write(random.Random(3).randbytes((folder / FILE_NAME).stat().st_size - 4096))
+            with pytest.raises(DamagedError):
+                await begin_many(records, (bulky(trigger, 4000) for _ in range(50)))
+            await records.reopen()
+            assert [notice.code for notice in records.notices] == ["damaged"]
+            assert await records.begin(trigger) > 40
+
+    scenario(steps)
+
+
+def test_numbers_are_refused_when_nothing_tells_which_were_given(opened, scenario, trigger, folder):
+    async def steps():
+        async with opened() as records:
+            assert await records.begin(trigger) == 1
+        (folder / FILE_NAME).write_bytes(b"nothing" * 5000)
+        (folder / MARK_NAME).write_bytes(b"\0" * 40)
+        with pytest.raises(SequenceError, match="continue-after"):
+            async with opened():
+                pass
+        assert not (folder / "aside").exists(), "nothing was changed"
+        said = CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", "continue-after", "700"])
+        assert (said.output, said.exit_code) == ("the next inspection is number 701\n", 0)
+        async with opened() as records:
+            assert await records.begin(trigger) == 701
+
+    scenario(steps)
+
+
+def test_a_lost_mark_is_taken_from_the_database_and_an_old_database_from_the_mark(opened, scenario, trigger, folder):
+    async def steps():
+        async with opened() as records:
+            assert await records.begin(trigger) == 1
+        (folder / MARK_NAME).unlink()
+        old = folder / FILE_NAME
+        copy = old.read_bytes()
+        async with opened() as records:
+            assert [await records.begin(trigger) for _ in range(2)] == [2, 3]
+        old.write_bytes(copy)
+        async with opened() as records:
+            assert await records.begin(trigger) == 4, "a copy put back gives no number twice"
+
+    scenario(steps)
+
+
+@pytest.mark.parametrize("cut", range(0, 41, 4))
+def test_a_torn_mark_costs_at_most_the_write_that_tore_it(tmp_path, cut):
+    path = tmp_path / "sequence"
+    mark = SequenceMark(path)
+    for value in (5, 6, 8, 11):
+        mark.value = value
+        mark.save()
+    before = path.read_bytes()
+    mark.value = 12
+    mark.save()
+    after = path.read_bytes()
+    changed = [place for place in range(40) if before[place] != after[place]]
+    torn = bytearray(before)
+    for place in changed[: len(changed) * cut // 40]:
+        torn[place] = after[place]
+    path.write_bytes(torn)
+    assert SequenceMark(path).value in {11, 12}
+    assert SequenceMark(path).known

@@ -1,0 +1,222 @@
+"""Which images are kept, for how long, and what is said of those that are not."""
+
+import asyncio
+import errno
+import sqlite3
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from station.records.images import ImageStore, accepted_is_kept
+from station.records.model import Image
+
+
+@pytest.fixture
+def inspected(trigger, passed, failed):
+    """Inspect one fruit with these images, and give its number."""
+
+    async def inspect(records, *images, accepted=False):
+        sequence = await records.begin(trigger)
+        outcome = await records.conclude(sequence, replace(passed if accepted else failed, images=images))
+        await records.published(outcome)
+        return sequence
+
+    return inspect
+
+
+def test_a_rejected_fruits_images_are_kept_without_loss(opened, scenario, inspected, noise, settled):
+    mask = Image("mask", 0, np.eye(9, dtype=np.uint8) * 255)
+    images = (noise("reference", None), noise(), mask)
+
+    async def steps():
+        async with opened() as records:
+            sequence = await inspected(records, *images)
+            await settled(records)
+            full = await records.inspection(sequence)
+            assert full.images_state == "kept"
+            assert [(image.kind, image.step) for image in full.images] == [
+                ("reference", None),
+                ("step", 0),
+                ("mask", 0),
+            ]
+            for stored, given_image in zip(full.images, images, strict=True):
+                read = cv2.imread(stored.path, cv2.IMREAD_UNCHANGED)
+                assert read is not None
+                assert np.array_equal(read, given_image.pixels)
+            assert records.status().images == {"kept": 3}
+            files = (records.folder / "images").glob("*/*.png")
+            assert sorted(file.stat().st_size for file in files) == sorted(image.size_bytes for image in full.images)
+            assert records.status().image_bytes == sum(image.size_bytes for image in full.images)
+
+    scenario(steps)
+
+
+def test_a_share_of_the_accepted_is_kept(opened, scenario, inspected, noise, settled):
+    async def steps():
+        async with opened(accepted_share=0.25, images_queue=64) as records:
+            numbers = [await inspected(records, noise(), accepted=True) for _ in range(8)]
+            await settled(records)
+            states = [(await records.inspection(number)).images_state for number in numbers]
+            assert states == ["not wanted", "not wanted", "not wanted", "kept"] * 2
+
+    scenario(steps)
+
+
+@given(st.integers(0, 2**32 - 200), st.floats(0, 1))
+def test_the_share_is_evenly_spread(first, share):
+    kept = sum(accepted_is_kept(sequence, share) for sequence in range(first + 1, first + 101))
+    assert abs(kept - 100 * share) <= 1 + 1e-6
+
+
+def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
+    opened, scenario, inspected, noise, settled
+):
+    """An image is 0.3 MB, so that 3 fit."""
+
+    async def steps():
+        async with opened(accepted_share=1.0, images_quota_mb=1) as records:
+
+            async def add(*, accepted):
+                number = await inspected(records, noise(side_px=315), accepted=accepted)
+                await settled(records)
+                return number
+
+            async def kept():
+                return [n for n in numbers if (await records.inspection(n)).images_state == "kept"]
+
+            numbers = [await add(accepted=False), await add(accepted=True), await add(accepted=True)]
+            assert await kept() == [1, 2, 3]
+            numbers.append(await add(accepted=True))
+            assert await kept() == [1, 3, 4], "the oldest accepted went"
+            numbers += [await add(accepted=False), await add(accepted=False)]
+            assert await kept() == [1, 5, 6], "the accepted went before any rejected"
+            numbers.append(await add(accepted=True))
+            assert await kept() == [1, 5, 6], "an accepted one pushes out no rejected one"
+            last = await records.inspection(7)
+            assert last.images_state == "dropped: the quota is full of images of rejected fruit"
+            numbers.append(await add(accepted=False))
+            assert await kept() == [5, 6, 8]
+            assert (await records.inspection(1)).images_state == "removed: space for newer ones"
+            files = list((records.folder / "images").glob("*/*"))
+            assert len(files) == 3
+            assert records.status().image_bytes == sum(file.stat().st_size for file in files)
+            assert (await records.inspection(1)).judged is not None, "its record stays"
+
+    scenario(steps)
+
+
+def test_images_larger_than_the_quota_are_dropped_and_it_is_said(opened, scenario, inspected, noise, settled):
+    async def steps():
+        async with opened(images_quota_mb=1) as records:
+            sequence = await inspected(records, *(noise(side_px=315) for _ in range(4)))
+            await settled(records)
+            assert "images_quota_mb allows 1000000" in (await records.inspection(sequence)).images_state
+        async with opened(images_quota_mb=0) as records:
+            sequence = await inspected(records, noise())
+            assert (await records.inspection(sequence)).images_state == "not wanted"
+
+    scenario(steps)
+
+
+def test_a_slow_disk_drops_images_and_never_holds_up_an_inspection(
+    opened, scenario, inspected, noise, settled, monkeypatch
+):
+    gate = threading.Event()
+    write = ImageStore._write
+
+    def slow(self, path, content):
+        gate.wait(30)
+        write(self, path, content)
+
+    monkeypatch.setattr(ImageStore, "_write", slow)
+
+    async def steps():
+        async with opened(images_queue=2) as records:
+            numbers = [await inspected(records, noise()) for _ in range(4)]
+            states = [(await records.inspection(number)).images_state for number in numbers]
+            assert states == ["pending", "pending", *["dropped: too many wait for the disk"] * 2]
+            gate.set()
+            await settled(records)
+            states = [(await records.inspection(number)).images_state for number in numbers[:2]]
+            assert states == ["kept", "kept"]
+            assert records.status().images == {"kept": 2, "dropped": 2}
+
+    scenario(steps)
+
+
+def test_a_disk_that_fills_up_among_the_images_costs_no_record(
+    opened, scenario, inspected, noise, settled, monkeypatch
+):
+    write = ImageStore._write
+    written: list[Path] = []
+
+    def full(self, path, content):
+        if len(written) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        written.append(path)
+        write(self, path, content)
+
+    monkeypatch.setattr(ImageStore, "_write", full)
+
+    async def steps():
+        async with opened() as records:
+            sequence = await inspected(records, noise(), noise(), noise())
+            await settled(records)
+            found = await records.inspection(sequence)
+            assert found.standing is not None
+            assert found.standing.outcome == "FAIL"
+            assert len(found.images) == 2
+            assert "the disk is full" in found.images_state
+            assert found.images_state.endswith("2 of 3 kept")
+            assert records.status().images == {"kept": 2, "failed": 1}
+
+    scenario(steps)
+
+
+def test_what_no_png_can_hold_is_said(opened, scenario, inspected, settled):
+    async def steps():
+        async with opened() as records:
+            sequence = await inspected(records, Image("step", 0, np.zeros((4, 4, 7), dtype=np.uint8)))
+            await settled(records)
+            assert (await records.inspection(sequence)).images_state.startswith("failed: ")
+            assert records.status().images == {"failed": 1}
+
+    scenario(steps)
+
+
+def test_a_start_removes_files_that_nothing_refers_to_and_says_which_images_were_lost(
+    opened, scenario, inspected, noise, settled
+):
+    async def steps():
+        async with opened() as records:
+            kept = await inspected(records, noise())
+            lost = await inspected(records, noise())
+            await settled(records)
+            folder = records.folder / "images"
+            (image,) = (await records.inspection(kept)).images
+            orphans = [folder / "ab" / f"ab{'0' * 62}.png", folder / image.sha256[:2] / "x.partial"]
+            for orphan in orphans:
+                orphan.parent.mkdir(exist_ok=True)
+                orphan.write_bytes(b"half an image")
+        _pretend_pending(records.folder, lost)
+        async with opened() as records:
+            while any(orphan.exists() for orphan in orphans):
+                await asyncio.sleep(0.01)
+            assert image.path in set(map(str, folder.glob("*/*.png")))
+            assert (await records.inspection(lost)).images_state == "lost: the station ended before they were written"
+
+    scenario(steps)
+
+
+def _pretend_pending(folder, sequence):
+    connection = sqlite3.connect(folder / "records.sqlite3")
+    with connection:
+        connection.execute("DELETE FROM images WHERE sequence = ?", (sequence,))
+        connection.execute("UPDATE inspections SET images_state = 'pending' WHERE sequence = ?", (sequence,))
+    connection.close()

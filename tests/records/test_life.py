@@ -1,0 +1,356 @@
+"""The life of an inspection in the records, over restarts."""
+
+import asyncio
+import sqlite3
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.channel.line import Outcome, Reason
+from station.records.errors import BadRecordError, LockedError, RecordsClosedError, UnknownInspectionError
+from station.records.model import AlarmEntry, AlarmRow
+
+
+def test_a_trigger_goes_its_way_from_begin_to_acknowledged(opened, scenario, trigger, failed):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            assert (await records.open_inspections()).running == ((sequence, 7),)
+            outcome = await records.conclude(sequence, failed)
+            assert outcome.outcome == "FAIL"
+            assert outcome.reasons == (Reason.AREA_OVER_LIMIT, Reason.EARLY_STOP)
+            assert (outcome.trigger_id, outcome.encoder, outcome.lot) == (7, 1234, "A-17")
+            assert (outcome.recipe_number, outcome.recipe_checksum) == (1, trigger.recipe.checksum)
+            assert (await records.open_inspections()).ended == (outcome,)
+            assert await records.acknowledged(sequence) == 0, "what the PLC was not told it cannot have taken"
+            assert await records.published(outcome)
+            assert not await records.published(outcome)
+            assert await records.acknowledged(sequence) == 1
+            assert await records.acknowledged(sequence) == 0
+            assert await records.open_inspections() == type(await records.open_inspections())((), ())
+            full = await records.inspection(sequence)
+            assert full.judged == failed
+            assert full.trigger == trigger
+            assert full.standing == outcome
+            assert full.boot == "boot-1"
+
+    scenario(steps)
+
+
+def test_numbers_go_on_over_restarts(opened, scenario, trigger):
+    async def steps():
+        given_numbers = []
+        for _ in range(3):
+            async with opened() as records:
+                given_numbers += [await records.begin(trigger) for _ in range(2)]
+        assert given_numbers == [1, 2, 3, 4, 5, 6]
+
+    scenario(steps)
+
+
+def test_the_first_conclusion_stands(opened, scenario, trigger, passed, failed):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            first = await records.conclude(sequence, failed)
+            assert await records.conclude(sequence, passed) == first
+            assert (await records.inspection(sequence)).judged == failed
+
+    scenario(steps)
+
+
+@pytest.mark.parametrize("told_first", [True, False])
+def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigger, passed, told_first):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            judged = None if told_first else await records.conclude(sequence, passed)
+            told = Outcome(
+                **{
+                    **(judged.model_dump() if judged else _bare(sequence)),
+                    "outcome": "NO_RESULT",
+                    "reasons": (Reason.LATE,),
+                    "late": True,
+                }
+            )
+            assert await records.published(told)
+            if told_first:
+                assert await records.conclude(sequence, passed) == told
+            assert (await records.open_inspections()).ended == (told,)
+            full = await records.inspection(sequence)
+            assert full.standing == told
+            assert full.judged == passed, "what was judged is kept beside it"
+
+    scenario(steps)
+
+
+def _bare(sequence: int) -> dict[str, object]:
+    return {
+        "sequence": sequence,
+        "trigger_id": 7,
+        "partial": True,
+        "simulated": True,
+        "area_mm2": None,
+        "area_px": None,
+        "closing_mm": None,
+        "confidence": None,
+        "recipe_number": 1,
+        "recipe_checksum": 5,
+        "began_utc_ms": 1,
+        "ended_utc_ms": 2,
+        "duration_ms": 1,
+        "encoder": 0,
+        "lot": "A-17",
+    }
+
+
+def _told(sequence: int) -> Outcome:
+    return Outcome(**{**_bare(sequence), "outcome": "NO_RESULT", "reasons": (Reason.STATION_LOST,), "late": False})
+
+
+def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger, passed, failed):
+    async def steps():
+        async with opened() as records:
+            running, judged, told, taken = [await records.begin(trigger) for _ in range(4)]
+            await records.conclude(judged, passed)
+            for sequence in (told, taken):
+                await records.published(await records.conclude(sequence, failed))
+            with sqlite3.connect(records.folder / "records.sqlite3") as other:
+                other.execute("UPDATE inspections SET acknowledged_utc_ms = 1 WHERE sequence = ?", (taken,))
+            other.close()
+        async with opened() as records:
+            assert records.lost == (running, judged)
+            was_open = await records.open_inspections()
+            assert was_open.running == ()
+            assert [(outcome.sequence, outcome.outcome) for outcome in was_open.ended] == [
+                (running, "NO_RESULT"),
+                (judged, "NO_RESULT"),
+                (told, "FAIL"),
+            ]
+            assert was_open.ended[0].reasons == was_open.ended[1].reasons == (Reason.STATION_LOST,)
+            assert was_open.ended[0].partial
+            assert (await records.inspection(judged)).judged == passed
+            assert (await records.inspection(running)).judged is None
+            # the interface outlived the station, and had shown the outcome just before: that stands
+            shown = Outcome(**{**was_open.ended[1].model_dump(), "outcome": "PASS", "reasons": ()})
+            assert await records.published(shown)
+            assert (await records.inspection(judged)).standing == shown
+
+    scenario(steps)
+
+
+def test_an_unknown_inspection_is_refused(opened, scenario, passed, trigger):
+    async def steps():
+        async with opened() as records:
+            for request in (records.conclude(1, passed), records.published(_told(1)), records.inspection(1)):
+                with pytest.raises(UnknownInspectionError):
+                    await request
+            assert await records.begin(trigger) == 1, "a refused one takes no number"
+
+    scenario(steps)
+
+
+@pytest.mark.parametrize(
+    "change", [{"reasons": ("late",)}, {"confidence": 1.5}, {"duration_ms": -1}, {"outcome": "FAIL"}, {"area_px": -3}]
+)
+def test_a_malformed_record_is_refused_and_the_inspection_stays_open(opened, scenario, trigger, passed, change):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            with pytest.raises(BadRecordError):
+                await records.conclude(sequence, replace(passed, **change))
+            assert (await records.open_inspections()).running == ((sequence, 7),)
+            assert (await records.conclude(sequence, passed)).outcome == "PASS"
+
+    scenario(steps)
+
+
+def test_a_trigger_that_no_outcome_could_be_told_of_is_refused_at_the_door(opened, scenario, trigger):
+    async def steps():
+        async with opened() as records:
+            for change in ({"lot": "x" * 33}, {"trigger_id": 0}, {"encoder": -1}, {"began_utc_ms": -1}):
+                with pytest.raises(BadRecordError):
+                    await records.begin(replace(trigger, **change))
+        async with opened() as records:
+            assert records.lost == ()
+
+    scenario(steps)
+
+
+def test_an_odd_figure_costs_no_record(opened, scenario, trigger, passed):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            await records.conclude(sequence, replace(passed, measures={"slope": float("nan"), "note": "é\x00"}))
+            full = await records.inspection(sequence)
+            assert full.judged is not None
+            assert full.judged.measures == {"slope": None, "note": "é\x00"}
+
+    scenario(steps)
+
+
+def test_requests_that_come_together_share_a_commit(opened, scenario, trigger):
+    async def steps():
+        async with opened() as records:
+            before = records.status().writes
+            numbers = await asyncio.gather(*(records.begin(trigger) for _ in range(200)))
+            assert sorted(numbers) == list(range(1, 201))
+            assert records.status().writes - before < 100
+
+    scenario(steps)
+
+
+def test_one_bad_request_does_not_undo_its_neighbours(opened, scenario, trigger, passed):
+    async def steps():
+        async with opened() as records:
+            answers = await asyncio.gather(
+                records.begin(trigger), records.conclude(99, passed), records.begin(trigger), return_exceptions=True
+            )
+            assert [answers[0], answers[2]] == [1, 2]
+            assert isinstance(answers[1], UnknownInspectionError)
+            assert len((await records.open_inspections()).running) == 2
+
+    scenario(steps)
+
+
+def test_clock_steps_change_no_order_and_no_duration(opened, scenario, trigger, passed):
+    async def steps():
+        hour_ms = 3_600_000
+        async with opened() as records:
+            for step_ms in (0, -hour_ms, hour_ms):
+                sequence = await records.begin(replace(trigger, began_utc_ms=trigger.began_utc_ms + step_ms))
+                ended = replace(passed, ended_utc_ms=trigger.began_utc_ms - step_ms)
+                outcome = await records.conclude(sequence, ended)
+                assert (outcome.duration_ms, outcome.ended_utc_ms) == (3210, ended.ended_utc_ms)
+            assert [outcome.sequence for outcome in (await records.open_inspections()).ended] == [1, 2, 3]
+
+    scenario(steps)
+
+
+def test_alarms_counters_and_events_outlive_a_restart(opened, scenario, folder):
+    rows = (AlarmRow("camera_lost", "unacknowledged", 5, 6, "USB"), AlarmRow("disk_full", "shelved", 7, 8, "", 99))
+
+    async def steps():
+        async with opened() as records:
+            await records.save_alarms([AlarmRow("old", "active", 1, 1)])
+            await records.save_alarms(rows, [AlarmEntry(5, "camera_lost", "raised", "USB", 3)])
+            await records.count({"restarts": 1, "restarts_plc": 4})
+            await records.note_event("recipe_changed", {"number": 4, "name": "strawberry"})
+        async with opened() as records:
+            assert await records.load_alarms() == rows
+            assert await records.count({"restarts": 2}) == {"restarts": 3, "restarts_plc": 4}
+            await records.save_alarms([])
+            assert await records.load_alarms() == ()
+
+    scenario(steps)
+    with sqlite3.connect(folder / "records.sqlite3") as connection:
+        assert connection.execute("SELECT id, change, sequence FROM alarms_log").fetchall() == [
+            ("camera_lost", "raised", 3)
+        ]
+        found = connection.execute("SELECT details FROM events WHERE name = 'recipe_changed'").fetchone()
+        assert found == ('{"number": 4, "name": "strawberry"}',)
+    connection.close()
+
+
+def test_totals_count_what_the_plc_was_told(opened, scenario, trigger, passed, failed):
+    async def steps():
+        async with opened() as records:
+            for record in (passed, passed, failed, failed):
+                sequence = await records.begin(trigger)
+                outcome = await records.conclude(sequence, record)
+                if sequence != 4:
+                    await records.published(outcome)
+            expected = {("strawberry", "PASS", "none"): 2, ("strawberry", "FAIL", "area_over_limit"): 1}
+            assert await records.totals() == await records.totals("boot-1") == expected
+            assert await records.totals("another") == {}
+
+    scenario(steps)
+
+
+def test_a_second_station_is_refused(opened, scenario):
+    async def steps():
+        async with opened():
+            with pytest.raises(LockedError, match="another station has it, process"):
+                async with opened():
+                    pass
+        async with opened():
+            pass
+
+    scenario(steps)
+
+
+def test_closed_records_refuse_in_words(opened, scenario, trigger):
+    async def steps():
+        async with opened() as records:
+            await records.close()
+            with pytest.raises(RecordsClosedError):
+                await records.begin(trigger)
+            await records.close()
+
+    scenario(steps)
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["begin", "pass", "fail", "tell", "take", "restart"]), st.integers(0, 5)),
+        min_size=5,
+        max_size=25,
+    )
+)
+def test_any_history_has_one_outcome_for_each_trigger(  # noqa: C901 (a model and its steps)
+    opened, scenario, tmp_path, trigger, passed, failed, history
+):
+    """The records against a model of the contract: sequence to (judged, standing, told, taken)."""
+    folder = tmp_path / f"{abs(hash(tuple(history)))}-{len(list(tmp_path.iterdir()))}"
+    model: dict[int, list] = {}
+
+    async def steps():
+        rest = list(history)
+        while rest:
+            async with opened(folder) as records:
+                for row in model.values():
+                    if not row[2]:
+                        row[1] = "NO_RESULT"
+                while rest:
+                    verb, choice = rest.pop(0)
+                    if verb == "restart":
+                        break
+                    await carry_out(records, verb, choice)
+                was_open = await records.open_inspections()
+                assert was_open.running == tuple((n, 7) for n, row in model.items() if row[1] is None)
+                ended = {outcome.sequence: outcome.outcome for outcome in was_open.ended}
+                assert ended == {n: row[1] for n, row in model.items() if row[1] is not None and not row[3]}
+                for n, row in model.items():
+                    full = await records.inspection(n)
+                    assert (full.judged.outcome if full.judged else None) == row[0]
+
+    async def carry_out(records, verb, choice):
+        if verb == "begin":
+            sequence = await records.begin(trigger)
+            assert sequence == len(model) + 1
+            model[sequence] = [None, None, False, False]
+            return
+        if not model:
+            return
+        sequence = sorted(model)[choice % len(model)]
+        row = model[sequence]
+        if verb in {"pass", "fail"}:
+            record = passed if verb == "pass" else failed
+            stands = await records.conclude(sequence, record)
+            if row[0] is None:
+                row[0], row[1] = record.outcome, row[1] or record.outcome
+            assert stands.outcome == row[1]
+        elif verb == "tell":
+            assert await records.published(_told(sequence)) is not row[2]
+            if not row[2]:
+                row[1], row[2] = "NO_RESULT", True
+        elif verb == "take":
+            taken = [n for n, other in model.items() if n <= sequence and other[2] and not other[3]]
+            assert await records.acknowledged(sequence) == len(taken)
+            for n in taken:
+                model[n][3] = True
+
+    scenario(steps)
