@@ -24,6 +24,7 @@ COMMANDS = {
     "demo": Entry("station.commands.demo:demo", "Measure a simulated press and say where the report lies."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
+    "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "service": Entry("station.commands.run:service", "Inspect fruit at the PLC's triggers."),

@@ -71,6 +71,11 @@ class PassOn:
 
 
 @dataclass(frozen=True, slots=True)
+class ClearFaults:
+    """Have the line's outputs forget their faults."""
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Write one line into the log."""
 
@@ -78,4 +83,6 @@ class Say:
     warning: bool = True
 
 
-Action = Keep | AskBegin | AskOutcome | AskOpen | AskCommand | TellPublished | TellAcknowledged | PassOn | Say
+Action = (
+    Keep | AskBegin | AskOutcome | AskOpen | AskCommand | TellPublished | TellAcknowledged | PassOn | ClearFaults | Say
+)

@@ -1,5 +1,6 @@
 """The bits that need no answer of the station: enable, offline, lot latch, clear error, reset counters."""
 
+from plc_interface.handshake.actions import ClearFaults
 from plc_interface.handshake.modes import Arming, Lot, Service, Signal
 from plc_interface.handshake.state import COUNTERS, Fault
 from plc_interface.handshake.work import Row, Work, row
@@ -52,6 +53,7 @@ def clear(work: Work) -> None:
     state.overrun = state.missed = False
     state.last_refusal, state.last_refused_id = None, 0
     state.faults = ()
+    work.actions.append(ClearFaults())
 
 
 def reset(work: Work) -> None:
@@ -70,7 +72,7 @@ ARMING_ROWS = (
     row(DISARMED, Signal.WRITER_LOST, count_loss),
     row(RELEASED, Signal.ENABLE_ON, to=ARMED),
     row(RELEASED, Signal.ENABLE_OFF),
-    row(RELEASED, Signal.PLC_SILENT, silent, to=DISARMED),
+    row(RELEASED, Signal.PLC_SILENT, silent),
     row(RELEASED, Signal.WRITER_LOST, count_loss),
     row(ARMED, Signal.ENABLE_OFF, to=RELEASED),
     row(ARMED, Signal.PLC_SILENT, silent, to=DISARMED),

@@ -96,6 +96,23 @@ class OutcomeCame:
 
 
 @dataclass(frozen=True, slots=True)
+class OutcomeFailed:
+    """`AskOutcome` got no answer, or none that can be used."""
+
+    at: Moment
+    sequence: int
+    what: str
+    """For the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leaving:
+    """This process ends: the PLC is told that the station is offline, and nothing is begun any more."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
 class RequestFailed:
     """Another request got no answer, or none that can be used."""
 
@@ -148,9 +165,11 @@ Event = (
     | BeginAnswered
     | BeginFailed
     | OutcomeCame
+    | OutcomeFailed
     | RequestFailed
     | OpenTold
     | OutcomeNoted
     | CommandAnswered
     | CommandFailed
+    | Leaving
 )

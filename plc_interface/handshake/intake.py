@@ -9,8 +9,10 @@ from plc_interface.handshake.events import (
     BeginFailed,
     CommandAnswered,
     CommandFailed,
+    Leaving,
     OpenTold,
     OutcomeCame,
+    OutcomeFailed,
     OutcomeNoted,
     PlcWrote,
     RequestFailed,
@@ -18,7 +20,7 @@ from plc_interface.handshake.events import (
     WriterCame,
     WriterWent,
 )
-from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.work import Work
 
 EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
@@ -65,6 +67,13 @@ def _request_failed(work: Work, event: RequestFailed) -> None:
     work.signals.append(Signal.CHANNEL_FAILED)
 
 
+def _outcome_failed(work: Work, event: OutcomeFailed) -> None:
+    running = work.state.running
+    if running is not None and running.sequence == event.sequence:
+        work.say(f"inspection {event.sequence}: the station did not give its outcome: {event.what}")
+        work.signals.append(Signal.CHANNEL_FAILED)
+
+
 def _open_told(work: Work, event: OpenTold) -> None:
     if event.number == work.state.open_asked:
         work.signals.append(Signal.OPENED)
@@ -96,12 +105,15 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
             work.signals.append(on)
         elif bit in fell and off is not None:
             work.signals.append(off)
-    _acknowledged(work, event, changed=before.acknowledged_sequence != event.inputs.acknowledged_sequence, rose=rose)
+    changed = event.inputs.acknowledged_sequence not in {before.acknowledged_sequence, 0}
+    left_high = seen is None and event.inputs.acknowledged_sequence == state.journal.acknowledged
+    _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:
         work.signals.append(Signal.ACKNOWLEDGE_OFF)
+    held = seen is None and _is_answered_or_asked(work, event.inputs.trigger_id)
     for bit, on, off in (
         ("execute_command", Signal.EXECUTE_ON, Signal.EXECUTE_OFF),
-        ("trigger", Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
+        ("trigger", Signal.TRIGGER_HELD if held else Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
     ):
         if bit in rose or bit in fell:
             work.signals.append(on if bit in rose else off)
@@ -110,15 +122,27 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
 
 
-def _acknowledged(work: Work, event: PlcWrote, *, changed: bool, rose: frozenset[str]) -> None:
-    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none."""
+def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
+    """Whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
+    asked = work.state.asked
+    return trigger_id != 0 and trigger_id == (asked.trigger_id if asked else work.state.journal.accepted_id)
+
+
+def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed: bool, left_high: bool) -> None:
+    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none.
+
+    A PLC that writes the sequence first and raises its bit then waits for result_valid to fall all the same.
+    """
     state, sequence = work.state, event.inputs.acknowledged_sequence
     by_bit, written = "acknowledge" in rose, "acknowledged_sequence" in event.written
-    if not (by_bit or written):
-        return
-    if state.result is Result.SHOWN and sequence == state.queue[0].sequence:
+    after = by_bit and sequence == state.unconfirmed
+    if by_bit:
+        state.unconfirmed = 0
+    if (by_bit or written) and state.queue and sequence == state.queue[0].sequence == state.shown:
         work.signals.append(Signal.ACKNOWLEDGED)
-    elif (by_bit or changed) and sequence != state.journal.acknowledged and (by_bit or sequence):
+    elif after and sequence:
+        work.signals.append(Signal.ACKNOWLEDGE_AFTER)
+    elif (by_bit and not left_high) or (changed and sequence != state.journal.acknowledged):
         work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)
 
 
@@ -154,9 +178,11 @@ _TAKERS: dict[type, Callable[[Work, Any], None]] = {
     BeginAnswered: _begin_answered,
     BeginFailed: _begin_answered,
     OutcomeCame: _outcome_came,
+    OutcomeFailed: _outcome_failed,
     RequestFailed: _request_failed,
     OpenTold: _open_told,
     OutcomeNoted: _outcome_noted,
     CommandAnswered: _command_answered,
     CommandFailed: _command_answered,
+    Leaving: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
 }

@@ -47,6 +47,8 @@ class Journal(_Kept):
     command_sequence: int | None = Field(default=None, ge=0, le=65_535)
     command_result: int = Field(default=0, ge=0, le=65_535)
     """As in the register map."""
+    asked_id: int | None = Field(default=None, ge=1, le=65_535)
+    """The id of the trigger that the station is asked to begin."""
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence."""

@@ -30,8 +30,9 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
     take_in(work)
     _run(work)
     state = work.state
-    if state.queue != state.journal.queue or state.running != state.journal.running:
-        work.keep(queue=state.queue, running=state.running)
+    kept = {"queue": state.queue, "running": state.running, "asked_id": state.asked.trigger_id if state.asked else None}
+    if any(getattr(state.journal, name) != value for name, value in kept.items()):
+        work.keep(**kept)
     if state.journal == before.journal:
         return state, tuple(work.actions)
     durable = (state.journal.verdicts, state.journal.disowned) != (before.journal.verdicts, before.journal.disowned)

@@ -24,12 +24,14 @@ def one_waits(work: Work) -> bool:
 def show(work: Work) -> None:
     """Show the oldest result, toggle."""
     work.state.toggle = not work.state.toggle
+    work.state.shown = work.state.queue[0].sequence
 
 
 def take(work: Work) -> None:
     """Take it from the queue, `Acknowledged`."""
     taken, *rest = work.state.queue
     work.state.queue = tuple(rest)
+    work.state.unconfirmed = 0 if bit_is_high(work) else taken.sequence
     acknowledge(work, taken.sequence)
     pass_over_hidden(work)
 
@@ -64,16 +66,19 @@ EMPTY, SHOWN, TAKEN = Result.EMPTY, Result.SHOWN, Result.TAKEN
 
 ROWS = (
     row(EMPTY, Signal.QUEUED, show, to=SHOWN),
+    row(EMPTY, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
     row(EMPTY, Signal.ACKNOWLEDGE_OFF, unstick),
     row(EMPTY, Signal.WRITER_LOST, unstick),
     row(SHOWN, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
     row(SHOWN, Signal.ACKNOWLEDGED, take, show, when=another_waits),
     row(SHOWN, Signal.ACKNOWLEDGED, take, to=EMPTY),
+    row(SHOWN, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(SHOWN, Signal.QUEUED),
     row(SHOWN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
     row(SHOWN, Signal.ACKNOWLEDGE_OFF, unstick),
     row(SHOWN, Signal.WRITER_LOST, unstick),
+    row(TAKEN, Signal.ACKNOWLEDGED, take),
     row(TAKEN, Signal.QUEUED),
     row(TAKEN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
     row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, show, to=SHOWN, when=one_waits),

@@ -86,7 +86,7 @@ def _may_be_asked_for(work: Work, sequence: int) -> bool:
 
 
 def _is_the_plcs(work: Work, sequence: int, trigger_id: int) -> bool:
-    """Whether an unknown inspection was begun just before this interface's start, for a trigger not yet answered.
+    """Whether an unknown inspection was accepted before this interface's start, and its journal was lost since.
 
     Later on every accepted sequence is known, so that an unknown one was begun for a trigger that was refused.
     """

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from plc_interface.handshake.events import Inputs, Moment
 from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
@@ -74,6 +75,8 @@ class State:
     inputs: Inputs = field(default_factory=Inputs)
     seen: frozenset[str] | None = None
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    unconfirmed: int = 0
+    """The sequence taken by its number alone; the bit may still follow."""
     acknowledge_stuck: bool = False
     """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
     last_refusal: Refusal | None = None
@@ -97,6 +100,8 @@ class State:
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first is the one shown."""
+    shown: int = 0
+    """The sequence of the last result shown."""
     toggle: bool = False
 
     # commands
@@ -131,20 +136,32 @@ class State:
 def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> State:
     """The state in which the interface starts: disarmed, the station unheard, and what the journal holds.
 
+    A trigger that was not answered yet is refused.
+
     Args:
         journal: what the run before kept.
         at: now; the counters start at 0.
         station_lost_after_s: how long an inspection that was running waits for the station.
     """
-    changes: dict[str, int] = {"boots": (journal.boots + 1) % 2**16, "epoch": (journal.epoch + 1) % 2**32}
+    changes: dict[str, Any] = {
+        "boots": (journal.boots + 1) % 2**16,
+        "epoch": (journal.epoch + 1) % 2**32,
+        "asked_id": None,
+    }
     if journal.command_result == COMMAND_RESULT.code("executing"):
         changes["command_result"] = COMMAND_RESULT.code("timed_out")
+    if journal.asked_id is not None:
+        changes["disowned"] = (*journal.disowned, journal.asked_id)
     state = State(
         reset_utc_ms=at.utc_ms,
         journal=journal.model_copy(update=changes),
         queue=journal.queue,
         result=Result.SHOWN if journal.queue else Result.EMPTY,
+        shown=journal.queue[0].sequence if journal.queue else 0,
     )
+    if journal.asked_id is not None:
+        state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True
+        state.counters = {**state.counters, "count_triggers": 1, "count_missed": 1}
     if journal.running is not None:
         ran_s = max(0.0, (at.utc_ms - journal.running.began_utc_ms) / 1000)
         state.running = journal.running.model_copy(update={"began_s": at.s - ran_s})

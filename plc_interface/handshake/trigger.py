@@ -23,12 +23,11 @@ def obstacle(state: State) -> Refusal | None:
 def refusal(state: State) -> Refusal | None:
     """Why the trigger with the id now written is refused; None where the station is asked.
 
-    A doubled trigger is told as such before it is told that its own inspection keeps the station busy.
+    A doubled id is told as such whatever else holds: no other refusal then names an id that was accepted.
     """
-    found = obstacle(state)
-    trigger_id = state.inputs.trigger_id
-    bad = trigger_id in (0, state.journal.accepted_id)
-    return Refusal.BAD_TRIGGER_ID if bad and found in {None, Refusal.BUSY, Refusal.QUEUE_FULL} else found
+    if state.inputs.trigger_id in {0, state.journal.accepted_id, state.asked.trigger_id if state.asked else 0}:
+        return Refusal.BAD_TRIGGER_ID
+    return obstacle(state)
 
 
 def may_be_asked(work: Work) -> bool:
@@ -57,11 +56,6 @@ def refuse(work: Work) -> None:
     note_refusal(work, refusal(work.state) or Refusal.NOT_READY, work.state.inputs.trigger_id)
 
 
-def refuse_busy(work: Work) -> None:
-    """Refuse as busy."""
-    note_refusal(work, Refusal.BUSY, work.state.inputs.trigger_id)
-
-
 def watch(work: Work) -> None:
     """Start the trigger's time-out."""
     work.start(Signal.TRIGGER_TIMEOUT, work.settings.handshake_timeout_s)
@@ -80,6 +74,7 @@ def forgotten(work: Work) -> None:
 ROWS = (
     row(Trigger.LOW, Signal.TRIGGER_ON, begin, to=Trigger.ASKED, when=may_be_asked),
     row(Trigger.LOW, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
+    row(Trigger.LOW, Signal.TRIGGER_HELD, watch, to=Trigger.ANSWERED),
     row(Trigger.LOW, Signal.TRIGGER_OFF),
     row(Trigger.LOW, Signal.WRITER_LOST),
     row(Trigger.ASKED, Signal.ACCEPTED, watch, to=Trigger.ANSWERED),
@@ -88,7 +83,8 @@ ROWS = (
     row(Trigger.ASKED, Signal.WRITER_LOST, to=Trigger.PULSED),
     row(Trigger.PULSED, Signal.ACCEPTED, watch, to=Trigger.HELD),
     row(Trigger.PULSED, Signal.REFUSED, watch, to=Trigger.HELD),
-    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse_busy, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_HELD, to=Trigger.ASKED),
     row(Trigger.PULSED, Signal.TRIGGER_OFF),
     row(Trigger.PULSED, Signal.WRITER_LOST),
     row(Trigger.ANSWERED, Signal.TRIGGER_OFF, end_watch, to=Trigger.LOW),

@@ -1,6 +1,7 @@
 """What the PLC reads in a state: values by the names of the register map. And what the station is told of the line."""
 
 import zlib
+from collections.abc import Mapping
 
 from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Order, Result, Service, Trigger
 from plc_interface.handshake.state import State
@@ -26,19 +27,20 @@ def view(state: State) -> dict[str, Value]:
             "counters_reset_utc_ms": state.reset_utc_ms}  # fmt: skip
 
 
-def line(state: State, faults: tuple[str, ...] = ()) -> Line:
+def line(state: State, counters: Mapping[str, int], faults: tuple[str, ...]) -> Line:
     """What the station is told with every beat.
 
     Args:
         state: of the handshake.
-        faults: those of the interface's other parts.
+        counters: those of the interface's other parts.
+        faults: the same.
     """
     return Line(
         plc_connected=state.writer,
         plc_alive=state.watched,
         enabled=state.arming is Arming.ARMED,
         waiting=len(state.queue),
-        counters=dict(state.counters),
+        counters={**state.counters, **counters},
         faults=(*(fault.value for fault in state.faults), *faults),
     )
 

@@ -119,6 +119,8 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     def resume_writing(self) -> None:
         """Go on reading."""
         self.stalled_since_s = None
+        if self.unfinished_since_s is not None:
+            self.unfinished_since_s = self._hub.now_s()
         if not self._ended:
             cast("asyncio.ReadTransport", self.transport).resume_reading()
 

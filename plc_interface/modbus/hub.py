@@ -143,10 +143,11 @@ class Hub:
         self._sweeping = self._loop.call_later(SWEEP_S, self._sweep)
         now_s, settings = self.now_s(), self._settings
         for member in tuple(self._members.values()):
-            if _older(member.unfinished_since_s, now_s - settings.frame_timeout_s):
+            if member.stalled_since_s is not None:  # the rest of a request then waits in the kernel, for our sake
+                if _older(member.stalled_since_s, now_s - settings.frame_timeout_s):
+                    member.drop(Trouble.SLOW_READER, f"responses not taken for {settings.frame_timeout_s:g} s")
+            elif _older(member.unfinished_since_s, now_s - settings.frame_timeout_s):
                 member.drop(Trouble.UNFINISHED, f"no whole request in {settings.frame_timeout_s:g} s")
-            elif _older(member.stalled_since_s, now_s - settings.frame_timeout_s):
-                member.drop(Trouble.SLOW_READER, f"responses not taken for {settings.frame_timeout_s:g} s")
             elif _older(member.heard_s, now_s - settings.idle_timeout_s):
                 member.drop(Trouble.IDLE, f"no request in {settings.idle_timeout_s:g} s")
         self.lease.expire(now_s)

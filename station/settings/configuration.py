@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from station.settings.arm import ArmSettings
 from station.settings.camera import CameraSettings
+from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.gripper import GripperSettings
 from station.settings.modbus import ModbusSettings
@@ -88,6 +89,7 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
         RecordsSettings(), title="Records", description="What the station keeps of its inspections."
     )

@@ -31,6 +31,14 @@ class ReferenceSettings(Settings):
         gt=0.0,
         le=1.0,
     )
+    most_change: float = setting(
+        1.6,
+        title="Most change",
+        description="The contact gate's statistic of a new reference against the golden one; more means that something "
+        "touches the gel. On the twin a touch of 0.25 mm gives 1.7 or more, half a day's drift of the light 1.5.",
+        gt=0.0,
+        le=100.0,
+    )
     most_drift_levels: float = setting(
         25.0,
         title="Most drift",

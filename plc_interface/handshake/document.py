@@ -1,0 +1,69 @@
+"""docs/plc/handshake.md: the state table as it is, drawn and printed. `python -m plc_interface.handshake.document`."""
+
+from pathlib import Path
+
+from plc_interface.handshake.modes import Mode
+from plc_interface.handshake.table import REGIONS
+from plc_interface.handshake.work import Row
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "plc" / "handshake.md"
+BEGIN = "<!-- table: made by python -m plc_interface.handshake.document -->\n"
+END = "<!-- end of table -->\n"
+
+
+def document(around: str) -> str:
+    """The document with the table as it is now.
+
+    Args:
+        around: the document, whose text outside the marks stays.
+    """
+    before, rest = around.split(BEGIN)
+    _, after = rest.split(END)
+    return f"{before}{BEGIN}{tables()}{END}{after}"
+
+
+def tables() -> str:
+    """A heading, a diagram and a table for each region."""
+    return "".join(_region(region, rows) for region, rows in REGIONS.items())
+
+
+def _region(region: type[Mode], rows: tuple[Row, ...]) -> str:
+    purpose = (region.__doc__ or "").removesuffix(".")
+    lines = [f"\n### {region.__name__}: {purpose[0].lower()}{purpose[1:]}\n", *_diagram(rows), *_table(rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _diagram(rows: tuple[Row, ...]) -> list[str]:
+    """Mermaid, by what changes the mode; the first row's mode is where it starts."""
+    changes: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row.mode is not row.next:
+            words = changes.setdefault((_node(row.mode), _node(row.next)), [])
+            if row.signal.value not in words:
+                words.append(row.signal.value)
+    arrows = [f"    {start} --> {end}: {', '.join(words)}" for (start, end), words in changes.items()]
+    return ["```mermaid", "stateDiagram-v2", f"    [*] --> {_node(rows[0].mode)}", *arrows, "```", ""]
+
+
+def _table(rows: tuple[Row, ...]) -> list[str]:
+    lines = ["| mode | signal | if | does | next |", "|---|---|---|---|---|"]
+    for row in rows:
+        guard = _words(row.guard.__doc__) if row.guard else ""
+        effects = "; ".join(_words(effect.__doc__) for effect in row.effects)
+        after = "" if row.next is row.mode else row.next.value
+        lines.append(f"| {row.mode.value} | {row.signal.value} | {guard} | {effects} | {after} |")
+    return lines
+
+
+def _node(mode: Mode) -> str:
+    return mode.value.replace(" ", "_")
+
+
+def _words(docstring: str | None) -> str:
+    """A docstring's sentence as a part of one; capitals as in PLC and `Begin` stay."""
+    words = (docstring or "").removesuffix(".")
+    return words if words[1:2].isupper() else words[:1].lower() + words[1:]
+
+
+if __name__ == "__main__":
+    DOCUMENT.write_text(document(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")

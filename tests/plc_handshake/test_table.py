@@ -1,0 +1,235 @@
+"""The table by itself: corners that are hard to reach from outside, and what is made from it."""
+
+import pytest
+
+from plc_interface.handshake import actions as do
+from plc_interface.handshake import events as ev
+from plc_interface.handshake.document import DOCUMENT, document
+from plc_interface.handshake.journal import Journal
+from plc_interface.handshake.modes import Arming, Inspection, Link, Result, Signal, Trigger
+from plc_interface.handshake.state import Fault
+from plc_interface.handshake.table import REGIONS
+from plc_interface.handshake.view import line, result_values, view
+from plc_interface.register_map import BY_NAME
+from station.channel.line import Begun, Open, Reason, Refusal
+
+
+def test_every_signal_and_every_mode_has_its_row():
+    rows = [row for rows in REGIONS.values() for row in rows]
+    assert {row.signal for row in rows} == set(Signal)
+    for region, of_region in REGIONS.items():
+        assert {row.mode for row in of_region} == set(region)
+        reached = {of_region[0].mode}
+        while more := {row.next for row in of_region if row.mode in reached} - reached:
+            reached |= more
+        assert reached == set(region)
+
+
+def test_a_row_behind_one_without_a_condition_would_never_be_taken():
+    for rows in REGIONS.values():
+        closed = set()
+        for row in rows:
+            assert (row.mode, row.signal) not in closed
+            if row.guard is None:
+                closed.add((row.mode, row.signal))
+
+
+def test_every_guard_and_effect_says_in_the_document_what_it_is():
+    for rows in REGIONS.values():
+        for row in rows:
+            assert all(part.__doc__ for part in (*row.effects, *([row.guard] if row.guard else [])))
+
+
+def test_the_document_shows_the_table_as_it_is():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert document(text) == text, "run python -m plc_interface.handshake.document"
+
+
+def test_a_pair_that_is_not_listed_changes_nothing_and_is_counted(bench):
+    made = bench()
+    made.armed()
+    made.state.timers = {Signal.RESULT_DEADLINE: made.now_s}
+    before = made.state.inspection
+    made.feed(ev.Tick)
+    assert (made.state.unlisted, made.state.inspection) == (1, before)
+    assert "not foreseen" in made.of(do.Say)[-1].text
+
+
+@pytest.mark.parametrize(
+    ("name", "reasons", "changes"),
+    [
+        ("PASS", (), {"trigger_id": 8}),
+        ("PASS", (Reason.SATURATED,), {}),
+        ("PASS", (), {"late": True}),
+        ("FAIL", (), {}),
+    ],
+)
+def test_an_outcome_that_contradicts_itself_is_no_outcome(bench, name, reasons, changes):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeCame, made.outcome(name, *reasons, **changes))
+    (shown,) = made.state.queue
+    assert (shown.sequence, shown.trigger_id, shown.outcome) == (41, 7, "NO_RESULT")
+    assert shown.reasons == (Reason.INTERNAL_FAULT,)
+    assert shown.area_mm2 is None
+    assert made.state.journal.verdicts == (shown,)
+
+
+def test_a_sequence_given_twice_is_refused(bench):
+    made = bench(Journal(highest=41))
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=1.0))
+    assert (made.state.inspection, made.state.last_refusal) == (Inspection.NONE, Refusal.NOT_READY)
+    assert made.state.trigger is Trigger.ANSWERED
+
+
+def test_an_inspection_that_the_station_does_not_know_any_more_is_no_result(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.Beat, made.station_state(boot="2"))
+    made.feed(ev.OpenTold, made.state.open_asked, Open(running=None, outcomes=()))
+    assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
+    assert made.state.link is Link.UP
+
+
+def test_an_outcome_that_comes_late_is_answered_with_what_stands(bench):
+    made = bench()
+    made.run()
+    for passed_s in (0.9, 0.9, 0.5):
+        made.now_s += passed_s
+        made.feed(ev.Beat, made.station_state())
+    (late,) = made.state.queue
+    assert (late.outcome, late.reasons, late.late) == ("NO_RESULT", (Reason.LATE,), True)
+    assert late.duration_ms == 2300
+    actions = made.feed(ev.OutcomeCame, made.outcome())
+    assert [action.outcome for action in actions if isinstance(action, do.TellPublished)] == [late]
+    assert made.state.queue == (late,)
+    made.feed(ev.OutcomeNoted, 41)
+    assert made.state.journal.verdicts == ()
+
+
+def test_what_the_interface_says_by_itself_is_on_the_disk_before_anything_else(bench):
+    made = bench()
+    made.run()
+    made.now_s += 10.0
+    first, *rest = made.feed(ev.Tick)
+    assert isinstance(first, do.Keep)
+    assert first.durable
+    assert first.journal.verdicts == made.state.queue
+    assert not any(isinstance(action, do.Keep) for action in rest)
+
+
+def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    actions = made.feed(ev.BeginFailed, made.state.asked.number)
+    assert isinstance(actions[0], do.Keep)
+    assert actions[0].durable
+    assert (made.state.last_refusal, made.state.link) == (Refusal.STATION_LOST, Link.RESUMING)
+    made.feed(ev.BeginAnswered, 1, Begun(sequence=41, deadline_s=1.0))
+    assert made.state.running is None
+    actions = made.link(Open(running=(41, 7), outcomes=()))
+    told = [action for action in actions if isinstance(action, do.TellPublished | do.TellAcknowledged)]
+    assert [type(action) for action in told] == [do.TellPublished, do.TellAcknowledged]
+    assert (told[0].outcome.sequence, told[0].outcome.outcome) == (41, "NO_RESULT")
+    assert view(made.state)["result_sequence"] == 0
+    assert made.state.journal.acknowledged == 41
+
+
+def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
+    made = bench()
+    made.feed(ev.WriterCame)
+    ended = made.outcome("FAIL", Reason.AREA_OVER_LIMIT, sequence=40, trigger_id=6)
+    made.link(Open(running=(41, 7), outcomes=(ended,)))
+    seen = view(made.state)
+    assert (seen["result_sequence"], seen["result_trigger_id"], seen["accepted_trigger_id"]) == (40, 6, 7)
+    assert [action.sequence for action in made.of(do.AskOutcome)] == [41]
+    made.feed(ev.OutcomeCame, made.outcome())
+    assert [outcome.sequence for outcome in made.state.queue] == [40, 41]
+
+
+def test_a_doubled_command_of_the_run_before_is_not_carried_out_again(bench):
+    executing = BY_NAME["command_result"].code("executing")
+    made = bench(Journal(command_sequence=5, command_result=executing))
+    made.armed()
+    made.write("enable", "execute_command", command_code=3, command_sequence=5)
+    assert made.of(do.AskCommand) == []
+    assert view(made.state)["command_result"] == BY_NAME["command_result"].code("timed_out")
+
+
+def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.WriterWent)
+    made.feed(ev.WriterCame)
+    assert made.state.arming is Arming.DISARMED
+    made.write("enable", "trigger")
+    assert made.state.trigger is Trigger.ANSWERED
+    assert (made.state.last_refusal, made.state.counters["count_triggers"]) == (None, 1)
+
+
+def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid_fall(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeCame, made.outcome())
+    made.write("enable")
+    made.feed(ev.PlcWrote, made.inputs, frozenset())
+    assert made.state.result is Result.SHOWN
+    made.write("enable", acknowledged_sequence=41)
+    assert made.state.result is Result.EMPTY
+    made.write("enable", "acknowledge")
+    assert made.state.result is Result.TAKEN
+    made.write("enable")
+    assert made.state.result is Result.EMPTY
+
+
+def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeCame, made.outcome())
+    made.write("enable", "acknowledge")
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+    made.write("enable", acknowledged_sequence=41 << 16)
+    assert made.state.counters["count_communication"] == 2
+    assert (made.state.result, made.of(do.TellAcknowledged)) == (Result.SHOWN, [])
+    made.write("enable", "clear_error")
+    assert made.state.faults == ()
+    assert len(made.of(do.ClearFaults)) == 1
+
+
+def test_timers_that_ran_out_together_go_in_a_fixed_order(bench):
+    made = bench()
+    made.run()
+    made.now_s += 60.0
+    made.feed(ev.Tick)
+    assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
+    assert made.state.link is Link.LOST
+    assert made.state.trigger is Trigger.STUCK
+    assert made.state.timers == {}
+
+
+def test_values_beyond_their_registers_are_shown_at_the_bound(bench):
+    outcome = bench().outcome(area_mm2=1e12, closing_mm=-1e6, area_px=2**40)
+    shown = result_values(outcome)
+    assert shown["result_area_mm2_x100"] == 2**31 - 1
+    assert shown["result_closing_mm_x100"] == -(2**15) + 1
+    assert shown["result_area_px"] == 2**32 - 2
+
+
+def test_counters_wrap_round(bench):
+    made = bench()
+    made.state.counters = {**made.state.counters, "count_missed": 2**32 - 1}
+    made.armed()
+    made.write("enable", "trigger", trigger_id=0)
+    assert made.state.counters["count_missed"] == 0
+
+
+def test_the_station_is_told_of_the_line(bench):
+    made = bench()
+    made.armed()
+    told = line(made.state, {"count_bad_requests": 3}, ("the gate is lost",))
+    assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
+    assert told.counters["count_bad_requests"] == 3
+    assert told.faults == ("the gate is lost",)

@@ -1,0 +1,52 @@
+"""A result is read whole or not at all."""
+
+import struct
+
+from plc_interface.register_map import BY_NAME
+
+READS = 10_000
+BLOCK = BY_NAME["result_sequence"].address
+BEHIND = BY_NAME["result_sequence_again"].end
+AREA = BY_NAME["result_area_mm2"].address - BLOCK
+
+
+def result(sequence):
+    """A result in which every value tells its sequence."""
+    return {
+        "result_sequence": sequence,
+        "result_trigger_id": sequence % 65_536,
+        "result_area_mm2": float(sequence),
+        "result_ended_utc_ms": sequence << 20,
+        "result_duration_ms": sequence,
+        "result_sequence_again": sequence,
+    }
+
+
+def test_no_read_of_ten_thousand_is_torn_while_results_change(serve, connect):
+    serving = serve()
+    sequence = 0
+
+    def change():
+        """As often as the loop comes round, and so between any two requests."""
+        nonlocal sequence
+        sequence += 1
+        serving.image.commit(result(sequence))
+        serving.again = serving.loop.call_soon(change)
+
+    plc = connect(serving)
+    serving.call(change)
+    request = struct.pack(">BHH", 3, BLOCK, BEHIND - BLOCK)
+    seen = set()
+    try:
+        for _ in range(READS // 20):
+            plc.send(b"".join(plc.request(request) for _ in range(20)))
+            for _ in range(20):
+                block = plc.receive()[2][2:]
+                first, trigger_id = struct.unpack_from(">IH", block, 0)
+                (area,) = struct.unpack_from(">f", block, 2 * AREA)
+                (last,) = struct.unpack_from(">I", block, len(block) - 4)
+                assert (first, first % 65_536, float(first)) == (last, trigger_id, area)
+                seen.add(first)
+    finally:
+        serving.call(serving.again.cancel)
+    assert len(seen) > 100
