@@ -22,7 +22,7 @@ from station.vision.candidates import (
 )
 from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_streaks
+from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge import Edge, find_edge
 from station.vision.edge_signal import denoised, edge_signal
 from station.vision.working import SATURATED_LEVEL, resized, working_image
@@ -85,11 +85,12 @@ class RobustMethod:
             )
         work = working_image(image)
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
-        drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
+        calm = quiet(bending(without_bands(difference)), self._least_bend)
+        drift = self._drift.fit(difference, calm)
         change = difference - drift.levels
         if self._blind is not None:
             change[self._blind] = 0
-        change = without_streaks(change, drift.background)
+        change = without_streaks(change, calm)
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
