@@ -18,20 +18,20 @@ from station.vision.candidates import (
     body_candidates,
     changed_places,
     cluster_levels,
+    extended,
     separate_candidates,
 )
-from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
-from station.vision.edge import Edge, find_edge
-from station.vision.edge_signal import denoised, edge_signal
+from station.vision.edge import Edge
+from station.vision.edge_signal import denoised, length_of
+from station.vision.outline import Outline, Place, find_outline, radius_px
 from station.vision.working import SATURATED_LEVEL, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
 """The image for which parameters in pixels are given; they scale with the image."""
 
-_SUBPIXEL_BITS = 4
 _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
@@ -97,13 +97,14 @@ class RobustMethod:
         levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
+        changed = None
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, levels, threshold)
         else:
-            changed = None if sure else changed_places(change, drift.background)
-            candidates = body_candidates(bend, levels, threshold, changed)
-        found = self._edges(change, bend, candidates, drift.background, sure=sure)
-        mask = self._mask([edge for edge, _ in found])
+            changed = changed_places(change, drift.background)
+            candidates = body_candidates(bend, levels, threshold, None if sure else changed)
+        found = self._outlines(change, bend, candidates, changed, drift.background, sure=sure)
+        mask = self._mask(found)
         if on_stage:
             pictures.emit(
                 on_stage,
@@ -113,7 +114,7 @@ class RobustMethod:
                 bend=bend,
                 levels=levels,
                 threshold=threshold,
-                edges=[edge for edge, _ in found],
+                edges=[outline.edge for outline in found],
                 mask=mask,
             )
         flags, confidence = self._judge(work, drift, mask, found, gate)
@@ -125,46 +126,44 @@ class RobustMethod:
             drift_levels=drift.strength_levels,
         )
 
-    def _edges(
+    def _outlines(
         self,
         change: FloatImage,
         bend: FloatImage,
         candidates: list[Candidate],
+        changed: Mask | None,
         background: FloatImage,
         *,
         sure: bool,
-    ) -> list[tuple[Edge, float]]:
-        """The edges that the image supports, or any where contact is sure, each with its confidence."""
-        found: list[tuple[Edge, float]] = []
+    ) -> list[Outline]:
+        """The outlines that the image supports, or any where contact is sure."""
+        found: list[Outline] = []
         height, width = change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
         for small, _ in candidates:
             if found and self._parameters.contacts == "one":
                 break
-            middle = _middle(bend, small, (width, height))
-            region = np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-            radius_px = float(np.sqrt(np.count_nonzero(region) / np.pi))
-            smooth = denoised(change, radius_px)
-            signal = edge_signal(smooth, bend, region, radius_px)
-            edge = find_edge(signal, region, middle, self._parameters.edge_stiffness)
-            inside = _filled(edge, (height, width), 1.0, 1.0) > 0
-            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], edge):
+            region = _grown(small, (width, height))
+            wide = None if changed is None else _grown(extended(small, changed), (width, height))
+            smooth = denoised(change, radius_px(region))
+            place = Place(region, wide, _middle(bend, small, (width, height)), background)
+            outline = find_outline(length_of(smooth), bend, place, self._parameters.edge_stiffness)
+            inside = outline.inside > 0
+            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], outline.edge):
                 continue
-            confidence = edge_confidence(edge, background_spread(signal, background))
-            if sure or confidence >= _LEAST_SUPPORT:
-                found.append((edge, confidence))
+            if sure or outline.confidence >= _LEAST_SUPPORT:
+                found.append(outline)
         return found
 
-    def _mask(self, edges: list[Edge]) -> Mask:
+    def _mask(self, outlines: list[Outline]) -> Mask:
         height, width = self._shape[:2]
-        x_scale, y_scale = width / self._reference.shape[1], height / self._reference.shape[0]
         mask = np.zeros((height, width), np.uint8)
-        for edge in edges:
-            mask |= _filled(edge, (height, width), x_scale, y_scale)
+        for outline in outlines:
+            mask |= outline.drawn(height, width)
         return mask
 
     def _judge(
-        self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
+        self, work: Image, drift: Drift, mask: Mask, found: list[Outline], gate: float
     ) -> tuple[frozenset[Flag], float]:
         """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
@@ -179,7 +178,7 @@ class RobustMethod:
         if not found and gate > 1:
             flags.add(Flag.UNDECIDED)
         untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
-        confidence = min((confidence for _, confidence in found), default=untouched)
+        confidence = min((outline.confidence for outline in found), default=untouched)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
@@ -198,12 +197,9 @@ def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[floa
     )
 
 
-def _filled(edge: Edge, shape: tuple[int, int], x_scale: float, y_scale: float) -> Mask:
-    points = (edge.points + 0.5) * (x_scale, y_scale) - 0.5
-    mask = np.zeros(shape, np.uint8)
-    fixed = np.rint(points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, _SUBPIXEL_BITS)
-    return mask
+def _grown(small: Mask, size: tuple[int, int]) -> Mask:
+    """A region of the bending's size at the change's, width and height."""
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
 def _one_sided(change: FloatImage, edge: Edge) -> bool:
