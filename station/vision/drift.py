@@ -33,7 +33,6 @@ _LATER_SHARE = 0.02
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
-_STREAK_ITERATIONS = 3
 _STRIPS = 32
 _MEDIAN_SIDE_PX = 60
 
@@ -154,15 +153,16 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
 def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
     prior = np.float32(_STREAK_PRIOR_SHARE * strips.shape[axis])
-    weight = background
-    offsets = np.zeros(3, np.float32)
-    for _ in range(_STREAK_ITERATIONS):
-        support = weight.sum(axis=axis, keepdims=True)[..., None] + prior
-        offsets = (strips * weight[..., None]).sum(axis=axis, keepdims=True) / support
-        away = cv2.transform((strips - offsets) ** 2, np.ones((1, 3), np.float32))
-        spread = np.maximum(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
-        weight = np.maximum(0, 1 - away / (_TUKEY_WIDTH**2 * spread)) ** 2 * background
-    return offsets
+    first = _line_means(strips, background, axis, prior)
+    away = cv2.transform((strips - first) ** 2, np.ones((1, 3), np.float32))
+    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
+    weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
+    return _line_means(strips, weight, axis, prior)
+
+
+def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: np.float32) -> FloatImage:
+    support = weight.sum(axis=axis, keepdims=True)[..., None] + prior
+    return np.asarray((strips * weight[..., None]).sum(axis=axis, keepdims=True) / support, np.float32)
 
 
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:

@@ -1,5 +1,6 @@
 """The outline of one contact: along the edge of a smooth body, of textured skin, or around few drupelets."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from station.vision.edge import Edge, find_edge
 from station.vision.edge_signal import element_px, envelope, is_textured
 from station.vision.skirt import unexplained
 
-_UNEXPLAINED = 1.0
+_UNEXPLAINED = 0.8
 _LARGEST_ELEMENT_SHARE = 0.03
 """Of the frame: 7 mm² of a DIGIT's field, more than a seed's or a drupelet's outline ever has."""
 _FIRST_CAP, _SECOND_CAP = 0.4, 0.25
@@ -27,8 +28,8 @@ class Place(NamedTuple):
 
     region: Mask
     """Where the gel bends, 0 or not."""
-    wide: Mask | None
-    """The region with the changed places around it; None where each region is a contact of its own."""
+    widen: Callable[[], Mask] | None
+    """Gives the region with the changed places around it; None where each region is a contact of its own."""
     middle: tuple[float, float]
     """x and y from which the contact is star-shaped, px."""
     background: FloatImage
@@ -68,15 +69,16 @@ def find_outline(length: FloatImage, bend: FloatImage, place: Place, stiffness: 
     """
     region, shape = place.region, (length.shape[0], length.shape[1])
     element = element_px(length, bend, region)
-    noise = weighted_median(length, place.background)
     textured = is_textured(element, radius_px(region))
-    signal = length
+    signal, doubt = length, 1.0
     if not textured:
         edge = find_edge(length, region, place.middle, stiffness)
         inside = filled(edge, shape)
-        small = np.count_nonzero(inside) < _LARGEST_ELEMENT_SHARE * inside.size
-        if small and place.wide is not None and _excess(length, place, edge, inside, noise) > _UNEXPLAINED:
-            region, textured = place.wide, True
+        if place.widen is not None and np.count_nonzero(inside) < _LARGEST_ELEMENT_SHARE * inside.size:
+            wide = place.widen()
+            doubt = unexplained(length, wide, edge, inside, weighted_median(length, place.background))
+            textured = doubt > _UNEXPLAINED
+            region = wide if textured else region
     if textured:
         signal = envelope(length, region, _FIRST_CAP, element)
         edge = find_edge(signal, region, place.middle, stiffness)
@@ -85,8 +87,7 @@ def find_outline(length: FloatImage, bend: FloatImage, place: Place, stiffness: 
             signal = envelope(length, core, _SECOND_CAP, element)
             edge = find_edge(signal, filled(edge, shape), _centre(edge, shape), stiffness)
         inside = filled(edge, shape)
-    doubt = max(1.0, _excess(length, place, edge, inside, noise))
-    confidence = edge_confidence(edge, background_spread(signal, place.background)) / doubt
+    confidence = edge_confidence(edge, background_spread(signal, place.background)) / max(1.0, doubt)
     apart = textured and inside.any() and elements.are_few(inside, element)
     return Outline(edge, elements.union(length, inside) if apart else inside, bool(apart), confidence)
 
@@ -116,10 +117,6 @@ def radius_px(region: Mask) -> float:
         region: 0 or not.
     """
     return float(np.sqrt(np.count_nonzero(region) / np.pi))
-
-
-def _excess(length: FloatImage, place: Place, edge: Edge, inside: Mask, noise: float) -> float:
-    return 0.0 if place.wide is None else unexplained(length, place.wide, edge, inside, noise)
 
 
 def _centre(edge: Edge, shape: tuple[int, int]) -> tuple[float, float]:

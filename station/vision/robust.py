@@ -97,13 +97,12 @@ class RobustMethod:
         levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
-        changed = None
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, levels, threshold)
         else:
-            changed = changed_places(change, drift.background)
-            candidates = body_candidates(bend, levels, threshold, None if sure else changed)
-        found = self._outlines(change, bend, candidates, changed, drift.background, sure=sure)
+            changed = None if sure else changed_places(change, drift.background)
+            candidates = body_candidates(bend, levels, threshold, changed)
+        found = self._outlines(change, bend, candidates, drift.background, sure=sure)
         mask = self._mask(found)
         if on_stage:
             pictures.emit(
@@ -131,22 +130,25 @@ class RobustMethod:
         change: FloatImage,
         bend: FloatImage,
         candidates: list[Candidate],
-        changed: Mask | None,
         background: FloatImage,
         *,
         sure: bool,
     ) -> list[Outline]:
         """The outlines that the image supports, or any where contact is sure."""
         found: list[Outline] = []
+        one = self._parameters.contacts == "one"
         height, width = change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
         for small, _ in candidates:
-            if found and self._parameters.contacts == "one":
+            if found and one:
                 break
             region = _grown(small, (width, height))
-            wide = None if changed is None else _grown(extended(small, changed), (width, height))
+
+            def widened(small: Mask = small) -> Mask:
+                return _grown(extended(small, changed_places(change, background)), (width, height))
+
             smooth = denoised(change, radius_px(region))
-            place = Place(region, wide, _middle(bend, small, (width, height)), background)
+            place = Place(region, widened if one else None, _middle(bend, small, (width, height)), background)
             outline = find_outline(length_of(smooth), bend, place, self._parameters.edge_stiffness)
             inside = outline.inside > 0
             if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], outline.edge):
