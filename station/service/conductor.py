@@ -96,6 +96,10 @@ class Performer(Protocol):
         """
         ...
 
+    def failed(self, fault: StationError) -> None:
+        """An action ran into this; its event follows."""
+        ...
+
     def refused(self, state: State, event: Event) -> None:
         """An event came that the table does not list; nothing was done."""
         ...
@@ -211,6 +215,7 @@ class Conductor:
             event, why = await work(), ""
         except StationError as fault:
             event, why = event_of(fault), str(fault)
+            self._performer.failed(fault)
             if event is Event.INTERNAL_FAULT:
                 log.exception("action %s", action)
         except Exception as error:  # as above

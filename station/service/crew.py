@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
+from station.devices.camera.interface import CameraError
 from station.devices.camera.open import camera_from
 from station.devices.gripper.errors import (
     NEEDS_ACTIVATION,
@@ -120,6 +121,22 @@ class Crew:
         """
         for name in (CAMERA, GRIPPER):
             self.watches[name].in_use = by_inspection
+
+    def failed(self, fault: StationError) -> None:
+        """Somebody who worked with a device ran into this.
+
+        Args:
+            fault: as raised.
+        """
+        match fault:
+            case ArmFault():
+                self.watches[ARM].failed(fault)
+            case GripperError():
+                self.watches[GRIPPER].failed(fault)
+            case CameraError() | FramesError():
+                self.watches[CAMERA].failed(fault)
+            case _:
+                pass
 
     @property
     def standing_stop(self) -> ArmFault | None:

@@ -15,6 +15,8 @@ from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 
 FRAME_DEADLINE_S = 1.0
+FINEST_STEP_MM = 0.4
+"""A count of the gripper."""
 _MOST_FAULTY_FRAMES = 10
 
 
@@ -75,10 +77,11 @@ class Grip:
     Args:
         cell: the devices, opened.
         recipe: width steps, speed, force, settle time and frames.
+        frame_deadline_s: longest wait for one frame.
     """
 
-    def __init__(self, cell: Cell, recipe: Recipe) -> None:
-        self._cell, self._recipe = cell, recipe
+    def __init__(self, cell: Cell, recipe: Recipe, frame_deadline_s: float = FRAME_DEADLINE_S) -> None:
+        self._cell, self._recipe, self._frame_deadline_s = cell, recipe, frame_deadline_s
 
     async def go(self, *poses: PoseName) -> None:
         """Bring the arm to one pose after the other; without an arm nothing moves.
@@ -125,10 +128,10 @@ class Grip:
         return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
 
     async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
-        """Close step by step until the gel is touched.
+        """Close step by step until the gel is touched, then once more from the step before, as finely as the gripper can.
 
-        On the way one frame without a pause is enough; where it shows a contact, a full step at the same width has to
-        confirm it.
+        The onset's width is what every closing is counted from, so it is found to a count of the gripper. On the way
+        one frame without a pause is enough; where it shows a contact, a full step at the same width has to confirm it.
 
         Args:
             touches: judges a step's frames.
@@ -142,26 +145,38 @@ class Grip:
         """
         expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
         width_mm = min(expected.largest_mm, self._cell.gripper.max_width_mm)
-        before: GripStep | None = None
+        stride_mm, before = step_mm, None
         while width_mm >= expected.smallest_mm - step_mm:
-            move = await self.close_to(width_mm)
-            step = GripStep(-1, move, await self.sound_frames(1))
-            held = move.reading.object_state is ObjectState.CONTACT_CLOSING
+            step = await self._glance(width_mm)
+            held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
             if held or await touches(step):
+                if stride_mm > FINEST_STEP_MM:
+                    stride_mm = FINEST_STEP_MM
+                    width_mm = await self._back(width_mm + step_mm)
+                    continue
                 step = await self.step(0, width_mm)
                 if await touches(step):
                     return before, step
                 if held:
                     raise UnseenContactError(
-                        f"the gripper holds something at {move.width_mm:.1f} mm which the gel does not show: look for "
-                        "what stands between the fingers beside the gel, then `station devices check`"
+                        f"the gripper holds something at {step.move.width_mm:.1f} mm which the gel does not show: look "
+                        "for what stands between the fingers beside the gel, then `station devices check`"
                     )
             before = step
-            width_mm -= step_mm
+            width_mm -= stride_mm
         raise NothingTouchedError(
             f"nothing was touched from {expected.largest_mm:g} down to {expected.smallest_mm:g} mm: is a "
             f"{self._recipe.name} in the nest, and is the arm there?"
         )
+
+    async def _glance(self, width_mm: float) -> GripStep:
+        move = await self.close_to(width_mm)
+        return GripStep(-1, move, await self.sound_frames(1))
+
+    async def _back(self, width_mm: float) -> float:
+        """Open to where nothing was touched; give the next width to look at."""
+        await self.close_to(min(width_mm, self._cell.gripper.max_width_mm))
+        return width_mm - FINEST_STEP_MM
 
     async def let_go(self) -> str | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
@@ -182,7 +197,7 @@ class Grip:
     async def _sound_frame(self, newer_than_s: float) -> Frame:
         faults: set[str] = set()
         for _ in range(_MOST_FAULTY_FRAMES):
-            frame = await self._cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
+            frame = await self._cell.camera.frame(newer_than_s, self._frame_deadline_s)
             if not frame.faults:
                 return frame
             faults |= frame.faults

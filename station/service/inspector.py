@@ -8,7 +8,7 @@ from station.inspection.judge import early_stop, judge
 from station.records.model import Image
 from station.service.crew import CAMERA, GRIPPER, Crew
 from station.service.eye import Eye
-from station.service.grip import Grip, GripStep, NothingTouchedError, UnseenContactError
+from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError
 from station.service.inspection import Inspection
 from station.service.reference import BadReferenceError
 from station.settings.service import ServiceSettings
@@ -156,7 +156,7 @@ class Inspector:
         now.outcome_name = "NO_RESULT"
 
     def _grip(self, now: Inspection) -> Grip:
-        return Grip(self._crew.cell, now.active.recipe)
+        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience)
 
     async def _touches(self, step: GripStep) -> bool:
         self._crew.watches[CAMERA].heard()

@@ -97,7 +97,7 @@ def examine(
             f"reference: its light differs from the golden reference's by {drift:.0f} grey levels: look at the "
             f"sensor's LEDs; after a change of gel or sensor remove {GOLDEN} from the home folder"
         )
-    if contact.found or Flag.UNDECIDED in contact.flags:
+    if contact.found if contact.gate is None else contact.gate > settings.most_change:
         raise BadReferenceError(
             "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
             f"gel; if the gel was changed, remove {GOLDEN} from the home folder"

@@ -13,7 +13,7 @@ from station.devices.arm.ur import POSES
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, UNJUDGED, Action, Event, Raise
-from station.inspection.deadlines import Pace, deadlines, late
+from station.inspection.deadlines import LONGEST_S, Deadlines, Pace, deadlines, late
 from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
 from station.records.model import InspectionRecord, Trigger
@@ -36,10 +36,8 @@ log = logging.getLogger(__name__)
 
 CYCLE = "cycle"
 _LEASE_S = 2.0
-_MEASURE_S = 1.0
+_MEASURE_S = 0.3
 _FRAMES_PER_S = 30.0
-_FRAMES_LOST = 3
-"""Of so many frames one may be good before the camera counts as failed."""
 _RECORD_NO_RESULT_S = 1.0
 
 
@@ -121,10 +119,7 @@ class Service:
                 self.active.snapshot,
                 self._crew.simulated,
             )
-            limits = deadlines(self.active.recipe, self.pace())
-            if self._settings.inspection_deadline_s is not None:
-                limits = limits._replace(inspection_s=min(limits.inspection_s, self._settings.inspection_deadline_s))
-            now = Inspection(trigger, self.active, limits, self._configuration.camera.mm_per_px)
+            now = Inspection(trigger, self.active, self._limits(self.active), self._configuration.camera.mm_per_px)
             self._pending = Pending(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()
@@ -212,6 +207,10 @@ class Service:
     def raise_alarm(self, told: Raise, why: str) -> None:
         """Raise an alarm of the cycle's."""
         self.alarms.raise_(told.alarm, why)
+
+    def failed(self, fault: StationError) -> None:
+        """Let the device's watch know before the cycle asks how the devices do."""
+        self._crew.failed(fault)
 
     def refused(self, state: State, event: Event) -> None:
         """Count what the table does not list; a trigger among it is answered."""
@@ -346,13 +345,21 @@ class Service:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
 
+    def _limits(self, active: Active) -> Deadlines:
+        limits, patience = deadlines(active.recipe, self.pace()), self._settings.patience
+        whole_s = min(patience * limits.inspection_s, LONGEST_S - _RECORD_NO_RESULT_S)
+        return Deadlines(
+            {state: patience * limit_s for state, limit_s in limits.phases_s.items()},
+            min(whole_s, self._settings.inspection_deadline_s or whole_s),
+        )
+
     def pace(self) -> Pace:
         """What the deadlines follow from on this cell."""
-        arm = self._configuration.arm
+        cell = self._crew.cell
         return Pace(
-            frames_per_s=(self._crew.cell.camera.description.frames_per_s or _FRAMES_PER_S) / _FRAMES_LOST,
-            arm_move_s=0.0 if self._crew.cell.arm is None else longest_move_s(arm),
-            stroke_mm=self._crew.cell.gripper.max_width_mm,
+            frames_per_s=cell.camera.description.frames_per_s or _FRAMES_PER_S,
+            arm_move_s=0.0 if cell.arm is None else longest_move_s(self._configuration.arm),
+            stroke_mm=cell.gripper.max_width_mm,
             record_s=self._configuration.records.deadline_s,
             measure_s=_MEASURE_S,
         )

@@ -89,6 +89,7 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
         RecordsSettings(), title="Records", description="What the station keeps of its inspections."
     )

@@ -31,6 +31,14 @@ class ReferenceSettings(Settings):
         gt=0.0,
         le=1.0,
     )
+    most_change: float = setting(
+        1.6,
+        title="Most change",
+        description="The contact gate's statistic of a new reference against the golden one; more means that something "
+        "touches the gel. On the twin a touch of 0.25 mm gives 1.7 or more, half a day's drift of the light 1.5.",
+        gt=0.0,
+        le=100.0,
+    )
     most_drift_levels: float = setting(
         25.0,
         title="Most drift",
@@ -70,6 +78,14 @@ class ServiceSettings(Settings):
         unit="s",
         ge=1.0,
         le=600.0,
+    )
+    patience: float = setting(
+        2.0,
+        title="Patience",
+        description="Factor on the time that each phase is expected to take, before it counts as a device's fault; more "
+        "for a machine that has other work.",
+        ge=1.0,
+        le=50.0,
     )
     clean_up_deadline_s: float = setting(
         20.0,

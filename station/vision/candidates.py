@@ -66,6 +66,18 @@ def changed_places(change: FloatImage, background: FloatImage) -> Mask:
     return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, speck), np.uint8)
 
 
+def extended(region: Mask, changed: Mask) -> Mask:
+    """A region with all changed places that hang together with it.
+
+    Args:
+        region: shape (height, width), 0 or 1.
+        changed: from `changed_places`, shape of `region`.
+    """
+    _, labels = cv2.connectedComponents(region | changed)
+    inside = np.unique(labels[region > 0])
+    return np.isin(labels, inside).astype(np.uint8)
+
+
 def body_candidates(
     bend: FloatImage, levels: list[float], threshold: float, changed: Mask | None = None
 ) -> list[Candidate]:

@@ -33,6 +33,7 @@ _LATER_SHARE = 0.02
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
+_STRIPS = 32
 _MEDIAN_SIDE_PX = 60
 
 _Floats = npt.NDArray[np.float64]
@@ -122,24 +123,46 @@ class DriftModel:
         return Drift(levels, resized(certain, self._size), spread, strength)
 
 
-def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
-    """The change with each column's and then each row's mean over its background taken off.
+def without_bands(difference: FloatImage) -> FloatImage:
+    """The difference with each column's median taken off: good enough to tell a band from a contact.
 
-    A column of which little is background is corrected by less: its mean is shrunk towards none.
+    Args:
+        difference: shape (height, width, 3), grey levels.
+    """
+    strips = resized(difference, (difference.shape[1], _STRIPS))
+    return difference - np.median(strips, axis=0)
+
+
+def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
+    """The change with each column's and then each row's offset over its background taken off.
+
+    An offset is a mean that weights down what departs from it (Tukey's biweight), so that a contact's skirt does not
+    pull it; a line of which little is background is corrected by less.
 
     Args:
         change: shape (height, width, 3), grey levels.
-        background: shape (height, width), 0 to 1.
+        background: any size, 0 to 1.
     """
-    height, width = background.shape
-    weighted = cv2.multiply(change, cv2.merge([background] * 3))
-    column_support = background.sum(axis=0) + _STREAK_PRIOR_SHARE * height
-    row_support = background.sum(axis=1) + _STREAK_PRIOR_SHARE * width
-    columns = cv2.reduce(weighted, 0, cv2.REDUCE_SUM)[0] / column_support[:, None]
-    rows = (cv2.reduce(weighted, 1, cv2.REDUCE_SUM)[:, 0] - background @ columns) / row_support[:, None]
-    even = change - columns
-    even -= rows[:, None]
+    height, width = change.shape[:2]
+    even = change - _offsets(resized(change, (width, _STRIPS)), resized(background, (width, _STRIPS)), 0)
+    across = _offsets(resized(even, (_STRIPS, height)), resized(background, (_STRIPS, height)), 1)
+    even -= across
     return np.asarray(even, np.float32)
+
+
+def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
+    """The lines' offsets along an axis, of length 1 along it."""
+    prior = np.float32(_STREAK_PRIOR_SHARE * strips.shape[axis])
+    first = _line_means(strips, background, axis, prior)
+    away = cv2.transform((strips - first) ** 2, np.ones((1, 3), np.float32))
+    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
+    weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
+    return _line_means(strips, weight, axis, prior)
+
+
+def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: np.float32) -> FloatImage:
+    support = weight.sum(axis=axis, keepdims=True)[..., None] + prior
+    return np.asarray((strips * weight[..., None]).sum(axis=axis, keepdims=True) / support, np.float32)
 
 
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:

@@ -1,4 +1,4 @@
-"""The quantity whose steepest fall is a contact's edge."""
+"""The quantity whose steepest fall is a contact's edge: the change's length, or its envelope on textured skin."""
 
 import cv2
 import numpy as np
@@ -9,7 +9,6 @@ from station.vision.working import resized
 _BLUR_SHARE = 0.045
 _BLUR_PX = (1.0, 3.5)
 _TEXTURED_SHARE = 0.15
-_CAP_QUANTILE = 0.4
 _WINDOW_SHARE = 0.7
 
 
@@ -37,28 +36,38 @@ def length_of(change: FloatImage) -> FloatImage:
     return np.asarray(cv2.sqrt(cv2.transform(cv2.multiply(change, change), ones)), np.float32)
 
 
-def edge_signal(smooth: FloatImage, bend: FloatImage, region: Mask, radius_px: float) -> FloatImage:
-    """The change's length over the channels; for textured skin its capped and spread envelope.
-
-    Length over bending is a length in the image: about half the radius for a smooth body, the size of a seed or a
-    drupelet for a textured one. Where it says texture, single seeds must not outshine the contact's edge: the length
-    is capped at what most of the region reaches and averaged (root mean square) over about one element.
+def element_px(length: FloatImage, bend: FloatImage, region: Mask) -> float:
+    """Length over bending: half the radius or so for a smooth body, the size of a seed or drupelet for a textured one.
 
     Args:
-        smooth: from `denoised`, shape (height, width, 3), grey levels.
-        bend: any size, grey levels per pixel of `smooth`.
+        length: shape (height, width), grey levels.
+        bend: any size, grey levels per pixel of `length`.
         region: the candidate's, shape (height, width), 0 or not.
-        radius_px: of a circle of that region's area.
-
-    Returns:
-        Shape (height, width), grey levels.
     """
-    length = length_of(smooth)
-    within = length[region > 0]
     small = resized(region.astype(np.float32), (bend.shape[1], bend.shape[0])) > 0
-    element_px = float(within.mean() / bend[small].mean())
-    if element_px >= _TEXTURED_SHARE * radius_px:
-        return length
-    capped = np.minimum(length, np.quantile(within, _CAP_QUANTILE))
-    spread = cv2.GaussianBlur(capped * capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element_px))
-    return np.asarray(cv2.sqrt(spread), np.float32)
+    return float(length[region > 0].mean() / bend[small].mean())
+
+
+def is_textured(element: float, radius_px: float) -> bool:
+    """Whether the elements are too small for a smooth body of that size.
+
+    Args:
+        element: from `element_px`.
+        radius_px: of a circle of the region's area.
+    """
+    return element < _TEXTURED_SHARE * radius_px
+
+
+def envelope(length: FloatImage, inside: Mask, quantile: float, element: float) -> FloatImage:
+    """The length capped at what most of a place reaches, averaged over about one element.
+
+    Single seeds and drupelets then no longer outshine the body's edge.
+
+    Args:
+        length: shape (height, width), grey levels.
+        inside: where the cap is taken, shape of `length`, 0 or not.
+        quantile: of the length there, the cap.
+        element: from `element_px`.
+    """
+    capped = np.minimum(length, np.quantile(length[inside > 0], quantile).astype(np.float32))
+    return np.asarray(cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element)), np.float32)

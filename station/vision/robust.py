@@ -18,20 +18,20 @@ from station.vision.candidates import (
     body_candidates,
     changed_places,
     cluster_levels,
+    extended,
     separate_candidates,
 )
-from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_streaks
-from station.vision.edge import Edge, find_edge
-from station.vision.edge_signal import denoised, edge_signal
+from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
+from station.vision.edge import Edge
+from station.vision.edge_signal import denoised, length_of
+from station.vision.outline import Outline, Place, find_outline, radius_px
 from station.vision.working import SATURATED_LEVEL, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
 """The image for which parameters in pixels are given; they scale with the image."""
 
-_SUBPIXEL_BITS = 4
 _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
@@ -85,11 +85,12 @@ class RobustMethod:
             )
         work = working_image(image)
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
-        drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
+        calm = quiet(bending(without_bands(difference)), self._least_bend)
+        drift = self._drift.fit(difference, calm)
         change = difference - drift.levels
         if self._blind is not None:
             change[self._blind] = 0
-        change = without_streaks(change, drift.background)
+        change = without_streaks(change, calm)
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
@@ -101,8 +102,8 @@ class RobustMethod:
         else:
             changed = None if sure else changed_places(change, drift.background)
             candidates = body_candidates(bend, levels, threshold, changed)
-        found = self._edges(change, bend, candidates, drift.background, sure=sure)
-        mask = self._mask([edge for edge, _ in found])
+        found = self._outlines(change, bend, candidates, drift.background, sure=sure)
+        mask = self._mask(found)
         if on_stage:
             pictures.emit(
                 on_stage,
@@ -112,7 +113,7 @@ class RobustMethod:
                 bend=bend,
                 levels=levels,
                 threshold=threshold,
-                edges=[edge for edge, _ in found],
+                edges=[outline.edge for outline in found],
                 mask=mask,
             )
         flags, confidence = self._judge(work, drift, mask, found, gate)
@@ -124,7 +125,7 @@ class RobustMethod:
             drift_levels=drift.strength_levels,
         )
 
-    def _edges(
+    def _outlines(
         self,
         change: FloatImage,
         bend: FloatImage,
@@ -132,38 +133,39 @@ class RobustMethod:
         background: FloatImage,
         *,
         sure: bool,
-    ) -> list[tuple[Edge, float]]:
-        """The edges that the image supports, or any where contact is sure, each with its confidence."""
-        found: list[tuple[Edge, float]] = []
+    ) -> list[Outline]:
+        """The outlines that the image supports, or any where contact is sure."""
+        found: list[Outline] = []
+        one = self._parameters.contacts == "one"
         height, width = change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
         for small, _ in candidates:
-            if found and self._parameters.contacts == "one":
+            if found and one:
                 break
-            middle = _middle(bend, small, (width, height))
-            region = np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-            radius_px = float(np.sqrt(np.count_nonzero(region) / np.pi))
-            smooth = denoised(change, radius_px)
-            signal = edge_signal(smooth, bend, region, radius_px)
-            edge = find_edge(signal, region, middle, self._parameters.edge_stiffness)
-            inside = _filled(edge, (height, width), 1.0, 1.0) > 0
-            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], edge):
+            region = _grown(small, (width, height))
+
+            def widened(small: Mask = small) -> Mask:
+                return _grown(extended(small, changed_places(change, background)), (width, height))
+
+            smooth = denoised(change, radius_px(region))
+            place = Place(region, widened if one else None, _middle(bend, small, (width, height)), background)
+            outline = find_outline(length_of(smooth), bend, place, self._parameters.edge_stiffness)
+            inside = outline.inside > 0
+            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], outline.edge):
                 continue
-            confidence = edge_confidence(edge, background_spread(signal, background))
-            if sure or confidence >= _LEAST_SUPPORT:
-                found.append((edge, confidence))
+            if sure or outline.confidence >= _LEAST_SUPPORT:
+                found.append(outline)
         return found
 
-    def _mask(self, edges: list[Edge]) -> Mask:
+    def _mask(self, outlines: list[Outline]) -> Mask:
         height, width = self._shape[:2]
-        x_scale, y_scale = width / self._reference.shape[1], height / self._reference.shape[0]
         mask = np.zeros((height, width), np.uint8)
-        for edge in edges:
-            mask |= _filled(edge, (height, width), x_scale, y_scale)
+        for outline in outlines:
+            mask |= outline.drawn(height, width)
         return mask
 
     def _judge(
-        self, work: Image, drift: Drift, mask: Mask, found: list[tuple[Edge, float]], gate: float
+        self, work: Image, drift: Drift, mask: Mask, found: list[Outline], gate: float
     ) -> tuple[frozenset[Flag], float]:
         """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
@@ -178,7 +180,7 @@ class RobustMethod:
         if not found and gate > 1:
             flags.add(Flag.UNDECIDED)
         untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
-        confidence = min((confidence for _, confidence in found), default=untouched)
+        confidence = min((outline.confidence for outline in found), default=untouched)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
@@ -197,12 +199,9 @@ def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[floa
     )
 
 
-def _filled(edge: Edge, shape: tuple[int, int], x_scale: float, y_scale: float) -> Mask:
-    points = (edge.points + 0.5) * (x_scale, y_scale) - 0.5
-    mask = np.zeros(shape, np.uint8)
-    fixed = np.rint(points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, _SUBPIXEL_BITS)
-    return mask
+def _grown(small: Mask, size: tuple[int, int]) -> Mask:
+    """A region of the bending's size at the change's, width and height."""
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
 def _one_sided(change: FloatImage, edge: Edge) -> bool:

@@ -1,0 +1,44 @@
+"""Each device's faults in each phase: one outcome for each trigger, an alarm, and the station comes back."""
+
+import asyncio
+
+import pytest
+
+from station.inspection.alarm_table import AlarmId
+from station.inspection.states import State
+from station.vocabulary import Reason
+
+FAULTS = [
+    ("camera", "off", State.REFERENCE, Reason.CAMERA_FAULT, AlarmId.CAMERA_LOST),
+    ("camera", "stuck", State.CLOSING_TO_ONSET, Reason.CAMERA_FAULT, AlarmId.CAMERA_STALE),
+    ("camera", "frame_torn", State.SETTLING, Reason.CAMERA_FAULT, AlarmId.CAMERA_STALE),
+    ("gripper", "off", State.CLOSING_TO_ONSET, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_LINK_LOST),
+    ("gripper", "garbage", State.MOVING, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_LINK_LOST),
+    ("gripper", "stuck", State.SETTLING, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_JAM),
+]
+
+
+@pytest.mark.parametrize("faults", [FAULTS[:3], FAULTS[3:]], ids=["camera", "gripper"])
+def test_a_fault_in_mid_inspection_is_one_no_result_and_passes(bench, faults):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            for device, fault, phase, reason, alarm in faults:
+                await cell.line.ready()
+                cell.at(phase, lambda device=device, fault=fault: cell.twin.boards[device].set(fault))
+                begun = await cell.line.begin()
+                outcome = await cell.line.outcome(begun.sequence)
+                assert outcome.outcome == "NO_RESULT", fault
+                assert reason in outcome.reasons, (fault, outcome)
+                state = await cell.line.state()
+                assert not state.ready
+                assert state.why_not_ready
+                assert alarm in {active.id for active in cell.station.service.alarms.alarms.active}, fault
+                cell.twin.boards[device].clear()
+                await cell.line.publish(outcome)
+            await cell.line.ready()
+            sound = await cell.line.inspect()
+            assert sound.sequence == len(faults) + 1
+            return sound
+
+    assert asyncio.run(scenario()).outcome in {"PASS", "FAIL"}

@@ -1,0 +1,102 @@
+"""What the PLC interface asks beside a fruit's outcome: doubled triggers, refusals, commands, the state."""
+
+import asyncio
+
+import pytest
+
+from station.channel.line import CommandName, PackmlState
+from station.channel.messages import RefusedError
+from station.inspection.states import State
+from station.vocabulary import Reason, Refusal
+
+
+def test_the_life_of_triggers_and_commands(bench):
+    async def scenario():
+        async with bench() as cell:
+            line = cell.line
+            first = await line.state()
+            assert not first.ready
+            assert first.why_not_ready
+            assert (await line.begin(9)).refusal is Refusal.NOT_READY
+
+            await cell.choose("blueberry")
+            ready = await line.ready()
+            assert ready.packml_state is PackmlState.IDLE
+            assert ready.recipe_number == 2
+            assert ready.recipe_checksum > 0
+            assert ready.simulated
+
+            begun = await line.begin(10)
+            doubled, other = await asyncio.gather(line.begin(10), line.begin(11))
+            assert doubled.sequence == begun.sequence
+            assert doubled.deadline_s <= begun.deadline_s
+            assert other.refusal is Refusal.BUSY
+            assert (await line.open()).running == (begun.sequence, 10)
+            changing = asyncio.create_task(line.order(CommandName.CHANGE_RECIPE, 3))
+            outcome = await line.outcome(begun.sequence)
+            assert outcome.trigger_id == 10
+            assert outcome.recipe_number == 2, "the recipe is frozen at the trigger"
+            assert outcome.recipe_checksum == ready.recipe_checksum
+            assert outcome == await line.outcome(begun.sequence)
+            assert [held.sequence for held in (await line.open()).outcomes] == [begun.sequence]
+            await line.publish(outcome)
+            await line.publish(outcome)
+            assert (await line.open()).outcomes == ()
+            assert (await changing).done
+            assert (await line.ready()).recipe_number == 3
+
+            again = await line.begin(10)
+            assert again.sequence == begun.sequence + 1, "the same id after its outcome was told is another fruit"
+            await cell.reach(State.CLOSING_TO_ONSET)
+            called_off = await line.order(CommandName.CALL_OFF)
+            assert called_off.done
+            ended = await line.outcome(again.sequence)
+            assert (ended.outcome, ended.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
+            await line.publish(ended)
+
+            unknown = await line.order(CommandName.CHANGE_RECIPE, 77)
+            assert not unknown.done
+            assert "expected one of 1, 2, 3" in unknown.why
+            assert not (await line.order(CommandName.SET_MODE, 4)).done
+            assert (await line.order(CommandName.SET_MODE, 2)).done
+            await cell.reach(State.IDLE)
+            state = await line.state()
+            assert not state.ready
+            assert "mode 1" in state.why_not_ready
+            assert (await line.begin(12)).refusal is Refusal.NOT_READY
+            assert (await line.order(CommandName.SET_MODE, 1)).done
+            assert (await line.ready()).mode == 1
+            with pytest.raises(RefusedError, match="no inspection 999"):
+                await line.outcome(999)
+
+    asyncio.run(scenario())
+
+
+def test_late_is_no_result(bench):
+    async def scenario():
+        async with bench(inspection_deadline_s=1.0) as cell:
+            await cell.choose("strawberry")
+            return await cell.line.inspect()
+
+    outcome = asyncio.run(scenario())
+    assert (outcome.outcome, outcome.reasons[0], outcome.late) == ("NO_RESULT", Reason.LATE, True)
+
+
+def test_an_order_to_end_gives_the_outcome_first_and_opens_the_jaws(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            begun = await cell.line.begin()
+            await cell.reach(State.MOVING)
+            asked = asyncio.create_task(cell.line.outcome(begun.sequence))
+            await asyncio.sleep(0)
+            cell.station.stop()
+            cell.station.stop()
+            outcome = await asked
+            await cell.running
+            return outcome, cell.twin.world.opening_mm()
+
+    outcome, opening_mm = asyncio.run(scenario())
+    assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
+    assert opening_mm == pytest.approx(85, abs=1)
