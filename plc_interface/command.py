@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from plc_interface.can.command import check_can
 from plc_interface.generate.files import DOCUMENTS, drifted_files, write_files
 from plc_interface.process import log_to_stderr, serve
 from station.errors import StationError
@@ -14,6 +15,9 @@ from station.settings.configuration import load_configuration
 @click.group("plc")
 def plc() -> None:
     """Talk to the line's PLC, and make its documents."""
+
+
+plc.add_command(check_can)
 
 
 @plc.command("run")

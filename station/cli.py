@@ -28,8 +28,8 @@ COMMANDS = {
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
-    "run": Entry("station.commands.start:run", "Run the station: all its processes, supervised."),
-    "service": Entry("station.commands.run:service", "Inspect fruit at the PLC's triggers."),
+    "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
+    "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 

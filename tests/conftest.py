@@ -37,7 +37,7 @@ class Living(NamedTuple):
             for connection in me.net_connections(kind="inet")
             if connection.status == psutil.CONN_LISTEN
         }
-        tasks = {thing for thing in gc.get_objects() if isinstance(thing, asyncio.Task) and not thing.done()}
+        tasks = {thing for thing in gc.get_objects() if issubclass(type(thing), asyncio.Task) and not thing.done()}
         return cls(
             frozenset(threading.enumerate()),
             frozenset(child.pid for child in children),

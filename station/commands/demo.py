@@ -14,7 +14,7 @@ from plc_interface.line.nest import TwinNest
 from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
-from station.commands.start import addresses
+from station.commands.run import addresses
 from station.errors import StationError
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection

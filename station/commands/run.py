@@ -1,44 +1,51 @@
-"""`station service`: the station's own process."""
+"""`station run`: the whole station, its processes supervised."""
 
 import asyncio
+import logging
 import signal
 from pathlib import Path
 
 import click
 
-from station.service.last_good import load_or_last_good
-from station.service.logs import configure_logging
-from station.service.station import Station
-from station.settings.configuration import Configuration
+from station.settings.configuration import Configuration, load_configuration
+from station.supervision.notify import notify
+from station.supervision.programs import station_programs
+from station.supervision.supervisor import Supervisor
 
 
-@click.command("service")
+@click.command("run")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
-@click.option(
-    "--log",
-    "style",
-    type=click.Choice(["auto", "json", "human"]),
-    default="auto",
-    show_default=True,
-    help="The log.",
-)
-def service(config: Path | None, style: str) -> None:
-    """Inspect fruit at the PLC's triggers, until SIGTERM or Ctrl-C. The arm and the gripper move.
+def run(config: Path | None) -> None:
+    """Run the station until Ctrl-C: the service and the PLC interface, each a process of its own.
 
-    An order to end lets the running inspection come to its outcome and opens the jaws; then the exit code is 0.
+    What dies or hangs is started again, at most 5 times within 60 s. On SIGTERM a running inspection ends, the jaws
+    open, and all processes end.
     """
-    configure_logging("station", style)  # type: ignore[arg-type] (click has checked it)
-    configuration, broken = load_or_last_good(config)
-    asyncio.run(_run(configuration, broken))
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
+    site = load_configuration(config)
+    asyncio.run(_supervise(site, config))
 
 
-async def _run(configuration: Configuration, broken: str) -> None:
-    station = Station(configuration, broken)
+async def _supervise(site: Configuration, config: Path | None) -> None:
+    ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, station.stop)
-    await station.run(lambda port: _announce(configuration, port))
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+
+    def announce() -> None:
+        click.echo(addresses(site))
+        click.echo("running; Ctrl-C ends it")
+        notify("READY=1")
+
+    await Supervisor(station_programs(config)).run(announce, ended)
 
 
-def _announce(configuration: Configuration, port: int) -> None:
-    click.echo(f"metrics  http://{configuration.metrics.host}:{port}/metrics, /readyz, /livez, /version beside it")
-    click.echo("running; SIGTERM or Ctrl-C ends it")
+def addresses(site: Configuration) -> str:
+    """Where a station is reached, one line each.
+
+    Args:
+        site: its configuration.
+    """
+    return (
+        f"Modbus TCP  {site.modbus.host}:{site.modbus.port}, unit {site.modbus.unit}\n"
+        f"metrics     http://{site.metrics.host}:{site.metrics.port}/metrics, health at /livez, /readyz, /version"
+    )

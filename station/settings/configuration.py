@@ -96,7 +96,6 @@ class Configuration(Settings):
     service: ServiceSettings = setting(
         ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."
     )
-    can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:

@@ -4,8 +4,6 @@ import asyncio
 
 import pytest
 
-from station.channel.line import PackmlState
-
 
 @pytest.mark.parametrize("kind", ["strawberry", "raspberry", "blueberry"])
 def test_a_fruit_gets_one_outcome_with_its_area_near_the_truth(bench, kind):

@@ -49,7 +49,8 @@ class Bench:
 
     def program(self, name: str, *how: str, **limits: float) -> Program:
         limits = {"start_limit_s": 20.0, "watchdog_s": 5.0, "stop_limit_s": 20.0} | limits
-        return Program(name, (sys.executable, str(self.folder / "child.py"), str(self.folder), name, *how), **limits)
+        command = (sys.executable, str(self.folder / "child.py"), str(self.folder), name, *how)
+        return Program(name, command, limits["start_limit_s"], limits["watchdog_s"], limits["stop_limit_s"])
 
     def log(self) -> list[str]:
         path = self.folder / "log"

@@ -1,0 +1,44 @@
+"""`station service`: the station's own process."""
+
+import asyncio
+import signal
+from pathlib import Path
+
+import click
+
+from station.service.last_good import load_or_last_good
+from station.service.logs import configure_logging
+from station.service.station import Station
+from station.settings.configuration import Configuration
+
+
+@click.command("service")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@click.option(
+    "--log",
+    "style",
+    type=click.Choice(["auto", "json", "human"]),
+    default="auto",
+    show_default=True,
+    help="The log.",
+)
+def service(config: Path | None, style: str) -> None:
+    """Inspect fruit at the PLC's triggers, until SIGTERM or Ctrl-C. The arm and the gripper move.
+
+    An order to end lets the running inspection come to its outcome and opens the jaws; then the exit code is 0.
+    """
+    configure_logging("station", style)  # type: ignore[arg-type] (click has checked it)
+    configuration, broken = load_or_last_good(config)
+    asyncio.run(_run(configuration, broken))
+
+
+async def _run(configuration: Configuration, broken: str) -> None:
+    station = Station(configuration, broken)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, station.stop)
+    await station.run(lambda port: _announce(configuration, port))
+
+
+def _announce(configuration: Configuration, port: int) -> None:
+    click.echo(f"metrics  http://{configuration.metrics.host}:{port}/metrics, /readyz, /livez, /version beside it")
+    click.echo("running; SIGTERM or Ctrl-C ends it")
