@@ -1,6 +1,7 @@
 """What every test lives under: nothing may outlive it, and a missing tool is an error where CI says so."""
 
 import asyncio
+import contextlib
 import gc
 import os
 import shutil
@@ -91,6 +92,20 @@ def unused_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+@pytest.fixture
+def unused_ports() -> Callable[[int], list[int]]:
+    """Gives so many different loopback ports that nobody listens on."""
+
+    def choose(count: int) -> list[int]:
+        with contextlib.ExitStack() as stack:
+            probes = [stack.enter_context(socket.socket()) for _ in range(count)]
+            for probe in probes:
+                probe.bind(("127.0.0.1", 0))
+            return [probe.getsockname()[1] for probe in probes]
+
+    return choose
 
 
 @pytest.fixture(scope="session")

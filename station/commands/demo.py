@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+from pathlib import Path
 
 import click
 from rich.console import Console
@@ -15,7 +16,7 @@ from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
 from station.commands.run import addresses
-from station.errors import StationError
+from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
 from station.records.wording import sparkline
@@ -25,7 +26,6 @@ from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 
 FRUITS = ("strawberry", "raspberry", "blueberry")
-_CONSOLE_PORT = 49211
 _LOT = "DEMO"
 _FAULT_EVERY = 4
 
@@ -41,6 +41,7 @@ _FAULT_EVERY = 4
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
 @click.option("--damaged", type=click.FloatRange(0, 1), default=0.25, show_default=True, help="Share of damaged fruit.")
+@click.option("--console", default=49211, show_default=True, type=click.IntRange(1, 65535), help="The twin's console.")
 @click.option("--faults", is_flag=True, help=f"The PLC does something wrong at every {_FAULT_EVERY}th fruit.")
 def demo(
     fruits: tuple[str, ...],
@@ -48,6 +49,7 @@ def demo(
     speed: float | None,
     seed: int,
     damaged: float,
+    console: int,
     faults: bool,  # noqa: FBT001
 ) -> None:
     """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
@@ -57,26 +59,49 @@ def demo(
     """
     os.environ["STATION_HOME"] = str(load_configuration().home.resolve() / "demo")
     site = load_configuration()
+    _refuse_real_devices(site)
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
-    nest = TwinNest(_CONSOLE_PORT, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed)
+    nest = TwinNest(console, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed)
     plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
     pace = Pace(every_s=60 / speed if speed else 0.0)
-    asyncio.run(_run(site, nest, LineProgram(plan, _LOT), pace, count, seed))
+    supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])
+    asyncio.run(_run(site, supervisor, nest, LineProgram(plan, _LOT), pace, count))
 
 
-async def _run(
-    site: Configuration, nest: TwinNest, program: LineProgram, pace: Pace, count: int | None, seed: int
-) -> None:
+def _refuse_real_devices(site: Configuration) -> None:
+    """A demonstration must not move a real arm because a site's configuration happens to be in force."""
+    hosts = {
+        "arm.host": site.arm.host,
+        "gripper.urcap.host": site.gripper.urcap.host,
+        "gripper.modbus_rtu.host": site.gripper.modbus_rtu.host,
+        "camera.twin.host": site.camera.twin.host,
+    }
+    real = [f"{name} is {host}" for name, host in hosts.items() if not host.startswith("127.")]
+    if site.camera.driver != "twin":
+        real.append(f"camera.driver is {site.camera.driver}")
+    if real:
+        raise BadInputError(
+            f"the demonstration works with the twin only, but {', '.join(real)}: unset STATION_CONFIG and the "
+            "variables STATION_… of the devices"
+        )
+
+
+def _logs(site: Configuration) -> Path:
     logs = site.home / "logs"
     try:
         logs.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StationError(f"{logs}: cannot be made: {error.strerror}; name another STATION_HOME") from error
+        raise BadInputError(f"{logs}: cannot be made: {error.strerror}; name another STATION_HOME") from error
+    return logs
+
+
+async def _run(
+    site: Configuration, supervisor: Supervisor, nest: TwinNest, program: LineProgram, pace: Pace, count: int | None
+) -> None:
     ended, ready = asyncio.Event(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    supervisor = Supervisor([twin_program(None, _CONSOLE_PORT, seed, logs), *station_programs(None, logs)])
-    click.echo(f"starting the twin, the station and the PLC interface; their logs: {logs}")
+    click.echo(f"starting the twin, the station and the PLC interface; their logs: {site.home / 'logs'}")
     supervising = asyncio.create_task(supervisor.run(ready.set, ended))
     waiting = asyncio.create_task(ready.wait())
     try:

@@ -42,6 +42,11 @@ class Cell:
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
 
 
+@pytest.fixture(name="own_host")
+def own_host_fixture() -> Callable[[], str]:
+    return own_host
+
+
 @pytest.fixture
 def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]:
     """Start a twin with the arguments given; it is ended after the test.

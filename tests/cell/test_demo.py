@@ -1,37 +1,95 @@
-"""`station demo` as a person uses it."""
+"""`station demo` as a person uses it: all processes, all protocols, fruit after fruit."""
 
-import csv
 import os
+import re
+import signal
 import subprocess
 import sys
 
+import psutil
 import pytest
 
-from station.commands import demo
-from station.errors import StationError
+ROW = re.compile(r"^(\d+) +(\d+) +(\w+)( \(damaged\))? .*?\b(PASS|FAIL|NO_RESULT|refused|no answer)\b")
 
 
-def test_the_demonstration_shows_a_contact_that_grows(tmp_path):
-    command = [sys.executable, "-m", "station", "demo"]
-    environment = {**os.environ, "STATION_HOME": str(tmp_path)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
-    assert done.returncode == 0, done.stderr
-    (report,) = tmp_path.glob("demo/*/report/report.html")
-    assert report.as_uri() in done.stdout
-    with (report.parent / "curve.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    areas_px = [int(row["area_px"]) for row in rows]
-    assert areas_px[:2] == [0, 0]
-    assert areas_px[2:] == sorted(areas_px[2:])
-    assert min(areas_px[2:]) > 0
-    with (report.parent / "results.csv").open(newline="") as file:
-        flags = [row["flags"] for row in csv.DictReader(file)]
-    assert all("no_contact" in text for text in flags[:2])
-    assert set(flags[2:]) == {""}
+@pytest.fixture
+def demo(tmp_path, unused_ports, own_host):
+    """Starts the demonstration with addresses of its own and the patience of a busy machine."""
+    modbus, metrics, camera, console = unused_ports(4)
+    host = own_host()
+    (tmp_path / "station.yaml").write_text(
+        f"modbus: {{port: {modbus}}}\nmetrics: {{port: {metrics}}}\narm: {{host: {host}, stale_after_s: 1.0}}\n"
+        f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
+        f"camera: {{oldest_s: 1.0, twin: {{port: {camera}}}}}\nservice: {{patience: 10.0}}\n"
+    )
+    environment = {**os.environ, "STATION_HOME": str(tmp_path), "STATION_CONFIG": str(tmp_path / "station.yaml")}
+
+    def begin(*arguments, **variables):
+        command = [sys.executable, "-m", "station", "demo", "--console", str(console), *map(str, arguments)]
+        return subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**environment, **variables}
+        )
+
+    return begin
 
 
-def test_a_drawing_that_takes_too_long_is_ended_with_a_remedy(monkeypatch, tmp_path):
-    monkeypatch.setenv("STATION_HOME", str(tmp_path))
-    monkeypatch.setattr(demo, "_DRAWING_TIMEOUT_S", 0.01)
-    with pytest.raises(StationError, match=r"more than 0\.01 s.* start the demonstration again"):
-        demo.demo.main([], standalone_mode=False)
+def records_of(home):
+    command = [sys.executable, "-m", "station", "records", "list", "--last", "100"]
+    environment = {**os.environ, "STATION_HOME": str(home)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, env=environment).stdout
+
+
+@pytest.mark.timeout(300)
+def test_every_fruit_is_decided_once_and_the_records_agree(demo, tmp_path):
+    output, errors = demo("--count", 2, "--fruit", "blueberry", "--damaged", 0).communicate(timeout=280)
+    assert errors == ""
+    rows = [match for line in output.splitlines() if (match := ROW.match(line))]
+    assert [row[1] for row in rows] == ["1", "2"], output
+    assert [row[2] for row in rows] == ["1", "2"]
+    assert {row[3] for row in rows} == {"blueberry"}
+    assert "2 fruits: " in output
+    assert "damaged and passed: 0" in output
+    listed = records_of(tmp_path / "demo")
+    for row in rows:
+        if row[5] in {"PASS", "FAIL", "NO_RESULT"}:
+            assert re.search(rf"trigger +{row[2]}\b.*{row[5]}|\b{row[2]}\b.*\bblueberry\b.*\b{row[5]}\b", listed), (
+                listed
+            )
+
+
+@pytest.mark.timeout(300)
+def test_ctrl_c_ends_everything(demo):
+    process = demo()
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("metrics"):
+            break
+    children = psutil.Process(process.pid).children(recursive=True)
+    assert len(children) >= 3
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=120)
+    assert (process.returncode, errors) == (0, "")
+    assert "fruits: " in output
+    assert psutil.wait_procs(children, timeout=10)[1] == []
+
+
+def test_a_site_with_real_devices_is_refused(demo):
+    process = demo(STATION_ARM_HOST="192.0.2.7")
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert errors.startswith("station: the demonstration works with the twin only, but arm.host is 192.0.2.7")
+
+
+def test_an_address_in_use_is_said_with_the_process_that_needs_it(demo, tmp_path):
+    first = demo()
+    assert first.stdout is not None
+    for line in first.stdout:
+        if line.startswith("metrics"):
+            break
+    second = demo()
+    _, errors = second.communicate(timeout=120)
+    first.send_signal(signal.SIGTERM)
+    first.communicate(timeout=120)
+    assert second.returncode == 1
+    assert "the process twin ended with exit code 2 before it was ready" in errors
+    assert "is another twin running?" in errors
