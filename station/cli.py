@@ -24,6 +24,7 @@ COMMANDS = {
     "demo": Entry("station.commands.demo:demo", "Measure a simulated press and say where the report lies."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
+    "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }

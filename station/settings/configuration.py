@@ -10,12 +10,14 @@ from pydantic import model_validator
 
 from station.settings.arm import ArmSettings
 from station.settings.camera import CameraSettings
+from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.gripper import GripperSettings
 from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
 from station.settings.network import Host
 from station.settings.paths import Folder
+from station.settings.plc import HandshakeSettings
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
 from station.settings.problems import Path as Where
 from station.settings.schema import branches, leaves, schema_of
@@ -74,6 +76,9 @@ class Configuration(Settings):
     modbus: ModbusSettings = setting(
         ModbusSettings(), title="Modbus TCP", description="Where the line's PLC reaches the station."
     )
+    handshake: HandshakeSettings = setting(
+        HandshakeSettings(), title="Handshake", description="How the PLC interface waits for the PLC and the station."
+    )
     hmi: HmiSettings = setting(HmiSettings(), title="HMI", description="Where operators' browsers reach the station.")
     metrics: MetricsSettings = setting(
         MetricsSettings(), title="Metrics", description="Where Prometheus and supervisors reach the station."
@@ -82,6 +87,7 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:

@@ -43,7 +43,7 @@ def twin(
     config: Path | None,
     console_port: int,
 ) -> None:
-    """Run the simulated arm, gripper, sensor and fruit until Ctrl-C, or talk to the one that runs."""
+    """Run the simulated arm, gripper, sensor, fruit and line until Ctrl-C, or talk to the one that runs."""
     if context.invoked_subcommand is not None:
         return
     site = load_configuration(config)
@@ -54,6 +54,7 @@ def twin(
         arm=site.arm,
         gripper=site.gripper,
         camera=site.camera.twin,
+        can=site.can,
         console_port=console_port,
         polyscope=polyscope,
     )
@@ -66,6 +67,9 @@ def _announce(options: TwinOptions, running: Twin) -> None:
         click.echo(f"arm      {options.arm.host}, on a UR controller's own ports")
     click.echo(f"gripper  {urcap.host}:{urcap.port} (URCap), {rtu.host}:{rtu.port} (Modbus RTU over TCP)")
     click.echo(f"camera   {options.camera.host}:{running.camera.port}")
+    if options.can.enabled:
+        nodes = f"gate {options.can.gate_node}, encoder {options.can.encoder_node}"
+        click.echo(f"line     CAN {options.can.interface} {options.can.channel}: {nodes}")
     click.echo(f"console  {LOOPBACK}:{running.console.address[1]}: station twin fault, station twin lay")
     click.echo("running; Ctrl-C ends it")
 

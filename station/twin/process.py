@@ -1,4 +1,4 @@
-"""The whole twin: arm, gripper, sensor and fruit on one loop, wired to each other as on the real cell."""
+"""The whole twin: arm, gripper, sensor, fruit and line on one loop, wired to each other as on the real cell."""
 
 import asyncio
 import signal
@@ -11,9 +11,12 @@ import numpy as np
 from station.errors import BadInputError
 from station.settings.arm import ArmPoses, ArmSettings
 from station.settings.camera import TwinCameraSettings
+from station.settings.can import CanSettings
 from station.settings.gripper import GripperSettings
+from station.twin.can.faults import line_faults
+from station.twin.can.line import LineNodes
 from station.twin.clock import Clock, SteadyClock
-from station.twin.console import ConsoleServer
+from station.twin.console import Action, ConsoleServer
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.faults import FaultBoard
@@ -51,6 +54,8 @@ class TwinOptions:
     """No arm: the fingers are always where the fruit lies."""
     arm: ArmSettings = field(default_factory=ArmSettings)
     """Where the station looks for the arm, and the nest's pose."""
+    can: CanSettings = field(default_factory=CanSettings)
+    """Where the station looks for the reject gate and the encoder; neither is there unless it is enabled."""
     gripper: GripperSettings = field(default_factory=GripperSettings)
     camera: TwinCameraSettings = field(default_factory=TwinCameraSettings)
     console_port: int = CONSOLE_PORT
@@ -91,9 +96,15 @@ class Twin:
             arm = UrController(options.arm.host, clock, self.boards["arm"], polyscope=options.polyscope)
             self.world.arm_at_nest = _near_nest(arm, options.arm.poses)
             self._servers.append(arm)
+        actions: dict[str, Action] = {"fruit": self._lay, "remove": self._remove, "state": self._state}
+        if options.can.enabled:
+            self.boards["line"] = line_faults()
+            line = LineNodes(options.can, clock, self.boards["line"])
+            self._servers.append(line)
+            actions["line"] = lambda _request: line.state()
         self.console = ConsoleServer(
             self.boards,
-            {"fruit": self._lay, "remove": self._remove, "state": self._state},
+            actions,
             LOOPBACK,
             options.console_port,
         )

@@ -44,8 +44,10 @@ def test_the_result_begins_and_ends_with_its_sequence():
     assert result[0].kind is result[-1].kind is Kind.U32
 
 
-def test_numbers_lie_on_even_addresses_where_they_take_two_registers():
-    assert [register.name for register in REGISTERS if register.words > 1 and register.address % 2] == []
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
+def test_numbers_are_aligned_in_their_block_so_that_it_can_be_laid_over_a_structure(group):
+    numbers = [register for register in group.registers if register.kind is not Kind.TEXT]
+    assert [register.name for register in numbers if (register.address - group.address) % register.words] == []
 
 
 def test_flags_and_codes_are_numbered_as_the_stations_enumerations():

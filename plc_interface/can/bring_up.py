@@ -1,0 +1,238 @@
+"""What a node is asked and told over SDO before it may work: identity, errors, configuration, PDO mapping.
+
+Every function waits for the node and is called from a worker thread. Objects: CiA 301, CiA 401 and CiA 406.
+"""
+
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import can
+import canopen
+from canopen.objectdictionary import ObjectDictionaryError
+from canopen.pdo.base import PdoMap
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from plc_interface.can.errors import BringUpError
+from station.settings.can import ENCODER_EDS, GATE_EDS, CanSettings
+
+_BEHAVIOUR = 0xFFFF_0000
+"""The upper half of a revision; the lower one never changes what a node does (CiA 301, object 1018)."""
+_ERROR_PART = 0xFFFF
+
+
+class Node(NamedTuple):
+    """One of the two nodes, as canopen sees it."""
+
+    remote: canopen.RemoteNode
+    number: int
+    name: str
+    """With the node id, for sentences."""
+    setting: str
+    """The setting that holds its node id."""
+
+
+class Pdo(NamedTuple):
+    """A PDO as it has to be configured; what it carries is in the data sheet."""
+
+    map: PdoMap
+    cob_id: int
+    event_timer_ms: int
+
+
+def make_gate(network: canopen.Network, settings: CanSettings) -> Node:
+    """The reject gate on this network, in the place of one made before."""
+    return _make(network, settings, "gate_node", "the reject gate", str(GATE_EDS))
+
+
+def make_encoder(network: canopen.Network, settings: CanSettings) -> Node:
+    """The line encoder on this network, in the place of one made before."""
+    return _make(network, settings, "encoder_node", "the line encoder", str(ENCODER_EDS))
+
+
+def _make(network: canopen.Network, settings: CanSettings, setting: str, name: str, eds: str) -> Node:
+    number = getattr(settings, setting)
+    remote = network.add_node(number, eds)
+    remote.sdo.RESPONSE_TIMEOUT = settings.answer_timeout_s
+    return Node(remote, number, f"{name} (node {number})", f"can.{setting}")
+
+
+def no_heartbeat(node: Node, settings: CanSettings) -> str:
+    """What to say of a node that is not heard."""
+    return (
+        f"no heartbeat of {node.name} on {settings.interface} {settings.channel}; look at its power, cable, bit rate "
+        f"and node id ({node.setting})"
+    )
+
+
+def verify_identity(node: Node) -> str:
+    """Read who the node is and compare it with the data sheet.
+
+    Returns:
+        Product and revision in words.
+
+    Raises:
+        BringUpError: it is another device, or does not answer.
+    """
+    for index, subindex, mask, what in (
+        (0x1000, 0, 0xFFFF_FFFF, "device type"),
+        (0x1018, 1, 0xFFFF_FFFF, "vendor"),
+        (0x1018, 2, 0xFFFF_FFFF, "product"),
+        (0x1018, 3, _BEHAVIOUR, "revision"),
+    ):
+        found, wanted = _get(node, index, subindex), _default(node, index, subindex)
+        if found & mask != wanted & mask:
+            raise BringUpError(
+                f"{node.name} is another device: its {what} is 0x{found:08X}, expected 0x{wanted:08X}; connect the "
+                f"right one, or set its node id and {node.setting} to the same number"
+            )
+    revision = _get(node, 0x1018, 3)
+    return f"{node.remote.object_dictionary.device_information.product_name} {revision >> 16}.{revision & 0xFFFF}"
+
+
+def standing_error(node: Node) -> tuple[int, int] | None:
+    """The node's latest error that stands, as code and error register; None where it has none.
+
+    Raises:
+        BringUpError: it does not answer.
+    """
+    register = _get(node, 0x1001, 0)
+    if not register:
+        return None
+    return (_get(node, 0x1003, 1) & _ERROR_PART if _get(node, 0x1003, 0) else 0x1000), register
+
+
+def configure_gate(node: Node, settings: CanSettings) -> None:
+    """Write what the gate does without the station, what it listens to, and its PDOs; each is read back.
+
+    Raises:
+        BringUpError: it refuses, keeps something else, or does not answer.
+    """
+    _put(node, 0x1017, 0, _ms(settings.heartbeat_s))
+    _put(node, 0x6206, 1, 0xFF)
+    _put(node, 0x6207, 1, settings.safe_output)
+    _put(node, 0x1029, 1, 0)
+    _write_pdos(node, gate_pdos(node, settings))
+    _put(node, 0x1016, 1, settings.station_node << 16 | _ms(settings.heartbeat_lost_s))
+
+
+def configure_encoder(node: Node, settings: CanSettings) -> None:
+    """Write how often the encoder speaks, and its PDO; each is read back.
+
+    Raises:
+        BringUpError: it refuses, keeps something else, does not count through 32 bits, or does not answer.
+    """
+    _put(node, 0x1017, 0, _ms(settings.heartbeat_s))
+    _put(node, 0x6002, 0, 0xFFFF_FFFF)
+    _write_pdos(node, encoder_pdos(node, settings))
+
+
+def gate_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
+    """The gate's PDOs: it takes orders and the encoder's count, and reports."""
+    remote = node.remote
+    return {
+        "RPDO 1": Pdo(remote.rpdo[1], 0x200 + node.number, 0),
+        "RPDO 2": Pdo(remote.rpdo[2], 0x180 + settings.encoder_node, _ms(settings.count_stale_s)),
+        "TPDO 1": Pdo(remote.tpdo[1], 0x180 + node.number, 0),
+    }
+
+
+def encoder_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
+    """The encoder's PDO: its count."""
+    return {"TPDO 1": Pdo(node.remote.tpdo[1], 0x180 + node.number, _ms(settings.encoder_period_s))}
+
+
+def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
+    """The first PDO that the node holds otherwise than asked for, in words; empty where all agree.
+
+    Raises:
+        BringUpError: it does not answer.
+    """
+    for name, pdo in pdos.items():
+        wanted = _wanted(pdo)
+        with _asking(node, f"for the mapping of its {name}"):
+            pdo.map.read()
+        if _layout(pdo.map) != wanted:
+            return f"{name} is {_layout(pdo.map)}, expected {wanted}"
+    return ""
+
+
+def _write_pdos(node: Node, pdos: dict[str, Pdo]) -> None:
+    for name, pdo in pdos.items():
+        _wanted(pdo)
+        with _asking(node, f"to take the mapping of its {name}"):
+            pdo.map.save()
+    if foreign := foreign_mapping(node, pdos):
+        raise BringUpError(f"{node.name} took its PDO mapping and holds another: {foreign}; {_OTHER_NODE}")
+
+
+def _wanted(pdo: Pdo) -> str:
+    """Prepare a map as it has to be written, and describe it."""
+    pdo.map.read(from_od=True)
+    pdo.map.cob_id, pdo.map.event_timer, pdo.map.enabled = pdo.cob_id, pdo.event_timer_ms, True
+    return _layout(pdo.map)
+
+
+def _layout(pdo: PdoMap) -> str:
+    carried = " ".join(f"{var.index:04X}:{var.subindex:02X}/{var.length}" for var in pdo.map)
+    on = "" if pdo.enabled else " off"
+    return f"[{carried}] at 0x{pdo.cob_id or 0:03X}{on}, type {pdo.trans_type}, timer {pdo.event_timer} ms"
+
+
+_OTHER_NODE = "compare its firmware with the data sheet that the station ships"
+
+
+@contextmanager
+def _asking(node: Node, what: str) -> Iterator[None]:
+    try:
+        yield
+    except SdoAbortedError as error:
+        raise BringUpError(f"{node.name} was asked {what} and refused: {error}; {_OTHER_NODE}") from error
+    except SdoCommunicationError as error:
+        raise BringUpError(
+            f"{node.name} was asked {what} and did not answer; look at its power and cable, and for a second master"
+        ) from error
+    except (struct.error, ObjectDictionaryError) as error:
+        raise BringUpError(f"{node.name} was asked {what} and answered nonsense: {error}; {_OTHER_NODE}") from error
+    except (can.CanError, OSError, RuntimeError) as error:
+        raise BringUpError(
+            f"{node.name} was asked {what}, and the bus failed: {error}; look at the interface"
+        ) from error
+
+
+def _variable(node: Node, index: int, subindex: int) -> Any:
+    entry: Any = node.remote.sdo[index]
+    return entry[subindex] if isinstance(entry, Mapping) else entry
+
+
+def _default(node: Node, index: int, subindex: int) -> int:
+    return _variable(node, index, subindex).od.default
+
+
+def _get(node: Node, index: int, subindex: int) -> int:
+    variable = _variable(node, index, subindex)
+    with _asking(node, f"for its {variable.name}"):
+        return variable.raw
+
+
+def _put(node: Node, index: int, subindex: int, value: int) -> None:
+    variable = _variable(node, index, subindex)
+    with _asking(node, f"to set its {variable.name} to 0x{value:X}"):
+        variable.raw = value
+    kept = _get(node, index, subindex)
+    if kept != value:
+        raise BringUpError(f"{node.name} was told {variable.name} 0x{value:X} and holds 0x{kept:X}; {_OTHER_NODE}")
+
+
+def read_position(node: Node) -> int:
+    """The encoder's count, asked for.
+
+    Raises:
+        BringUpError: it does not answer.
+    """
+    return _get(node, 0x6004, 0)
+
+
+def _ms(duration_s: float) -> int:
+    return round(1000 * duration_s)

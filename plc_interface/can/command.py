@@ -1,0 +1,84 @@
+"""`station plc check-can`: is the bus there, and are the nodes the right ones?"""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from plc_interface.can import bring_up
+from plc_interface.can.errors import BringUpError, LineIoError
+from plc_interface.can.link import CanLink, described
+from station.settings.can import CanSettings
+from station.settings.configuration import load_configuration
+
+_NODE_DEADLINE_S = 3.0
+_STATES = {0: "booting", 4: "stopped", 5: "operational", 127: "pre-operational"}
+_POLL_S = 0.02
+
+
+@click.command("check-can")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def check_can(config: Path | None) -> None:
+    """Ask the CAN nodes who they are; nothing is moved or written. Not while the station runs: one master at a time.
+
+    Says for the interface and for each node what was found, a verdict, and what to do. The exit code is 1 where
+    anything is faulty.
+    """
+    settings = load_configuration(config).can
+    if not settings.enabled:
+        click.echo("CAN is off, the line's PLC diverts; set can.enabled to use it")
+        return
+    counters: Counter[str] = Counter()
+    link = CanLink(settings, counters)
+    faulty: list[str] = []
+    try:
+        click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
+        for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
+            looked = _look_at_gate if node.number == settings.gate_node else _look_at_encoder
+            try:
+                found = looked(link, node, settings)
+            except LineIoError as error:
+                faulty.append(node.name)
+                click.echo(f"{click.style('fault   ', fg='red')}{error}")
+            else:
+                click.echo(f"{click.style('ok      ', fg='green')}{node.name}: {found}")
+    finally:
+        link.close()
+    if faulty:
+        raise LineIoError(f"not usable: {', '.join(faulty)}")
+
+
+def _look_at_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return _look(link, node, settings, bring_up.gate_pdos)
+
+
+def _look_at_encoder(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return f"{_look(link, node, settings, bring_up.encoder_pdos)}, count {bring_up.read_position(node)}"
+
+
+def _look(
+    link: CanLink,
+    node: bring_up.Node,
+    settings: CanSettings,
+    pdos: Callable[[bring_up.Node, CanSettings], dict[str, bring_up.Pdo]],
+) -> str:
+    """Heartbeat, identity and mapping in words.
+
+    Raises:
+        LineIoError: no heartbeat, another device, or no answer.
+    """
+    deadline_s = time.monotonic() + _NODE_DEADLINE_S
+    while node.number not in link.beats:
+        link.check()
+        if time.monotonic() > deadline_s:
+            raise BringUpError(bring_up.no_heartbeat(node, settings))
+        time.sleep(_POLL_S)
+    identity = bring_up.verify_identity(node)
+    foreign = bring_up.foreign_mapping(node, pdos(node, settings))
+    mapping = (
+        "another mapping, which the station writes at its start" if foreign else "mapping as the station writes it"
+    )
+    state = link.beats[node.number].state
+    return f"{identity}, heartbeat {_STATES.get(state, f'in state {state}')}, {mapping}"

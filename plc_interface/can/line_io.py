@@ -1,0 +1,361 @@
+"""The line's I/O by CAN: keeps the bus up, diverts fruit at an encoder count, and says what is wrong.
+
+Nothing here moves by itself: the gate fires at a count that it was told before, and without the station's heartbeat it
+puts out its safe output. Unverified on hardware.
+"""
+
+import asyncio
+import logging
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from typing import NamedTuple, TypeVar
+
+from plc_interface.can import bring_up
+from plc_interface.can.counts import RANGE, Count, ahead, further
+from plc_interface.can.emergency import in_words, is_reset
+from plc_interface.can.errors import (
+    BringUpError,
+    EchoMissingError,
+    InterfaceError,
+    LateShotError,
+    LineIoError,
+    NodeLostError,
+    NotReadyError,
+    ShotRefusedError,
+)
+from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
+from plc_interface.can.shots import Fired, Order, PendingShot, Shots
+from station.settings.can import CanSettings
+
+_LONGEST_PAUSE_S = 10.0
+_POLL_S = 0.02
+_NODE_DEADLINE_S = 3.0
+_LANES = 8
+_OPERATIONAL, _PRE_OPERATIONAL, _STOPPED = 5, 127, 4
+_STATES = {0: "booting", _STOPPED: "stopped", _OPERATIONAL: "operational", _PRE_OPERATIONAL: "pre-operational"}
+_UNHEALTHY = "the station is not healthy, so its heartbeat is withheld and the gate keeps to its safe output"
+
+Result = TypeVar("Result")
+log = logging.getLogger(__name__)
+
+
+class DivertEcho(NamedTuple):
+    """A shot that the gate has fired as ordered."""
+
+    sequence: int
+    lane: int
+    at_count: int
+    fired_count: int
+    """The encoder's count as the gate fired."""
+    confirmed_s: float
+    """From the order to the gate's confirmation that it is armed."""
+
+
+class LineIo:
+    """The station's end of the bus. Make, start, stop and use it on one loop."""
+
+    def __init__(self, settings: CanSettings) -> None:
+        self._settings = settings
+        self._counters: Counter[str] = Counter()
+        self._shots = Shots(self._counters, settings.tolerance_counts)
+        self._emergencies: dict[tuple[int, int], str] = {}
+        self._healthy_until_s = 0.0
+        self._link: CanLink | None = None
+        self._operational = False
+        self._trouble: str | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._worker: ThreadPoolExecutor | None = None
+
+    async def start(self) -> None:
+        """Begin to bring the bus up, and keep it up; returns at once. Idempotent."""
+        if not self._tasks:
+            self._worker = ThreadPoolExecutor(1, "CAN worker")
+            self._tasks = [
+                asyncio.create_task(self._keep_up(), name="CAN keep up"),
+                asyncio.create_task(self._beat(), name="CAN heartbeat"),
+            ]
+
+    async def stop(self) -> None:
+        """End the heartbeat and close the bus: the gate puts out its safe output. Idempotent."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        if self._worker:
+            self._worker.shutdown()
+            self._worker = None
+
+    def renew_health(self, lease_s: float) -> None:
+        """Say that the station is healthy for so many seconds; when they are over, its heartbeat stops."""
+        self._healthy_until_s = time.monotonic() + lease_s
+
+    @property
+    def ready(self) -> bool:
+        """Whether a shot can be ordered now."""
+        return not self.why_not_ready
+
+    @property
+    def why_not_ready(self) -> str:
+        """One sentence with the remedy; empty where ready."""
+        if not self._tasks:
+            return "the CAN driver is not started"
+        if not self._healthy:
+            return _UNHEALTHY
+        if not self._operational:
+            return self._trouble or "the CAN bus is being brought up"
+        if self.encoder_count() is None:
+            return "the encoder's count is not known; look at the encoder's power and cable"
+        return next(iter(self._emergencies.values()), "")
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What is wrong with the bus, its nodes and recent shots, one sentence each."""
+        trouble = (self._trouble,) if self._trouble else ()
+        return (*trouble, *self._emergencies.values(), *self._shots.faults)
+
+    def acknowledge_faults(self) -> None:
+        """Forget the faults of shots; those of the bus and its nodes go when their cause goes."""
+        self._shots.faults.clear()
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """What happened since the start, by name; docs/plc/can.md lists them."""
+        return dict(self._counters)
+
+    def encoder_count(self) -> Count | None:
+        """What the encoder said last, and how long ago; None where that is stale or nothing was heard."""
+        if self._link is None or self._link.count is None:
+            return None
+        value, at_s = self._link.count
+        age_s = time.monotonic() - at_s
+        return Count(value, age_s) if age_s <= self._settings.count_stale_s else None
+
+    def count_at_gate(self, count_at_nest: int) -> int:
+        """The count at which a fruit reaches the gate.
+
+        Args:
+            count_at_nest: the encoder's count when the fruit was at the nest.
+        """
+        return further(count_at_nest, self._settings.distance_counts)
+
+    async def divert(self, sequence: int, lane: int, at_count: int) -> DivertEcho:
+        """Have the flap of a lane opened when the belt reaches a count; returns when the gate has reported it.
+
+        Several shots may be under way. The gate keeps an order when the caller is cancelled.
+
+        Args:
+            sequence: the inspection's, 1 to 2**32 - 1; the gate sees its lower 16 bits.
+            lane: 1 to 8.
+            at_count: the encoder's count at which the flap opens, 0 to 2**32 - 1; at most 2**31 - 1 ahead.
+
+        Raises:
+            NotReadyError: nothing was ordered.
+            LateShotError, ShotRefusedError: nothing was or will be fired.
+            InterfaceError: the order did not leave.
+            EchoMissingError, EchoWrongError, ShotLostError: what was fired, if anything, is not what was ordered.
+        """
+        if not 1 <= sequence < RANGE or not 1 <= lane <= _LANES or not 0 <= at_count < RANGE:
+            raise ShotRefusedError(
+                sequence,
+                f"expected a sequence from 1 to {RANGE - 1}, a lane from 1 to {_LANES} and a count from 0 to "
+                f"{RANGE - 1}, found {sequence}, {lane} and {at_count}",
+            )
+        link, now = self._link, self.encoder_count()
+        if not self.ready or link is None or now is None:
+            raise NotReadyError(f"shot {sequence} was not ordered: {self.why_not_ready}")
+        with self._shots.under_way(Order(sequence, lane, at_count)) as shot:
+            if ahead(now.value, at_count) <= 0:
+                raise LateShotError(
+                    sequence,
+                    f"count {at_count} is past, the belt is at {now.value}; nothing was ordered and the fruit went by: "
+                    "shorten the inspection, or raise the distance from the nest to the gate",
+                )
+            began_s = time.monotonic()
+            self._counters["shots_ordered"] += 1
+            link.send(
+                0x200 + self._settings.gate_node,
+                ORDER.pack(shot.order.on_wire, lane, self._settings.pulse_ms, at_count),
+            )
+            report = await self._confirmed(shot)
+            confirmed_s = time.monotonic() - began_s
+            while report.fired != Fired.FIRED:
+                report = await self._fired(shot, began_s)
+            self._counters["shots_fired"] += 1
+            return DivertEcho(sequence, lane, at_count, report.encoder_count, confirmed_s)
+
+    async def _confirmed(self, shot: PendingShot) -> Report:
+        try:
+            async with asyncio.timeout(self._settings.echo_deadline_s):
+                return await shot.next()
+        except TimeoutError:
+            self._counters["echoes_missing"] += 1
+            raise EchoMissingError(
+                shot.order.sequence,
+                f"the gate did not confirm the order within {self._settings.echo_deadline_s:g} s; look at the gate, "
+                "and take the fruit for not diverted",
+            ) from None
+
+    async def _fired(self, shot: PendingShot, began_s: float) -> Report:
+        """Wait for the belt to reach the count, however slowly, and then for the report."""
+        at = shot.order.at_count
+        passed_s: float | None = None
+        while True:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_POLL_S):
+                    return await shot.next()
+            now_s, count = time.monotonic(), self.encoder_count()
+            if passed_s is None and count and ahead(count.value, at) <= 0:
+                passed_s = now_s
+            if passed_s and now_s - passed_s > self._settings.echo_deadline_s:
+                what = f"the belt is past count {at} and the gate did not report; look at the gate and at the fruit"
+            elif now_s - began_s > self._settings.shot_deadline_s:
+                what = f"the belt did not reach count {at} within {self._settings.shot_deadline_s:g} s; is it running?"
+            else:
+                continue
+            self._counters["echoes_missing"] += 1
+            raise EchoMissingError(shot.order.sequence, what)
+
+    @property
+    def _healthy(self) -> bool:
+        return time.monotonic() < self._healthy_until_s
+
+    async def _beat(self) -> None:
+        """Send the station's heartbeat from this loop: one that hangs is silent, as it has to be."""
+        while True:
+            if self._healthy and self._link:
+                try:
+                    self._link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
+                except InterfaceError:
+                    self._counters["send_errors"] += 1
+            await asyncio.sleep(self._settings.heartbeat_s)
+
+    async def _keep_up(self) -> None:
+        pause_s = self._settings.retry_s
+        while True:
+            try:
+                while not self._healthy:
+                    await asyncio.sleep(_POLL_S)
+                await self._session()
+                self._trouble, pause_s = None, self._settings.retry_s
+                continue
+            except NodeLostError as error:
+                self._failed("nodes_lost", str(error))
+                pause_s = self._settings.retry_s
+            except LineIoError as error:
+                self._failed("bring_up_failures", str(error))
+            except Exception:
+                log.exception("the CAN driver failed")
+                self._failed("bring_up_failures", "the CAN driver failed; its log tells why")
+            await asyncio.sleep(pause_s)
+            pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+
+    def _failed(self, counter: str, why: str) -> None:
+        self._counters[counter] += 1
+        if why != self._trouble:
+            log.warning("%s", why)
+        self._trouble = why
+
+    async def _session(self) -> None:
+        """Open the bus, bring both nodes up and watch them; returns when the station is no longer healthy.
+
+        Raises:
+            LineIoError: the bus or a node cannot be had, or was lost.
+        """
+        loop = asyncio.get_running_loop()
+        link = CanLink(
+            self._settings,
+            self._counters,
+            lambda report: loop.call_soon_threadsafe(self._shots.on_report, report),
+            lambda emergency: loop.call_soon_threadsafe(self._on_emergency, emergency),
+        )
+        self._link, why = link, "the driver was stopped"
+        self._emergencies.clear()
+        try:
+            await self._bring_up(link)
+            self._operational, self._trouble = True, None
+            self._counters["bring_ups"] += 1
+            await self._watch(link)
+            why = _UNHEALTHY
+        except LineIoError as error:
+            why = str(error)
+            raise
+        finally:
+            self._operational, self._link = False, None
+            self._shots.lose(why)
+            link.abort()
+            await self._in_worker(link.close)
+
+    async def _bring_up(self, link: CanLink) -> None:
+        settings = self._settings
+        gate = bring_up.make_gate(link.network, settings)
+        encoder = bring_up.make_encoder(link.network, settings)
+        for node in (gate, encoder):
+            await self._until(
+                link, lambda node=node: self._alive(link, node.number), bring_up.no_heartbeat(node, settings)
+            )
+            await self._in_worker(lambda node=node: bring_up.verify_identity(node))
+            await self._order(link, node, "PRE-OPERATIONAL", _PRE_OPERATIONAL)
+        await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
+        await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
+        for node in (encoder, gate):
+            if standing := await self._in_worker(lambda node=node: bring_up.standing_error(node)):
+                self._on_emergency(Emergency(node.number, *standing))
+            await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
+
+    async def _order(self, link: CanLink, node: bring_up.Node, name: str, state: int) -> None:
+        """Command a state and wait until the node's heartbeat says it."""
+        sent_s = time.monotonic()
+        try:
+            node.remote.nmt.state = name
+        except Exception as error:
+            raise InterfaceError(f"the bus failed: {error}; look at the interface") from error
+
+        def obeyed() -> bool:
+            beat = link.beats[node.number]
+            return beat.state == state and beat.at_s > sent_s
+
+        why = f"{node.name} did not become {_STATES[state]} when told so; look at its state, and for a second master"
+        await self._until(link, obeyed, why)
+
+    def _alive(self, link: CanLink, node: int) -> bool:
+        beat = link.beats.get(node)
+        return beat is not None and time.monotonic() - beat.at_s < self._settings.heartbeat_lost_s
+
+    async def _until(self, link: CanLink, condition: Callable[[], bool], why: str) -> None:
+        deadline_s = time.monotonic() + max(_NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
+        while not condition():
+            link.check()
+            if time.monotonic() > deadline_s:
+                raise BringUpError(why)
+            await asyncio.sleep(_POLL_S)
+
+    async def _watch(self, link: CanLink) -> None:
+        names = {self._settings.gate_node: "the reject gate", self._settings.encoder_node: "the line encoder"}
+        while self._healthy:
+            link.check()
+            for node, name in names.items():
+                if not self._alive(link, node):
+                    raise NodeLostError(f"{name} (node {node}) has fallen silent; look at its power and cable")
+                state = link.beats[node].state
+                if state != _OPERATIONAL:
+                    raise NodeLostError(
+                        f"{name} (node {node}) is {_STATES.get(state, f'in state {state}')} without being told so: it "
+                        "was restarted, or lost the station's heartbeat; it is brought up again"
+                    )
+            await asyncio.sleep(_POLL_S)
+
+    def _on_emergency(self, emergency: Emergency) -> None:
+        node, code, register = emergency
+        if is_reset(code):
+            self._emergencies = {key: text for key, text in self._emergencies.items() if key[0] != node}
+            return
+        self._counters["emergencies"] += 1
+        name = "the reject gate" if node == self._settings.gate_node else "the line encoder"
+        self._emergencies[node, code] = f"{name} (node {node}): {in_words(code, register)}"
+
+    def _in_worker(self, work: Callable[[], Result]) -> Awaitable[Result]:
+        """Have the one worker thread do what waits."""
+        return asyncio.get_running_loop().run_in_executor(self._worker, work)

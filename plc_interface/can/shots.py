@@ -1,0 +1,145 @@
+"""Shots that were ordered, and what the gate reported of them. Lives on the loop; no bus, no clock."""
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from typing import NamedTuple
+
+from plc_interface.can.counts import ahead
+from plc_interface.can.errors import (
+    EchoWrongError,
+    LateShotError,
+    ShotError,
+    ShotLostError,
+    ShotRefusedError,
+)
+from plc_interface.can.link import Report
+
+_REMEMBERED = 64
+_KEPT_FAULTS = 8
+_WIRE = 0xFFFF
+
+
+class Fired(IntEnum):
+    """The gate's word on a shot, object 2001:02 of its data sheet."""
+
+    ARMED = 0
+    FIRED = 1
+    LATE = 2
+    FULL = 3
+    BAD = 4
+
+
+class Order(NamedTuple):
+    """One shot."""
+
+    sequence: int
+    lane: int
+    at_count: int
+
+    @property
+    def on_wire(self) -> int:
+        """The sequence as the gate knows it: the lower 16 bits."""
+        return self.sequence & _WIRE
+
+
+class PendingShot:
+    """An order under way."""
+
+    def __init__(self, order: Order, tolerance_counts: int) -> None:
+        self.order = order
+        self._tolerance_counts = tolerance_counts
+        self.reports: asyncio.Queue[Report | ShotError] = asyncio.Queue()
+
+    async def next(self) -> Report:
+        """The gate's next word, if it is that of a shot that goes as ordered.
+
+        Raises:
+            ShotError: it was refused, came otherwise than ordered, or the gate is lost.
+        """
+        report = await self.reports.get()
+        if isinstance(report, ShotError):
+            raise report
+        sequence, at = self.order.sequence, self.order.at_count
+        match report.fired:
+            case Fired.ARMED:
+                return report
+            case Fired.FIRED:
+                off = ahead(at, report.encoder_count)
+                if abs(off) > self._tolerance_counts:
+                    raise EchoWrongError(
+                        sequence,
+                        f"the gate fired {abs(off)} counts {'after' if off > 0 else 'before'} count {at}; "
+                        "look at the encoder and at can.tolerance_counts",
+                    )
+                return report
+            case Fired.LATE:
+                raise LateShotError(
+                    sequence,
+                    f"count {at} was past when the gate got the order, at {report.encoder_count}; "
+                    "the fruit went by: raise can.distance_counts or shorten the inspection",
+                )
+            case Fired.FULL:
+                raise ShotRefusedError(sequence, "the gate has no place left for an order; slow the line down")
+            case _:
+                raise ShotRefusedError(
+                    sequence, f"the gate does not take lane {self.order.lane} (answer {report.fired}); look at the lane"
+                )
+
+
+class Shots:
+    """All orders under way, by the sequence on the wire."""
+
+    def __init__(self, counters: Counter[str], tolerance_counts: int) -> None:
+        self._counters = counters
+        self._tolerance_counts = tolerance_counts
+        self._pending: dict[int, PendingShot] = {}
+        self._ended: deque[int] = deque(maxlen=_REMEMBERED)
+        self.faults: deque[str] = deque(maxlen=_KEPT_FAULTS)
+        """What went wrong with shots since the last acknowledgement, one sentence each."""
+
+    @contextmanager
+    def under_way(self, order: Order) -> Iterator[PendingShot]:
+        """Expect reports of this order; what goes wrong with it is counted and kept as a fault.
+
+        Raises:
+            ShotRefusedError: an order with this sequence is under way.
+        """
+        if order.on_wire in self._pending:
+            raise ShotRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
+        shot = self._pending[order.on_wire] = PendingShot(order, self._tolerance_counts)
+        try:
+            yield shot
+        except ShotError as error:
+            self.blame(error)
+            raise
+        finally:
+            del self._pending[order.on_wire]
+            self._ended.append(order.on_wire)
+
+    def blame(self, error: ShotError) -> None:
+        """Count a shot that went wrong, and keep it as a fault."""
+        self._counters["shots_failed"] += 1
+        self.faults.append(str(error))
+
+    def on_report(self, report: Report) -> None:
+        """Take the gate's word to the shot that it is about."""
+        if shot := self._pending.get(report.sequence):
+            shot.reports.put_nowait(report)
+        elif report.sequence in self._ended:
+            self._counters["echoes_late"] += 1
+        else:
+            self._counters["echoes_unknown"] += 1
+            self.faults.append(
+                f"the gate reports shot {report.sequence}, which was not ordered; look for a second master on the bus"
+            )
+
+    def lose(self, why: str) -> None:
+        """End all orders: the gate is gone, and nobody knows what it did."""
+        for shot in self._pending.values():
+            lost = ShotLostError(
+                shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
+            )
+            shot.reports.put_nowait(lost)

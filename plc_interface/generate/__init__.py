@@ -1,0 +1,1 @@
+"""What is made from the register map: documents, import files for other tools, PLC code."""

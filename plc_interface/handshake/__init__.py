@@ -1,0 +1,1 @@
+"""The handshake with the PLC as one pure state table: no I/O, no clock, no thread."""

@@ -1,0 +1,175 @@
+"""What reaches the handshake from outside. Every event carries its time."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from station.channel.line import Begun, Open, Outcome, StationState
+
+
+class Moment(NamedTuple):
+    """A point in time on both clocks."""
+
+    s: float
+    """The monotonic clock, s; every wait is measured by it."""
+    utc_ms: int
+    """Milliseconds since 1970-01-01 UTC; for records only."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What the PLC has written, decoded: the control block of the register map."""
+
+    control: frozenset[str] = frozenset()
+    """The names of the control bits that are set."""
+    trigger_id: int = 0
+    acknowledged_sequence: int = 0
+    command_code: int = 0
+    command_argument: int = 0
+    command_sequence: int = 0
+    plc_heartbeat: int = 0
+    encoder: int = 0
+    lot: str | None = ""
+    """None where the registers do not hold printable ASCII."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlcWrote:
+    """The writer wrote into the control block; the registers named hold new values, or the same once more."""
+
+    at: Moment
+    inputs: Inputs
+    written: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class WriterCame:
+    """A client got the right to write."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class WriterWent:
+    """The client with the right to write closed, died, or gave it back."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Nothing but time."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """The station answered a beat."""
+
+    at: Moment
+    station: StationState
+
+
+@dataclass(frozen=True, slots=True)
+class BeginAnswered:
+    """The station's answer to `AskBegin` with this number."""
+
+    at: Moment
+    number: int
+    begun: Begun
+
+
+@dataclass(frozen=True, slots=True)
+class BeginFailed:
+    """`AskBegin` got no answer; whether it was carried out is unknown."""
+
+    at: Moment
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeCame:
+    """An inspection's outcome."""
+
+    at: Moment
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeFailed:
+    """`AskOutcome` got no answer, or none that can be used."""
+
+    at: Moment
+    sequence: int
+    what: str
+    """For the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leaving:
+    """This process ends: the PLC is told that the station is offline, and nothing is begun any more."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class RequestFailed:
+    """Another request got no answer, or none that can be used."""
+
+    at: Moment
+    what: str
+    """For the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenTold:
+    """The station's answer to `AskOpen` with this number."""
+
+    at: Moment
+    number: int
+    opened: Open
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomeNoted:
+    """The station has durably what the PLC was told under this sequence."""
+
+    at: Moment
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAnswered:
+    """The station's answer to `AskCommand` with this number."""
+
+    at: Moment
+    number: int
+    done: bool
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class CommandFailed:
+    """`AskCommand` got no answer in time; whether it was carried out is unknown."""
+
+    at: Moment
+    number: int
+
+
+Event = (
+    PlcWrote
+    | WriterCame
+    | WriterWent
+    | Tick
+    | Beat
+    | BeginAnswered
+    | BeginFailed
+    | OutcomeCame
+    | OutcomeFailed
+    | RequestFailed
+    | OpenTold
+    | OutcomeNoted
+    | CommandAnswered
+    | CommandFailed
+    | Leaving
+)

@@ -1,0 +1,178 @@
+"""The one inspection that can be under way, from the question to the station to the outcome that stands."""
+
+from collections.abc import Callable
+
+from plc_interface.handshake.actions import AskBegin, AskOutcome
+from plc_interface.handshake.events import BeginAnswered, Moment
+from plc_interface.handshake.journal import Running
+from plc_interface.handshake.modes import Inspection, Signal
+from plc_interface.handshake.state import Asked
+from plc_interface.handshake.trigger import note_refusal
+from plc_interface.handshake.verdict import give, is_sound, no_result, queue, tell_if_other
+from plc_interface.handshake.work import Work, row
+from station.channel.line import Begun, Reason, Refusal
+
+
+def ask_begin(work: Work) -> None:
+    """`Begin` to the station."""
+    state = work.state
+    number = work.number()
+    state.asked = Asked(number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot)
+    work.actions.append(AskBegin(number, state.asked.trigger_id, state.asked.encoder, state.asked.lot))
+
+
+def is_new(work: Work) -> bool:
+    """The sequence is higher than any before."""
+    event = work.event
+    return isinstance(event, BeginAnswered) and (event.begun.sequence or 0) > work.state.journal.highest
+
+
+def accept(work: Work) -> None:
+    """Accept the id under the sequence, start the deadline, `AwaitOutcome`."""
+    state, event, asked = work.state, work.event, work.state.asked
+    if not isinstance(event, BeginAnswered) or event.begun.sequence is None or asked is None:
+        return
+    state.missed = False
+    work.count("count_triggers", "count_accepted")
+    work.keep(disowned=())
+    run(work, event.begun.sequence, asked, event.begun.deadline_s)
+    state.open_asked = None  # its answer may be older than this inspection
+    work.signals.append(Signal.ACCEPTED)
+
+
+def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
+    """Take an inspection as running, with the interface's own deadline behind the station's."""
+    state, station = work.state, work.state.station
+    within_s = deadline_s + work.settings.result_margin_s
+    state.asked = None
+    state.running = Running(
+        sequence=sequence,
+        trigger_id=asked.trigger_id,
+        encoder=asked.encoder,
+        lot=asked.lot,
+        within_s=within_s,
+        began_s=work.at.s,
+        began_utc_ms=work.at.utc_ms,
+        recipe_number=station.recipe_number if station else 0,
+        recipe_checksum=station.recipe_checksum if station else 0,
+        simulated=station.simulated if station else False,
+    )
+    work.keep(accepted_id=asked.trigger_id, highest=sequence)
+    work.start(Signal.RESULT_DEADLINE, within_s)
+    work.actions.append(AskOutcome(sequence, within_s))
+
+
+def unknown_run(asked: Asked, sequence: int, at: Moment) -> Running:
+    """An inspection of which nothing is known but its sequence and trigger id."""
+    return Running(
+        sequence=sequence,
+        trigger_id=asked.trigger_id,
+        encoder=asked.encoder,
+        lot=asked.lot,
+        within_s=0.0,
+        began_s=at.s,
+        began_utc_ms=at.utc_ms,
+        recipe_number=0,
+        recipe_checksum=0,
+        simulated=False,
+    )
+
+
+def refuse_as_told(work: Work) -> None:
+    """Refuse with the station's reason."""
+    event = work.event
+    begun = event.begun if isinstance(event, BeginAnswered) else Begun()
+    refuse_asked(work, begun.refusal or Refusal.NOT_READY)
+    if begun.refusal is Refusal.BUSY:  # with something that this interface knows nothing of
+        work.signals.append(Signal.CHANNEL_FAILED)
+
+
+def refuse_asked(work: Work, reason: Refusal) -> None:
+    """Refuse the trigger that the station was asked about."""
+    asked, work.state.asked = work.state.asked, None
+    if asked is not None:
+        note_refusal(work, reason, asked.trigger_id)
+    work.signals.append(Signal.REFUSED)
+
+
+def refuse_used(work: Work) -> None:
+    """Refuse as not ready: the station gave a sequence twice."""
+    work.say("the station gave a sequence again, or a lower one: its records were changed; the trigger is refused")
+    refuse_asked(work, Refusal.NOT_READY)
+
+
+def disown(work: Work) -> None:
+    """Refuse as station lost; should it have begun, it is never shown."""
+    asked = work.state.asked
+    if asked is not None:
+        work.keep(disowned=(*work.state.journal.disowned, asked.trigger_id)[-8:])
+    refuse_asked(work, Refusal.STATION_LOST)
+
+
+def is_its_outcome(work: Work) -> bool:
+    """Id and content are sound."""
+    running, outcome = work.state.running, work.found
+    return (
+        running is not None and outcome is not None and outcome.trigger_id == running.trigger_id and is_sound(outcome)
+    )
+
+
+def end_run(work: Work) -> Running | None:
+    """No inspection is under way any more."""
+    running, work.state.running = work.state.running, None
+    work.stop(Signal.RESULT_DEADLINE)
+    return running
+
+
+def publish(work: Work) -> None:
+    """The station's outcome stands, `Published`."""
+    end_run(work)
+    if work.found is not None:
+        queue(work, work.found)
+
+
+def _ending(words: str, *reasons: Reason) -> Callable[[Work], None]:
+    def give_no_result(work: Work) -> None:
+        running = end_run(work)
+        if running is not None:
+            work.say(f"inspection {running.sequence}: NO_RESULT ({', '.join(reasons)})")
+            give(work, no_result(running, work.at, *reasons))
+
+    give_no_result.__doc__ = words
+    return give_no_result
+
+
+late = _ending("NO_RESULT (late) stands, `Published`.", Reason.LATE)
+lost = _ending("NO_RESULT (station lost) stands, `Published`.", Reason.STATION_LOST)
+unsound = _ending("NO_RESULT (internal fault) stands, `Published`.", Reason.INTERNAL_FAULT)
+
+
+def drop(work: Work) -> None:
+    """Drop it; `Published` where another one stands under its sequence."""
+    if work.found is not None:
+        tell_if_other(work, work.found)
+
+
+NONE, BEGINNING, RUNNING = Inspection.NONE, Inspection.BEGINNING, Inspection.RUNNING
+
+ROWS = (
+    row(NONE, Signal.BEGIN, ask_begin, to=BEGINNING),
+    row(NONE, Signal.RESUMED_RUN, to=RUNNING),
+    row(NONE, Signal.FOREIGN_OUTCOME, drop),
+    row(NONE, Signal.STATION_SILENT),
+    row(NONE, Signal.STATION_RESTARTED),
+    row(BEGINNING, Signal.BEGUN, accept, to=RUNNING, when=is_new),
+    row(BEGINNING, Signal.BEGUN, refuse_used, to=NONE),
+    row(BEGINNING, Signal.BEGIN_REFUSED, refuse_as_told, to=NONE),
+    row(BEGINNING, Signal.BEGIN_FAILED, disown, to=NONE),
+    row(BEGINNING, Signal.STATION_SILENT, disown, to=NONE),
+    row(BEGINNING, Signal.STATION_RESTARTED, disown, to=NONE),
+    row(BEGINNING, Signal.FOREIGN_OUTCOME, drop),
+    row(RUNNING, Signal.OUTCOME, publish, to=NONE, when=is_its_outcome),
+    row(RUNNING, Signal.OUTCOME, unsound, to=NONE),
+    row(RUNNING, Signal.RESULT_DEADLINE, late, to=NONE),
+    row(RUNNING, Signal.STATION_SILENT, lost, to=NONE),
+    row(RUNNING, Signal.GONE, lost, to=NONE),
+    row(RUNNING, Signal.STATION_RESTARTED),
+    row(RUNNING, Signal.FOREIGN_OUTCOME, drop),
+)

@@ -1,0 +1,180 @@
+"""From what came in to the signals of the table."""
+
+from collections.abc import Callable
+from typing import Any
+
+from plc_interface.handshake.events import (
+    Beat,
+    BeginAnswered,
+    BeginFailed,
+    CommandAnswered,
+    CommandFailed,
+    Leaving,
+    OpenTold,
+    OutcomeCame,
+    OutcomeFailed,
+    OutcomeNoted,
+    PlcWrote,
+    RequestFailed,
+    Tick,
+    WriterCame,
+    WriterWent,
+)
+from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.work import Work
+
+EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
+    ("offline", Signal.OFFLINE_ON, Signal.OFFLINE_OFF),
+    ("enable", Signal.ENABLE_ON, Signal.ENABLE_OFF),
+    ("latch_lot", Signal.LATCH_ON, Signal.LATCH_OFF),
+    ("clear_error", Signal.CLEAR_ON, None),
+    ("reset_counters", Signal.RESET_ON, None),
+)
+"""The bits in the order in which those of one write count; the acknowledgement, the command and the trigger follow."""
+
+
+def take_in(work: Work) -> None:
+    """Note the event's data in the state and put its signals in line."""
+    _TAKERS[type(work.event)](work, work.event)
+
+
+def _writer_came(work: Work, _event: WriterCame) -> None:
+    work.state.writer = True
+    work.state.seen = None
+
+
+def _writer_went(work: Work, _event: WriterWent) -> None:
+    work.state.writer = False
+    work.state.seen = None
+    work.stop(Signal.PLC_SILENT)
+    work.signals.append(Signal.WRITER_LOST)
+
+
+def _beat(work: Work, event: Beat) -> None:
+    same = event.station.boot == work.state.last_boot
+    work.signals.append(Signal.STATION_ANSWERED if same else Signal.STATION_RESTARTED)
+
+
+def _outcome_came(work: Work, event: OutcomeCame) -> None:
+    running = work.state.running
+    work.found = event.outcome
+    mine = running is not None and running.sequence == event.outcome.sequence
+    work.signals.append(Signal.OUTCOME if mine else Signal.FOREIGN_OUTCOME)
+
+
+def _request_failed(work: Work, event: RequestFailed) -> None:
+    work.say(f"the station did not answer as it has to: {event.what}")
+    work.signals.append(Signal.CHANNEL_FAILED)
+
+
+def _outcome_failed(work: Work, event: OutcomeFailed) -> None:
+    running = work.state.running
+    if running is not None and running.sequence == event.sequence:
+        work.say(f"inspection {event.sequence}: the station did not give its outcome: {event.what}")
+        work.signals.append(Signal.CHANNEL_FAILED)
+
+
+def _open_told(work: Work, event: OpenTold) -> None:
+    if event.number == work.state.open_asked:
+        work.signals.append(Signal.OPENED)
+    else:
+        work.state.stale += 1
+
+
+def _outcome_noted(work: Work, event: OutcomeNoted) -> None:
+    verdicts = work.state.journal.verdicts
+    work.keep(verdicts=tuple(verdict for verdict in verdicts if verdict.sequence != event.sequence))
+
+
+def _plc_wrote(work: Work, event: PlcWrote) -> None:
+    state, before, seen = work.state, work.state.inputs, work.state.seen
+    state.inputs = event.inputs
+    if event.inputs.plc_heartbeat != before.plc_heartbeat:
+        work.start(Signal.PLC_SILENT, work.settings.plc_heartbeat_timeout_s)
+    rose: frozenset[str] = frozenset()
+    fell: frozenset[str] = frozenset()
+    if "control" in event.written:
+        control = event.inputs.control
+        state.seen = control
+        rose = control - (seen or frozenset())
+        fell = frozenset(bit for bit in _BITS if bit not in control and (seen is None or bit in seen))
+        if seen is None:  # a bit that was high all along is no order to clear or to reset
+            rose -= {"clear_error", "reset_counters"}
+    for bit, on, off in EDGES:
+        if bit in rose:
+            work.signals.append(on)
+        elif bit in fell and off is not None:
+            work.signals.append(off)
+    _acknowledged(work, event, changed=before.acknowledged_sequence != event.inputs.acknowledged_sequence, rose=rose)
+    if "acknowledge" in fell:
+        work.signals.append(Signal.ACKNOWLEDGE_OFF)
+    held = seen is None and _is_answered_or_asked(work, event.inputs.trigger_id)
+    for bit, on, off in (
+        ("execute_command", Signal.EXECUTE_ON, Signal.EXECUTE_OFF),
+        ("trigger", Signal.TRIGGER_HELD if held else Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
+    ):
+        if bit in rose or bit in fell:
+            work.signals.append(on if bit in rose else off)
+
+
+_BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
+
+
+def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
+    """Whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
+    asked = work.state.asked
+    return trigger_id != 0 and trigger_id == (asked.trigger_id if asked else work.state.journal.accepted_id)
+
+
+def _acknowledged(work: Work, event: PlcWrote, *, changed: bool, rose: frozenset[str]) -> None:
+    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none."""
+    state, sequence = work.state, event.inputs.acknowledged_sequence
+    by_bit, written = "acknowledge" in rose, "acknowledged_sequence" in event.written
+    if not (by_bit or written):
+        return
+    if state.result is Result.SHOWN and sequence == state.queue[0].sequence:
+        work.signals.append(Signal.ACKNOWLEDGED)
+    elif (by_bit or changed) and sequence != state.journal.acknowledged and (by_bit or sequence):
+        work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)
+
+
+def _begin_answered(work: Work, event: BeginAnswered | BeginFailed) -> None:
+    if work.state.asked is None or work.state.asked.number != event.number:
+        work.state.stale += 1
+    elif isinstance(event, BeginFailed):
+        work.signals += [Signal.BEGIN_FAILED, Signal.CHANNEL_FAILED]
+    elif event.begun.sequence is not None and event.begun.refusal is None:
+        work.signals.append(Signal.BEGUN)
+    else:
+        work.signals.append(Signal.BEGIN_REFUSED)
+
+
+def _command_answered(work: Work, event: CommandAnswered | CommandFailed) -> None:
+    if event.number != work.state.command_asked:
+        work.state.stale += 1
+    elif isinstance(event, CommandFailed):
+        work.signals.append(Signal.COMMAND_FAILED)
+    elif event.done:
+        work.signals.append(Signal.COMMAND_DONE)
+    else:
+        work.say(f"the station did not carry out the PLC's command: {event.why}")
+        work.signals.append(Signal.COMMAND_REFUSED)
+
+
+_TAKERS: dict[type, Callable[[Work, Any], None]] = {
+    PlcWrote: _plc_wrote,
+    WriterCame: _writer_came,
+    WriterWent: _writer_went,
+    Tick: lambda _work, _event: None,
+    Beat: _beat,
+    BeginAnswered: _begin_answered,
+    BeginFailed: _begin_answered,
+    OutcomeCame: _outcome_came,
+    OutcomeFailed: _outcome_failed,
+    RequestFailed: _request_failed,
+    OpenTold: _open_told,
+    OutcomeNoted: _outcome_noted,
+    CommandAnswered: _command_answered,
+    CommandFailed: _command_answered,
+    Leaving: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
+}

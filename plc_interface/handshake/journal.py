@@ -1,0 +1,60 @@
+"""What must survive the end of this process, so that the PLC never hears two things of one inspection."""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from plc_interface.register_map import BY_NAME
+from station.channel.line import Outcome
+
+COMMAND_RESULT = BY_NAME["command_result"]
+
+
+class _Kept(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Running(_Kept):
+    """The inspection under way."""
+
+    sequence: int = Field(ge=1, lt=2**32)
+    trigger_id: int = Field(ge=1, le=65_535)
+    encoder: int = Field(ge=0, lt=2**32)
+    lot: str = Field(max_length=32)
+    within_s: float = Field(ge=0, allow_inf_nan=False)
+    """From its acceptance: the interface's own deadline."""
+    began_s: float = Field(allow_inf_nan=False)
+    """On the monotonic clock."""
+    began_utc_ms: int = Field(ge=0, lt=2**63)
+    recipe_number: int = Field(ge=0, le=65_535)
+    recipe_checksum: int = Field(ge=0, lt=2**32)
+    simulated: bool
+
+
+class Journal(_Kept):
+    """The kept part of the state."""
+
+    boots: int = Field(default=0, ge=0, lt=2**16)
+    """Starts of the interface."""
+    epoch: int = Field(default=0, ge=0, lt=2**32)
+    """Resets of the counters, a start of the interface among them."""
+    highest: int = Field(default=0, ge=0, lt=2**32)
+    """The highest sequence that the station gave for an accepted trigger."""
+    acknowledged: int = Field(default=0, ge=0, lt=2**32)
+    """The PLC has taken everything up to here."""
+    accepted_id: int = Field(default=0, ge=0, le=65_535)
+    """The last trigger id accepted."""
+    lot: str = Field(default="", max_length=32)
+    """The lot in force."""
+    command_sequence: int | None = Field(default=None, ge=0, le=65_535)
+    command_result: int = Field(default=0, ge=0, le=65_535)
+    """As in the register map."""
+    asked_id: int | None = Field(default=None, ge=1, le=65_535)
+    """The id of the trigger that the station is asked to begin."""
+    running: Running | None = None
+    queue: tuple[Outcome, ...] = ()
+    """Not acknowledged, in order of sequence."""
+    verdicts: tuple[Outcome, ...] = ()
+    """Outcomes that the interface itself gave and that the station has not noted yet."""
+    disowned: tuple[int, ...] = ()
+    """Ids of triggers that were refused although the station may have begun them, under sequences after `highest`."""
+    hidden: tuple[int, ...] = ()
+    """Sequences of such triggers, once the station told them; never shown."""

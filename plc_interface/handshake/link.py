@@ -1,0 +1,68 @@
+"""The station over the channel: heard, lost, and settled with."""
+
+from plc_interface.handshake.actions import AskOpen
+from plc_interface.handshake.events import Beat
+from plc_interface.handshake.modes import Link, Signal
+from plc_interface.handshake.settle import settle
+from plc_interface.handshake.work import Work, row
+
+
+def none_is_asked(work: Work) -> bool:
+    """`Resume` is not under way."""
+    return work.state.open_asked is None
+
+
+def hear(work: Work) -> None:
+    """Note the station's state, wait for the next beat."""
+    if not isinstance(work.event, Beat):
+        return
+    state, station = work.state, work.event.station
+    if station.boot != state.last_boot:
+        state.last_boot = station.boot
+        state.station_boots = (state.station_boots + 1) % 2**16
+    state.station = station
+    work.start(Signal.STATION_SILENT, work.settings.station_lost_after_s)
+
+
+def beat(work: Work) -> None:
+    """Heartbeat to the PLC if the station is healthy."""
+    if work.state.station is not None and work.state.station.healthy:
+        work.state.heartbeat = (work.state.heartbeat + 1) % 2**16
+
+
+def ask_open(work: Work) -> None:
+    """`Resume` to the station."""
+    work.state.open_asked = work.number()
+    work.actions.append(AskOpen(work.state.open_asked))
+
+
+def forget_question(work: Work) -> None:
+    """Ask anew at the next beat."""
+    work.state.open_asked = None
+
+
+def forget_station(work: Work) -> None:
+    """What the station said is not used any more."""
+    work.state.station = None
+    work.state.open_asked = None
+    work.say("the station does not answer: triggers are refused until it does")
+
+
+LOST, RESUMING, UP = Link.LOST, Link.RESUMING, Link.UP
+
+ROWS = (
+    row(LOST, Signal.STATION_ANSWERED, hear, ask_open, to=RESUMING),
+    row(LOST, Signal.STATION_RESTARTED, hear, ask_open, to=RESUMING),
+    row(LOST, Signal.CHANNEL_FAILED),
+    row(LOST, Signal.STATION_SILENT),
+    row(RESUMING, Signal.STATION_ANSWERED, hear, ask_open, when=none_is_asked),
+    row(RESUMING, Signal.STATION_ANSWERED, hear),
+    row(RESUMING, Signal.STATION_RESTARTED, hear, ask_open),
+    row(RESUMING, Signal.OPENED, settle, to=UP),
+    row(RESUMING, Signal.CHANNEL_FAILED, forget_question),
+    row(RESUMING, Signal.STATION_SILENT, forget_station, to=LOST),
+    row(UP, Signal.STATION_ANSWERED, hear, beat),
+    row(UP, Signal.STATION_RESTARTED, hear, ask_open, to=RESUMING),
+    row(UP, Signal.CHANNEL_FAILED, forget_question, to=RESUMING),
+    row(UP, Signal.STATION_SILENT, forget_station, to=LOST),
+)

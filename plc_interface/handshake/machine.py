@@ -1,0 +1,54 @@
+"""One step of the handshake: a state and an event in, the next state and what to do out."""
+
+import copy
+
+from plc_interface.handshake.actions import Action, Keep
+from plc_interface.handshake.events import Event
+from plc_interface.handshake.intake import take_in
+from plc_interface.handshake.modes import TIMERS, Signal
+from plc_interface.handshake.state import State
+from plc_interface.handshake.table import apply
+from plc_interface.handshake.work import Work
+from station.settings.plc import HandshakeSettings
+
+
+def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[State, tuple[Action, ...]]:
+    """The state after an event, and the actions to carry out in their order.
+
+    Timers that ran out before the event come first, then the event. `before` is not changed.
+
+    Args:
+        before: the state so far.
+        event: what happened, with its time, which never goes back.
+        settings: time-outs and deadlines.
+    """
+    work = Work(copy.copy(before), event.at, event, settings)
+    while (due := _due(work)) is not None:
+        work.stop(due)
+        work.signals.append(due)
+        _run(work)
+    take_in(work)
+    _run(work)
+    state = work.state
+    kept = {"queue": state.queue, "running": state.running, "asked_id": state.asked.trigger_id if state.asked else None}
+    if any(getattr(state.journal, name) != value for name, value in kept.items()):
+        work.keep(**kept)
+    if state.journal == before.journal:
+        return state, tuple(work.actions)
+    durable = (state.journal.verdicts, state.journal.disowned) != (before.journal.verdicts, before.journal.disowned)
+    return state, (Keep(state.journal, durable), *work.actions)
+
+
+def next_due_s(state: State) -> float | None:
+    """When the next timer runs out, on the monotonic clock; None where none runs. Step with a `Tick` then."""
+    return min(state.timers.values(), default=None)
+
+
+def _due(work: Work) -> Signal | None:
+    due = [(due_s, TIMERS.index(timer), timer) for timer, due_s in work.state.timers.items() if due_s <= work.at.s]
+    return min(due)[2] if due else None
+
+
+def _run(work: Work) -> None:
+    while work.signals:
+        apply(work, work.signals.popleft())

@@ -1,0 +1,145 @@
+"""The regions of the handshake, the modes of each, and the signals that move them."""
+
+from enum import StrEnum
+
+
+class Link(StrEnum):
+    """The station, as seen over the channel."""
+
+    LOST = "lost"
+    """It does not answer in time."""
+    RESUMING = "resuming"
+    """It answers; what is open has still to be settled."""
+    UP = "up"
+
+
+class Arming(StrEnum):
+    """The enable bit."""
+
+    DISARMED = "disarmed"
+    """Enable has to be given anew: written 0, then 1."""
+    RELEASED = "released"
+    """Enable was written 0."""
+    ARMED = "armed"
+
+
+class Service(StrEnum):
+    """The offline bit."""
+
+    IN_SERVICE = "in service"
+    OFFLINE = "offline"
+
+
+class Trigger(StrEnum):
+    """The trigger bit and its acknowledgement."""
+
+    LOW = "low"
+    ASKED = "asked"
+    """The bit is high, the station has still to accept or refuse."""
+    PULSED = "pulsed"
+    """As asked, but the PLC has taken its bit back already."""
+    ANSWERED = "answered"
+    """Acknowledged; the PLC's bit has to fall."""
+    HELD = "held"
+    """Acknowledged after the bit had fallen; shown for the handshake's time-out."""
+    STUCK = "stuck"
+    """The PLC forgot its bit; it has to fall before it can rise."""
+
+
+class Inspection(StrEnum):
+    """The one inspection that can be under way."""
+
+    NONE = "none"
+    BEGINNING = "beginning"
+    RUNNING = "running"
+
+
+class Result(StrEnum):
+    """The result block and its acknowledgement."""
+
+    EMPTY = "empty"
+    SHOWN = "shown"
+    TAKEN = "taken"
+    """Acknowledged; the PLC's bit has to fall before the next result is shown."""
+
+
+class Order(StrEnum):
+    """The PLC's commands."""
+
+    IDLE = "idle"
+    EXECUTING = "executing"
+    DONE = "done"
+    FAILED = "failed"
+
+
+class Lot(StrEnum):
+    """The lot latch."""
+
+    OPEN = "open"
+    LATCHED = "latched"
+
+
+Mode = Link | Arming | Service | Trigger | Inspection | Result | Order | Lot
+
+
+class Signal(StrEnum):
+    """What happened, seen from the table."""
+
+    # the PLC's bits and registers
+    ENABLE_ON = "enable on"
+    ENABLE_OFF = "enable off"
+    OFFLINE_ON = "offline on"
+    OFFLINE_OFF = "offline off"
+    TRIGGER_ON = "trigger on"
+    TRIGGER_OFF = "trigger off"
+    TRIGGER_HELD = "trigger still on after a reconnect"
+    ACKNOWLEDGED = "sequence acknowledged"
+    WRONG_ACKNOWLEDGEMENT = "another sequence acknowledged"
+    ACKNOWLEDGE_OFF = "acknowledge off"
+    EXECUTE_ON = "execute on"
+    EXECUTE_OFF = "execute off"
+    LATCH_ON = "latch lot on"
+    LATCH_OFF = "latch lot off"
+    CLEAR_ON = "clear error on"
+    RESET_ON = "reset counters on"
+    WRITER_LOST = "writer lost"
+    # times that ran out
+    PLC_SILENT = "PLC heartbeat lost"
+    TRIGGER_TIMEOUT = "trigger time-out"
+    ACKNOWLEDGE_TIMEOUT = "acknowledge time-out"
+    EXECUTE_TIMEOUT = "execute time-out"
+    LATCH_TIMEOUT = "latch time-out"
+    RESULT_DEADLINE = "result deadline"
+    STATION_SILENT = "station silent"
+    # the station's answers
+    STATION_ANSWERED = "beat answered"
+    STATION_RESTARTED = "beat answered by a new start"
+    CHANNEL_FAILED = "request failed"
+    OPENED = "open ones told"
+    BEGUN = "begun"
+    BEGIN_REFUSED = "begin refused"
+    BEGIN_FAILED = "begin failed"
+    OUTCOME = "outcome"
+    FOREIGN_OUTCOME = "outcome of another sequence"
+    COMMAND_DONE = "command done"
+    COMMAND_REFUSED = "command refused"
+    COMMAND_FAILED = "command failed"
+    # from one region to another
+    BEGIN = "begin"
+    ACCEPTED = "accepted"
+    REFUSED = "refused"
+    QUEUED = "result queued"
+    RESUMED_RUN = "inspection resumed"
+    GONE = "inspection unknown to the station"
+
+
+TIMERS = (
+    Signal.STATION_SILENT,
+    Signal.PLC_SILENT,
+    Signal.RESULT_DEADLINE,
+    Signal.TRIGGER_TIMEOUT,
+    Signal.ACKNOWLEDGE_TIMEOUT,
+    Signal.EXECUTE_TIMEOUT,
+    Signal.LATCH_TIMEOUT,
+)
+"""The signals that time gives; of several that are due at once, the earlier one here comes first."""

@@ -1,0 +1,85 @@
+"""The result block and its acknowledgement by sequence."""
+
+from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.state import Fault
+from plc_interface.handshake.verdict import acknowledge, pass_over_hidden
+from plc_interface.handshake.work import Work, row
+
+
+def bit_is_high(work: Work) -> bool:
+    """The acknowledge bit is high."""
+    return "acknowledge" in (work.state.seen or ()) and not work.state.acknowledge_stuck
+
+
+def another_waits(work: Work) -> bool:
+    """Another result waits."""
+    return len(work.state.queue) > 1
+
+
+def one_waits(work: Work) -> bool:
+    """A result waits."""
+    return bool(work.state.queue)
+
+
+def show(work: Work) -> None:
+    """Show the oldest result, toggle."""
+    work.state.toggle = not work.state.toggle
+
+
+def take(work: Work) -> None:
+    """Take it from the queue, `Acknowledged`."""
+    taken, *rest = work.state.queue
+    work.state.queue = tuple(rest)
+    acknowledge(work, taken.sequence)
+    pass_over_hidden(work)
+
+
+def watch(work: Work) -> None:
+    """Start the acknowledge bit's time-out."""
+    work.start(Signal.ACKNOWLEDGE_TIMEOUT, work.settings.handshake_timeout_s)
+
+
+def end_watch(work: Work) -> None:
+    """Stop the time-out."""
+    work.stop(Signal.ACKNOWLEDGE_TIMEOUT)
+
+
+def unstick(work: Work) -> None:
+    """The bit counts again."""
+    work.state.acknowledge_stuck = False
+
+
+def forgotten(work: Work) -> None:
+    """Fault: forgotten acknowledge; the bit does not count until it falls."""
+    work.state.acknowledge_stuck = True
+    work.fault(Fault.ACKNOWLEDGE_FORGOTTEN)
+
+
+def wrong(work: Work) -> None:
+    """Fault: wrong acknowledgement."""
+    work.fault(Fault.WRONG_ACKNOWLEDGEMENT)
+
+
+EMPTY, SHOWN, TAKEN = Result.EMPTY, Result.SHOWN, Result.TAKEN
+
+ROWS = (
+    row(EMPTY, Signal.QUEUED, show, to=SHOWN),
+    row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
+    row(EMPTY, Signal.ACKNOWLEDGE_OFF, unstick),
+    row(EMPTY, Signal.WRITER_LOST, unstick),
+    row(SHOWN, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
+    row(SHOWN, Signal.ACKNOWLEDGED, take, show, when=another_waits),
+    row(SHOWN, Signal.ACKNOWLEDGED, take, to=EMPTY),
+    row(SHOWN, Signal.QUEUED),
+    row(SHOWN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
+    row(SHOWN, Signal.ACKNOWLEDGE_OFF, unstick),
+    row(SHOWN, Signal.WRITER_LOST, unstick),
+    row(TAKEN, Signal.QUEUED),
+    row(TAKEN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
+    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, to=EMPTY),
+    row(TAKEN, Signal.WRITER_LOST, end_watch, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.WRITER_LOST, end_watch, to=EMPTY),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, forgotten, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, forgotten, to=EMPTY),
+)

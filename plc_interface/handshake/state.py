@@ -1,0 +1,168 @@
+"""All that the handshake remembers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from plc_interface.handshake.events import Inputs, Moment
+from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
+from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Mode, Order, Result, Service, Signal, Trigger
+from plc_interface.register_map import QUEUE_PLACES
+from station.channel.line import Outcome, Refusal, StationState
+
+
+class Fault(StrEnum):
+    """What went wrong on the line, as one sentence with the remedy; latched until clear_error."""
+
+    PLC_SILENT = "the PLC's heartbeat stood still: check the PLC, then give enable anew"
+    WRITER_LOST = "the writing PLC's connection was lost: connect, then give enable anew"
+    TRIGGER_FORGOTTEN = "the PLC did not take its trigger bit back: drop it after trigger_acknowledged"
+    ACKNOWLEDGE_FORGOTTEN = "the PLC did not take its acknowledge bit back: drop it when result_valid falls"
+    EXECUTE_FORGOTTEN = "the PLC did not take its execute bit back: drop it after command_done or command_failed"
+    LATCH_FORGOTTEN = "the PLC did not take its latch bit back: drop it after lot_latched"
+    WRONG_ACKNOWLEDGEMENT = (
+        "the PLC acknowledged another sequence than the one shown: read result_sequence, and check the word order"
+    )
+    BAD_LOT = "the lot id is not printable ASCII, so that it was not latched: write it anew"
+    COMMAND_BUSY = "the PLC gave a command while another was carried out: wait for command_done or command_failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A trigger that the station has still to accept."""
+
+    number: int
+    trigger_id: int
+    encoder: int
+    lot: str
+
+
+COUNTERS = (
+    "count_triggers",
+    "count_accepted",
+    "count_pass",
+    "count_fail",
+    "count_no_result",
+    "count_missed",
+    "count_late",
+    "count_overrun",
+    "count_communication",
+)
+"""What the handshake counts, by the names of the register map; all wrap round at 2³²."""
+
+
+@dataclass(slots=True)
+class State:
+    """The modes of all regions and the data beside them. Only `machine.step` makes one from another."""
+
+    link: Link = Link.LOST
+    arming: Arming = Arming.DISARMED
+    service: Service = Service.IN_SERVICE
+    trigger: Trigger = Trigger.LOW
+    inspection: Inspection = Inspection.NONE
+    result: Result = Result.EMPTY
+    order: Order = Order.IDLE
+    lot: Lot = Lot.OPEN
+
+    timers: Mapping[Signal, float] = field(default_factory=dict)
+    """When each running timer is due, on the monotonic clock."""
+    numbers: int = 0
+    """The last number given to a request."""
+
+    # the PLC
+    writer: bool = False
+    inputs: Inputs = field(default_factory=Inputs)
+    seen: frozenset[str] | None = None
+    """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    acknowledge_stuck: bool = False
+    """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
+    last_refusal: Refusal | None = None
+    last_refused_id: int = 0
+    missed: bool = False
+    overrun: bool = False
+
+    # the station
+    station: StationState | None = None
+    """Its last answer; None while it is lost."""
+    last_boot: str = ""
+    station_boots: int = 0
+    heartbeat: int = 0
+    adopted: bool = False
+    """The station has told once, since this interface started, what was open."""
+    open_asked: int | None = None
+    """The number of `AskOpen` that is not answered."""
+
+    # inspections
+    asked: Asked | None = None
+    running: Running | None = None
+    queue: tuple[Outcome, ...] = ()
+    """Not acknowledged, in order of sequence; the first is the one shown."""
+    toggle: bool = False
+
+    # commands
+    command_asked: int | None = None
+    command_changes_recipe: bool = False
+
+    counters: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTERS, 0))
+    reset_utc_ms: int = 0
+    unlisted: int = 0
+    """Pairs of mode and signal that came and are not in the table: refused."""
+    stale: int = 0
+    """Answers that came after their question was settled otherwise."""
+    faults: tuple[Fault, ...] = ()
+
+    journal: Journal = field(default_factory=Journal)
+
+    def mode(self, region: type[Mode]) -> Mode:
+        """The mode of one region."""
+        return getattr(self, region.__name__.lower())
+
+    @property
+    def places(self) -> int:
+        """Results that may wait in all."""
+        return QUEUE_PLACES if "buffer_results" in self.inputs.control else 1
+
+    @property
+    def watched(self) -> bool:
+        """The PLC's heartbeat has changed in time."""
+        return Signal.PLC_SILENT in self.timers
+
+
+def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> State:
+    """The state in which the interface starts: disarmed, the station unheard, and what the journal holds.
+
+    A trigger that was not answered yet is refused.
+
+    Args:
+        journal: what the run before kept.
+        at: now; the counters start at 0.
+        station_lost_after_s: how long an inspection that was running waits for the station.
+    """
+    changes: dict[str, Any] = {
+        "boots": (journal.boots + 1) % 2**16,
+        "epoch": (journal.epoch + 1) % 2**32,
+        "asked_id": None,
+    }
+    if journal.command_result == COMMAND_RESULT.code("executing"):
+        changes["command_result"] = COMMAND_RESULT.code("timed_out")
+    if journal.asked_id is not None:
+        changes["disowned"] = (*journal.disowned, journal.asked_id)
+    state = State(
+        reset_utc_ms=at.utc_ms,
+        journal=journal.model_copy(update=changes),
+        queue=journal.queue,
+        result=Result.SHOWN if journal.queue else Result.EMPTY,
+    )
+    if journal.asked_id is not None:
+        state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True
+        state.counters = {**state.counters, "count_triggers": 1, "count_missed": 1}
+    if journal.running is not None:
+        ran_s = max(0.0, (at.utc_ms - journal.running.began_utc_ms) / 1000)
+        state.running = journal.running.model_copy(update={"began_s": at.s - ran_s})
+        state.inspection = Inspection.RUNNING
+        state.timers = {
+            Signal.STATION_SILENT: at.s + station_lost_after_s,
+            Signal.RESULT_DEADLINE: at.s + journal.running.within_s,
+        }
+    return state

@@ -1,0 +1,49 @@
+"""The one state table: every region's rows, and how the row for a pair is found."""
+
+from collections import defaultdict
+
+from plc_interface.handshake import bits, inspection, link, orders, results, trigger
+from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Mode, Order, Result, Service, Signal, Trigger
+from plc_interface.handshake.work import Row, Work
+
+REGIONS: dict[type[Mode], tuple[Row, ...]] = {
+    Link: link.ROWS,
+    Service: bits.SERVICE_ROWS,
+    Arming: bits.ARMING_ROWS,
+    Lot: bits.LOT_ROWS,
+    Result: results.ROWS,
+    Order: orders.ROWS,
+    Inspection: inspection.ROWS,
+    Trigger: trigger.ROWS,
+}
+"""By region, in the order in which they take a signal that concerns several."""
+
+_CONCERNED: dict[Signal, tuple[type[Mode], ...]] = {
+    signal: tuple(region for region, rows in REGIONS.items() if any(row.signal is signal for row in rows))
+    for signal in Signal
+}
+
+_ROWS: dict[tuple[type[Mode], Mode, Signal], list[Row]] = defaultdict(list)
+for _region, _rows in REGIONS.items():
+    for _row in _rows:
+        _ROWS[_region, _row.mode, _row.signal].append(_row)
+
+
+def apply(work: Work, signal: Signal) -> None:
+    """Let every region that knows the signal go through its row; a pair that is not listed changes nothing.
+
+    Args:
+        work: the step under way.
+        signal: what happened.
+    """
+    for region in _CONCERNED[signal]:
+        mode = work.state.mode(region)
+        for row in _ROWS.get((region, mode, signal), ()):
+            if row.guard is None or row.guard(work):
+                for effect in row.effects:
+                    effect(work)
+                setattr(work.state, region.__name__.lower(), row.next)
+                break
+        else:
+            work.state.unlisted += 1
+            work.say(f"{region.__name__.lower()} is {mode}, and then {signal}: not foreseen, nothing was done")

@@ -1,0 +1,100 @@
+"""The trigger bit and its acknowledgement."""
+
+from plc_interface.handshake.modes import Arming, Inspection, Link, Order, Service, Signal, Trigger
+from plc_interface.handshake.state import Fault, State
+from plc_interface.handshake.work import Work, row
+from station.channel.line import Refusal
+
+
+def obstacle(state: State) -> Refusal | None:
+    """Why no trigger is accepted now, whatever its id; None where the station would be asked."""
+    waiting = len(state.queue)
+    reasons: tuple[tuple[bool, Refusal], ...] = (
+        (state.service is Service.OFFLINE, Refusal.OFFLINE),
+        (state.link is not Link.UP, Refusal.STATION_LOST),
+        (state.arming is not Arming.ARMED, Refusal.NOT_ENABLED),
+        (state.inspection is not Inspection.NONE, Refusal.BUSY),
+        (waiting >= state.places, Refusal.QUEUE_FULL),
+        (state.order is Order.EXECUTING and state.command_changes_recipe, Refusal.RECIPE_CHANGING),
+    )
+    return next((refusal for holds, refusal in reasons if holds), None)
+
+
+def refusal(state: State) -> Refusal | None:
+    """Why the trigger with the id now written is refused; None where the station is asked.
+
+    A doubled id is told as such whatever else holds: no other refusal then names an id that was accepted.
+    """
+    if state.inputs.trigger_id in {0, state.journal.accepted_id, state.asked.trigger_id if state.asked else 0}:
+        return Refusal.BAD_TRIGGER_ID
+    return obstacle(state)
+
+
+def may_be_asked(work: Work) -> bool:
+    """Nothing stands against the trigger."""
+    return refusal(work.state) is None
+
+
+def begin(work: Work) -> None:
+    """Ask for an inspection."""
+    work.signals.append(Signal.BEGIN)
+
+
+def note_refusal(work: Work, reason: Refusal, trigger_id: int) -> None:
+    """Tell a refusal: counted, with its reason and its id."""
+    state = work.state
+    state.last_refusal, state.last_refused_id, state.missed = reason, trigger_id, True
+    work.count("count_triggers", "count_missed")
+    if reason is Refusal.QUEUE_FULL:
+        state.overrun = True
+        work.count("count_overrun")
+    work.say(f"trigger {trigger_id} refused: {reason.value}")
+
+
+def refuse(work: Work) -> None:
+    """Refuse with the reason."""
+    note_refusal(work, refusal(work.state) or Refusal.NOT_READY, work.state.inputs.trigger_id)
+
+
+def watch(work: Work) -> None:
+    """Start the trigger's time-out."""
+    work.start(Signal.TRIGGER_TIMEOUT, work.settings.handshake_timeout_s)
+
+
+def end_watch(work: Work) -> None:
+    """Stop the trigger's time-out."""
+    work.stop(Signal.TRIGGER_TIMEOUT)
+
+
+def forgotten(work: Work) -> None:
+    """Fault: forgotten trigger."""
+    work.fault(Fault.TRIGGER_FORGOTTEN)
+
+
+ROWS = (
+    row(Trigger.LOW, Signal.TRIGGER_ON, begin, to=Trigger.ASKED, when=may_be_asked),
+    row(Trigger.LOW, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
+    row(Trigger.LOW, Signal.TRIGGER_HELD, watch, to=Trigger.ANSWERED),
+    row(Trigger.LOW, Signal.TRIGGER_OFF),
+    row(Trigger.LOW, Signal.WRITER_LOST),
+    row(Trigger.ASKED, Signal.ACCEPTED, watch, to=Trigger.ANSWERED),
+    row(Trigger.ASKED, Signal.REFUSED, watch, to=Trigger.ANSWERED),
+    row(Trigger.ASKED, Signal.TRIGGER_OFF, to=Trigger.PULSED),
+    row(Trigger.ASKED, Signal.WRITER_LOST, to=Trigger.PULSED),
+    row(Trigger.PULSED, Signal.ACCEPTED, watch, to=Trigger.HELD),
+    row(Trigger.PULSED, Signal.REFUSED, watch, to=Trigger.HELD),
+    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_HELD, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_OFF),
+    row(Trigger.PULSED, Signal.WRITER_LOST),
+    row(Trigger.ANSWERED, Signal.TRIGGER_OFF, end_watch, to=Trigger.LOW),
+    row(Trigger.ANSWERED, Signal.WRITER_LOST, end_watch, to=Trigger.LOW),
+    row(Trigger.ANSWERED, Signal.TRIGGER_TIMEOUT, forgotten, to=Trigger.STUCK),
+    row(Trigger.HELD, Signal.TRIGGER_ON, end_watch, begin, to=Trigger.ASKED, when=may_be_asked),
+    row(Trigger.HELD, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
+    row(Trigger.HELD, Signal.TRIGGER_OFF),
+    row(Trigger.HELD, Signal.TRIGGER_TIMEOUT, to=Trigger.LOW),
+    row(Trigger.HELD, Signal.WRITER_LOST, end_watch, to=Trigger.LOW),
+    row(Trigger.STUCK, Signal.TRIGGER_OFF, to=Trigger.LOW),
+    row(Trigger.STUCK, Signal.WRITER_LOST, to=Trigger.LOW),
+)

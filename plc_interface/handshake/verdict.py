@@ -1,0 +1,109 @@
+"""Outcomes that the interface itself gives, and how every outcome reaches the PLC."""
+
+from plc_interface.handshake.actions import PassOn, TellAcknowledged, TellPublished
+from plc_interface.handshake.events import Moment
+from plc_interface.handshake.journal import Running
+from plc_interface.handshake.modes import Signal
+from plc_interface.handshake.work import Work
+from station.channel.line import Outcome, Reason
+
+KEPT_VERDICTS = 64
+"""So many of the interface's own outcomes are kept for a station that never notes them."""
+
+_COUNTED = {"PASS": "count_pass", "FAIL": "count_fail", "NO_RESULT": "count_no_result"}
+
+
+def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
+    """NO_RESULT for an inspection whose outcome the station did not give, or not in time.
+
+    Args:
+        running: what is known of the inspection.
+        at: now, its end.
+        reasons: why; LATE makes it late.
+    """
+    return Outcome(
+        sequence=running.sequence,
+        trigger_id=running.trigger_id,
+        outcome="NO_RESULT",
+        reasons=reasons,
+        late=Reason.LATE in reasons,
+        partial=True,
+        simulated=running.simulated,
+        area_mm2=None,
+        area_px=None,
+        closing_mm=None,
+        confidence=None,
+        recipe_number=running.recipe_number,
+        recipe_checksum=running.recipe_checksum,
+        began_utc_ms=running.began_utc_ms,
+        ended_utc_ms=at.utc_ms,
+        duration_ms=max(0, min(round(1000 * (at.s - running.began_s)), 2**32 - 1)),
+        encoder=running.encoder,
+        lot=running.lot,
+    )
+
+
+def in_place_of(outcome: Outcome, reason: Reason) -> Outcome:
+    """NO_RESULT in the place of a station's outcome that must not stand."""
+    nothing = {"area_mm2": None, "area_px": None, "closing_mm": None, "confidence": None}
+    return outcome.model_copy(update={"outcome": "NO_RESULT", "reasons": (reason,), "late": False, **nothing})
+
+
+def is_sound(outcome: Outcome) -> bool:
+    """Whether an outcome says one thing only: PASS without a reason and in time, everything else with a reason."""
+    if outcome.outcome == "PASS":
+        return not outcome.reasons and not outcome.late
+    return bool(outcome.reasons)
+
+
+def queue(work: Work, outcome: Outcome) -> None:
+    """Let an outcome wait for the PLC, and tell everybody. From here on it stands."""
+    state = work.state
+    state.queue = (*state.queue, outcome)
+    work.count(_COUNTED[outcome.outcome], *(("count_late",) if outcome.late else ()))
+    work.actions += [PassOn(outcome), TellPublished(outcome)]
+    work.signals.append(Signal.QUEUED)
+
+
+def give(work: Work, outcome: Outcome) -> None:
+    """Let the interface's own outcome stand, over a restart too, until the station has noted it."""
+    work.keep(verdicts=(*work.state.journal.verdicts, outcome)[-KEPT_VERDICTS:])
+    queue(work, outcome)
+
+
+def hide(work: Work, outcome: Outcome) -> None:
+    """Settle an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
+    journal = work.state.journal
+    work.say(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
+    work.keep(verdicts=(*journal.verdicts, outcome)[-KEPT_VERDICTS:], hidden=(*journal.hidden, outcome.sequence))
+    work.actions.append(TellPublished(outcome))
+    pass_over_hidden(work)
+
+
+def pass_over_hidden(work: Work) -> None:
+    """Acknowledge hidden sequences as soon as nothing older waits for the PLC, which cannot do it."""
+    state = work.state
+    waiting = [outcome.sequence for outcome in state.queue] + ([state.running.sequence] if state.running else [])
+    oldest = min(waiting, default=2**32)
+    passed = [sequence for sequence in state.journal.hidden if sequence < oldest]
+    if passed:
+        acknowledge(work, max(passed))
+        left = tuple(sequence for sequence in state.journal.hidden if sequence not in passed)
+        work.keep(hidden=left)
+
+
+def acknowledge(work: Work, sequence: int) -> None:
+    """Note that everything up to here is done with, and tell the station."""
+    acknowledged = max(work.state.journal.acknowledged, sequence)
+    work.keep(acknowledged=acknowledged)
+    work.actions.append(TellAcknowledged(acknowledged))
+
+
+def tell_if_other(work: Work, theirs: Outcome) -> None:
+    """Tell the station what stands, where it holds another outcome of the same sequence."""
+    for ours in (*work.state.journal.verdicts, *work.state.queue):
+        if ours.sequence == theirs.sequence:
+            if ours != theirs:
+                work.say(f"inspection {ours.sequence}: {theirs.outcome} came after {ours.outcome}, which stands")
+                work.actions.append(TellPublished(ours))
+            return

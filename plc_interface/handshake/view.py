@@ -1,0 +1,170 @@
+"""What the PLC reads in a state: values by the names of the register map. And what the station is told of the line."""
+
+import zlib
+from collections.abc import Mapping
+
+from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Order, Result, Service, Trigger
+from plc_interface.handshake.state import State
+from plc_interface.handshake.trigger import obstacle
+from plc_interface.register_map import BY_NAME
+from station.channel.line import PACKML_STATE_NUMBERS, Line, Outcome, StationState
+
+Value = int | float | str | None
+
+STATION_LOST_CODE = 1000
+"""In `error_code` while the station does not answer; its alarms have the numbers below."""
+
+_STATUS, _FLAGS, _REASONS = BY_NAME["status"], BY_NAME["result_flags"], BY_NAME["result_reasons"]
+_OUTCOMES, _REFUSALS = BY_NAME["result_outcome"], BY_NAME["last_refusal"]
+
+
+def view(state: State) -> dict[str, Value]:
+    """Every register that the handshake sets: status, result and counters.
+
+    What the station said is not shown any more once it is lost.
+    """
+    return {**_status(state), **_result(state), **state.counters, "counters_epoch": state.journal.epoch,
+            "counters_reset_utc_ms": state.reset_utc_ms}  # fmt: skip
+
+
+def line(state: State, counters: Mapping[str, int], faults: tuple[str, ...]) -> Line:
+    """What the station is told with every beat.
+
+    Args:
+        state: of the handshake.
+        counters: those of the interface's other parts.
+        faults: the same.
+    """
+    return Line(
+        plc_connected=state.writer,
+        plc_alive=state.watched,
+        enabled=state.arming is Arming.ARMED,
+        waiting=len(state.queue),
+        counters={**state.counters, **counters},
+        faults=(*(fault.value for fault in state.faults), *faults),
+    )
+
+
+def _status(state: State) -> dict[str, Value]:
+    journal, station = state.journal, state.station
+    taken = len(state.queue) + (state.inspection is not Inspection.NONE)
+    running = state.running
+    return {
+        "status": _STATUS.flags(_status_bits(state)),
+        "packml_state": PACKML_STATE_NUMBERS[station.packml_state] if station and station.packml_state else 0,
+        "packml_mode": station.mode if station else 0,
+        "accepted_trigger_id": journal.accepted_id,
+        "station_heartbeat": state.heartbeat,
+        "plc_heartbeat_echo": state.inputs.plc_heartbeat,
+        "command_sequence_echo": journal.command_sequence or 0,
+        "command_result": journal.command_result,
+        "active_recipe": station.recipe_number if station else 0,
+        "active_recipe_checksum": station.recipe_checksum if station else 0,
+        "free_places": max(0, state.places - taken),
+        "waiting_results": len(state.queue),
+        "error_code": station.error_code if station else STATION_LOST_CODE,
+        "alarms": station.alarms if station else 0,
+        "last_refusal": _REFUSALS.code(state.last_refusal.value) if state.last_refusal else 0,
+        "last_refused_trigger_id": state.last_refused_id,
+        "latched_lot_checksum": lot_checksum(journal.lot),
+        "acknowledged_sequence_echo": journal.acknowledged,
+        **({"result_deadline_ms": round(1000 * running.within_s)} if running else {}),
+        "interface_boots": journal.boots,
+        "station_boots": state.station_boots,
+    }
+
+
+def _status_bits(state: State) -> list[str]:
+    station = state.station
+    running = state.inspection is Inspection.RUNNING
+    bits = {
+        "online": state.link is Link.UP and state.service is Service.IN_SERVICE,
+        "trigger_ready": obstacle(state) is None and station is not None and station.ready,
+        "trigger_acknowledged": state.trigger in {Trigger.ANSWERED, Trigger.HELD},
+        "acquiring": running,
+        "inspecting": running,
+        "result_valid": state.result is Result.SHOWN,
+        "overrun": state.overrun,
+        "missed": state.missed,
+        "command_executing": state.order is Order.EXECUTING,
+        "command_done": state.order is Order.DONE,
+        "command_failed": state.order is Order.FAILED,
+        "error": state.link is not Link.UP or _is_faulted(station),
+        "toggle": state.toggle,
+        "lot_latched": state.lot is Lot.LATCHED,
+        "writer_owned": state.writer,
+        "simulated": station is not None and station.simulated,
+    }
+    return [name for name, is_set in bits.items() if is_set]
+
+
+def _is_faulted(station: StationState | None) -> bool:
+    return station is None or station.error_code != 0 or not station.healthy
+
+
+def _result(state: State) -> dict[str, Value]:
+    shown = state.queue[0] if state.result is Result.SHOWN else None
+    return _NO_RESULT if shown is None else result_values(shown)
+
+
+def result_values(outcome: Outcome) -> dict[str, Value]:
+    """The result block for an outcome; areas and closing beyond their registers' bounds are shown at the bound."""
+    area = outcome.area_mm2
+    flags = {
+        "pass": outcome.outcome == "PASS",
+        "area_valid": area is not None,
+        "late": outcome.late,
+        "partial": outcome.partial,
+        "simulated": outcome.simulated,
+    }
+    return {
+        "result_sequence": outcome.sequence,
+        "result_trigger_id": outcome.trigger_id,
+        "result_flags": _FLAGS.flags(name for name, is_set in flags.items() if is_set),
+        "result_reasons": _REASONS.flags(reason.value for reason in outcome.reasons),
+        "result_area_mm2_x100": None if area is None else _bounded(100 * area, 0, 2**31 - 1),
+        "result_area_mm2": None if area is None else min(area, 3.4e38),
+        "result_area_px": None if outcome.area_px is None else min(outcome.area_px, 2**32 - 2),
+        "result_closing_mm_x100": (
+            None if outcome.closing_mm is None else _bounded(100 * outcome.closing_mm, -(2**15) + 1, 2**15 - 1)
+        ),
+        "result_confidence_pct": None if outcome.confidence is None else round(100 * outcome.confidence),
+        "result_recipe": outcome.recipe_number,
+        "result_outcome": _OUTCOMES.code(outcome.outcome),
+        "result_recipe_checksum": outcome.recipe_checksum,
+        "result_ended_utc_ms": outcome.ended_utc_ms,
+        "result_duration_ms": outcome.duration_ms,
+        "result_encoder": outcome.encoder,
+        "result_lot_checksum": lot_checksum(outcome.lot),
+        "result_sequence_again": outcome.sequence,
+    }
+
+
+_NO_RESULT: dict[str, Value] = {
+    "result_sequence": 0,
+    "result_trigger_id": 0,
+    "result_flags": 0,
+    "result_reasons": 0,
+    "result_area_mm2_x100": None,
+    "result_area_mm2": None,
+    "result_area_px": None,
+    "result_closing_mm_x100": None,
+    "result_confidence_pct": None,
+    "result_recipe": 0,
+    "result_outcome": 0,
+    "result_recipe_checksum": 0,
+    "result_ended_utc_ms": 0,
+    "result_duration_ms": 0,
+    "result_encoder": 0,
+    "result_lot_checksum": 0,
+    "result_sequence_again": 0,
+}
+
+
+def lot_checksum(lot: str) -> int:
+    """CRC-32 of a lot id in ASCII, 0 for none."""
+    return zlib.crc32(lot.encode("ascii", "replace")) if lot else 0
+
+
+def _bounded(value: float, low: int, high: int) -> int:
+    return round(min(max(value, low), high))

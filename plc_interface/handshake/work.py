@@ -1,0 +1,86 @@
+"""One step under way, and what a row of the table is."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from plc_interface.handshake.actions import Action, Say
+from plc_interface.handshake.events import Event, Moment
+from plc_interface.handshake.modes import Mode, Signal
+from plc_interface.handshake.state import Fault, State
+from station.channel.line import Outcome
+from station.settings.plc import HandshakeSettings
+
+
+@dataclass(slots=True)
+class Work:
+    """A state that is being changed, by effects that know the event, its time and the settings."""
+
+    state: State
+    at: Moment
+    event: Event
+    settings: HandshakeSettings
+    actions: list[Action] = field(default_factory=list)
+    signals: deque[Signal] = field(default_factory=deque)
+    found: Outcome | None = None
+    """The outcome that the signal OUTCOME or FOREIGN_OUTCOME is about."""
+
+    def keep(self, **changes: Any) -> None:
+        """Change the journal; it is written before the PLC sees what follows from it."""
+        self.state.journal = self.state.journal.model_copy(update=changes)
+
+    def count(self, *names: str) -> None:
+        """Count; the counters wrap round at 2³²."""
+        counters = dict(self.state.counters)
+        for name in names:
+            counters[name] = (counters[name] + 1) % 2**32
+        self.state.counters = counters
+
+    def fault(self, fault: Fault) -> None:
+        """Count a broken handshake, say it and latch it."""
+        self.count("count_communication")
+        self.say(fault.value)
+        if fault not in self.state.faults:
+            self.state.faults = (*self.state.faults, fault)
+
+    def say(self, text: str, *, warning: bool = True) -> None:
+        """One line for the log."""
+        self.actions.append(Say(text, warning))
+
+    def start(self, timer: Signal, after_s: float) -> None:
+        """Start a timer, or start it anew."""
+        self.state.timers = {**self.state.timers, timer: self.at.s + after_s}
+
+    def stop(self, timer: Signal) -> None:
+        """Stop a timer; nothing where it does not run."""
+        self.state.timers = {name: due_s for name, due_s in self.state.timers.items() if name != timer}
+
+    def number(self) -> int:
+        """A new number for a request."""
+        self.state.numbers += 1
+        return self.state.numbers
+
+
+Guard = Callable[[Work], bool]
+"""Its docstring is its condition in the printed table."""
+Effect = Callable[[Work], None]
+"""Its docstring is its line in the printed table."""
+
+
+class Row(NamedTuple):
+    """In this mode, on this signal and where the guard holds: the effects in their order, then the next mode.
+
+    Of several rows for one pair the first whose guard holds is taken.
+    """
+
+    mode: Mode
+    signal: Signal
+    guard: Guard | None
+    effects: tuple[Effect, ...]
+    next: Mode
+
+
+def row(mode: Mode, signal: Signal, *effects: Effect, to: Mode | None = None, when: Guard | None = None) -> Row:
+    """A row; without `to` the mode stays."""
+    return Row(mode, signal, when, effects, mode if to is None else to)

@@ -1,0 +1,95 @@
+"""The handshake's journal on the disk."""
+
+import contextlib
+import fcntl
+import logging
+import os
+import time
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from plc_interface.handshake.journal import Journal
+from station.errors import BadInputError, StationError
+
+log = logging.getLogger(__name__)
+
+
+class JournalFile:
+    """One file that is replaced as a whole, and a lock that keeps a second interface away from it."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the folder and take the lock.
+
+        Args:
+            folder: of this file alone.
+
+        Raises:
+            StationError: the folder cannot be written, or another interface runs there.
+        """
+        self._folder = folder
+        self._path = folder / "journal.json"
+        self._new = folder / "journal.new"
+        self.trouble = ""
+        """Why the last write failed; empty where it did not."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = (folder / "lock").open("w")
+        except OSError as error:
+            raise StationError(
+                f"the PLC interface cannot keep its journal in {folder}: {error.strerror}; give this user the right to "
+                "write there, or set home to another folder"
+            ) from error
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self._lock.close()
+            raise BadInputError(
+                f"another PLC interface runs in {folder}: stop it, or give this one a home folder of its own"
+            ) from error
+
+    def read(self) -> Journal:
+        """What was written last; an empty journal where there is none, or none that can be read."""
+        try:
+            return Journal.model_validate_json(self._path.read_bytes())
+        except FileNotFoundError:
+            return Journal()
+        except (OSError, ValidationError) as error:
+            aside = self._path.with_suffix(".damaged")
+            with contextlib.suppress(OSError):
+                self._path.replace(aside)
+            log.error(  # noqa: TRY400 (the file is at fault, not the code)
+                "the journal cannot be read (%s): it is put aside as %s; what is open is asked of the station",
+                type(error).__name__,
+                aside,
+            )
+            return Journal(boots=int(time.time()) % 2**16)  # another number than before, whatever that was
+
+    def write(self, journal: Journal, *, durable: bool) -> None:
+        """Replace the file. A failure is logged and kept in `trouble`: the line goes on.
+
+        Args:
+            journal: the new content.
+            durable: wait for the disk, so that it outlives a loss of power too.
+        """
+        try:
+            with self._new.open("wb") as file:
+                file.write(journal.model_dump_json().encode())
+                if durable:
+                    file.flush()
+                    os.fsync(file.fileno())
+            self._new.replace(self._path)
+        except OSError as error:
+            trouble = (
+                f"the journal {self._path} cannot be written: {error.strerror}; until it can, a restart of the PLC "
+                "interface may lose results"
+            )
+            if trouble != self.trouble:
+                log.error("%s", trouble)  # noqa: TRY400 (the disk is at fault, not the code)
+            self.trouble = trouble
+        else:
+            self.trouble = ""
+
+    def close(self) -> None:
+        """Give the lock back. Idempotent."""
+        self._lock.close()

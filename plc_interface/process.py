@@ -1,0 +1,78 @@
+"""The PLC interface as a process: registers served, handshake held, station asked, until told to end."""
+
+import asyncio
+import logging
+import signal
+import sys
+import time
+from importlib.metadata import version
+
+from plc_interface.codec import WordOrder
+from plc_interface.interface import Interface
+from plc_interface.journal_file import JournalFile
+from plc_interface.line_output import make_output
+from plc_interface.modbus.image import RegisterImage
+from plc_interface.modbus.server import ModbusServer
+from station.settings.configuration import Configuration
+from station.settings.plc import line_endpoint
+
+JOURNAL_FOLDER = "plc"
+GOODBYE_S = 0.3
+"""At the end a PLC that scans every 100 ms can read that the station is offline before its connection closes."""
+
+log = logging.getLogger(__name__)
+
+
+async def serve(configuration: Configuration) -> None:
+    """Serve until SIGINT or SIGTERM; then say offline, close the connections and return.
+
+    Args:
+        configuration: the site's.
+
+    Raises:
+        StationError: a port, a certificate, the journal's folder or the endpoint cannot be used.
+    """
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    modbus, handshake = configuration.modbus, configuration.handshake
+    endpoint = line_endpoint(handshake, configuration.home)
+    journal = JournalFile(configuration.home / JOURNAL_FOLDER)
+    output = make_output(configuration.can)
+    image = RegisterImage(WordOrder(modbus.word_order))
+    image.commit(
+        {
+            "software_version": version("fruit-station")[:16],
+            "plc_heartbeat_timeout_ms": round(1000 * handshake.plc_heartbeat_timeout_s),
+            "writer_lease_ms": round(1000 * modbus.writer_lease_s),
+            "handshake_timeout_ms": round(1000 * handshake.handshake_timeout_s),
+            "station_heartbeat_ms": round(1000 * handshake.beat_period_s),
+        }
+    )
+    interface = Interface(handshake, endpoint, image, journal, output)
+    server = ModbusServer(modbus, image, interface.on_write, interface.on_writer)
+    try:
+        await server.start()
+        interface.start(server.statistics)
+        await output.start()
+        log.info("Modbus TCP is served on %s, port %d, unit %d", modbus.host, modbus.port, modbus.unit)
+        await ended.wait()
+        log.info("told to end: the PLC reads offline, then its connection closes")
+        interface.leave()
+        await asyncio.sleep(GOODBYE_S)
+    finally:
+        await server.stop()
+        await interface.stop()
+        await output.stop()
+        journal.close()
+
+
+def log_to_stderr() -> None:
+    """One line an event, with its time in UTC and its place; what pymodbus has to say is said by our own server."""
+    handler = logging.StreamHandler(sys.stderr)
+    formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)

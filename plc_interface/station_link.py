@@ -1,0 +1,186 @@
+"""The questions of the handshake, asked of the station over the channel."""
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from plc_interface.handshake import actions as do
+from plc_interface.handshake import events as ev
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    Line,
+    Noted,
+    Open,
+    Outcome,
+    Published,
+    Resume,
+    StationState,
+)
+from station.channel.messages import ChannelError, RefusedError
+from station.settings.plc import HandshakeSettings
+
+OUTCOME_GRACE_S = 1.0
+"""So much longer than the interface's own deadline an outcome is waited for: what it would have been is logged."""
+
+log = logging.getLogger(__name__)
+
+
+def now() -> ev.Moment:
+    """The time on both clocks."""
+    return ev.Moment(time.monotonic(), time.time_ns() // 1_000_000)
+
+
+class StationLink:
+    """Carries out what the handshake asks of the station, and beats. Belongs to one event loop."""
+
+    def __init__(
+        self, endpoint: str, settings: HandshakeSettings, feed: Callable[[ev.Event], None], line: Callable[[], Line]
+    ) -> None:
+        """Nothing is asked before `start`.
+
+        Args:
+            endpoint: where the station answers.
+            settings: periods and deadlines.
+            feed: given every answer.
+            line: what the station is told with each beat.
+        """
+        self._settings, self._feed, self._line = settings, feed, line
+        self._client = ChannelClient(endpoint, "the station")
+        self._notes: deque[do.TellPublished | do.TellAcknowledged] = deque()
+        self._noting: asyncio.Task[None] | None = None
+        self._outcomes: dict[int, asyncio.Task[None]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._beat_now = asyncio.Event()
+        self._said = ""
+
+    def start(self) -> None:
+        """Begin to beat."""
+        self._spawn(self._beat(), "beats")
+
+    async def stop(self) -> None:
+        """End every question."""
+        tasks = tuple(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._client.close()
+
+    def carry_out(self, action: do.Action) -> None:
+        """Ask; the answer comes as an event. Actions that are not for the station are passed over."""
+        match action:
+            case do.AskBegin():
+                self._spawn(self._begin(action), f"begin {action.trigger_id}")
+            case do.AskOutcome():
+                if action.sequence in self._outcomes:
+                    self._outcomes[action.sequence].cancel()
+                self._outcomes[action.sequence] = self._spawn(self._outcome(action), f"outcome {action.sequence}")
+            case do.AskOpen():
+                self._spawn(self._open(action), "open")
+            case do.AskCommand():
+                self._spawn(self._command(action), f"command {action.command}")
+            case do.TellPublished() | do.TellAcknowledged():
+                self._notes.append(action)
+                if self._noting is None or self._noting.done():
+                    self._noting = self._spawn(self._note(), "notes")
+            case _:
+                pass
+
+    def _spawn(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+        task = asyncio.create_task(work, name=f"station: {name}")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def _beat(self) -> None:
+        period_s = self._settings.beat_period_s
+        deadline_s = max(2 * period_s, self._settings.station_lost_after_s / 3)
+        while True:
+            self._beat_now.clear()
+            try:
+                state = await self._client.ask(self._line(), StationState, deadline_s=deadline_s)
+            except ChannelError as error:
+                if str(error) != self._said:
+                    log.warning("%s", error)
+                self._said = str(error)
+            else:
+                self._said = ""
+                self._feed(ev.Beat(now(), state))
+            try:
+                async with asyncio.timeout(period_s):
+                    await self._beat_now.wait()
+            except TimeoutError:
+                pass
+
+    async def _begin(self, action: do.AskBegin) -> None:
+        request = Begin(trigger_id=action.trigger_id, encoder=action.encoder, lot=action.lot)
+        try:
+            begun = await self._client.ask(request, Begun, deadline_s=self._settings.begin_deadline_s)
+        except ChannelError as error:
+            log.warning("%s", error)
+            self._feed(ev.BeginFailed(now(), action.number))
+        else:
+            self._feed(ev.BeginAnswered(now(), action.number, begun))
+
+    async def _outcome(self, action: do.AskOutcome) -> None:
+        request = AwaitOutcome(sequence=action.sequence)
+        try:
+            outcome = await self._client.ask(request, Outcome, deadline_s=action.within_s + OUTCOME_GRACE_S)
+        except ChannelError as error:
+            self._forget_outcome(action.sequence)
+            self._feed(ev.OutcomeFailed(now(), action.sequence, str(error)))
+        else:
+            self._forget_outcome(action.sequence)
+            self._feed(ev.OutcomeCame(now(), outcome))
+            self._beat_now.set()  # the station may be ready for the next trigger at once
+
+    def _forget_outcome(self, sequence: int) -> None:
+        if self._outcomes.get(sequence) is asyncio.current_task():
+            del self._outcomes[sequence]
+
+    async def _open(self, action: do.AskOpen) -> None:
+        try:
+            opened = await self._client.ask(Resume(), Open, deadline_s=self._settings.station_lost_after_s)
+        except ChannelError as error:
+            self._feed(ev.RequestFailed(now(), str(error)))
+        else:
+            self._feed(ev.OpenTold(now(), action.number, opened))
+
+    async def _command(self, action: do.AskCommand) -> None:
+        request = Command(command=action.command, argument=action.argument)
+        try:
+            done = await self._client.ask(request, CommandDone, deadline_s=self._settings.command_deadline_s)
+        except RefusedError as error:
+            self._feed(ev.CommandAnswered(now(), action.number, done=False, why=str(error)))
+        except ChannelError as error:
+            log.warning("%s", error)
+            self._feed(ev.CommandFailed(now(), action.number))
+        else:
+            self._feed(ev.CommandAnswered(now(), action.number, done.done, done.why))
+
+    async def _note(self) -> None:
+        """Tell what there is to tell, one after the other: an acknowledgement never overtakes what it is about."""
+        while self._notes:
+            action = self._notes[0]
+            told = isinstance(action, do.TellPublished)
+            request = Published(outcome=action.outcome) if told else Acknowledged(sequence=action.sequence)
+            try:
+                await self._client.ask(request, Noted, deadline_s=self._settings.station_lost_after_s)
+            except RefusedError as error:
+                log.warning("the station did not take a note: %s", error)
+            except ChannelError as error:
+                self._notes.clear()  # all that still stands is told again once the station answers
+                self._feed(ev.RequestFailed(now(), str(error)))
+                return
+            else:
+                if told:
+                    self._feed(ev.OutcomeNoted(now(), action.outcome.sequence))
+            self._notes.popleft()

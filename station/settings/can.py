@@ -1,0 +1,182 @@
+"""The line's CAN: the bus, its two nodes, and how long anything may stay silent."""
+
+import ipaddress
+import re
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from station.settings.model import Settings, setting
+
+EDS_FOLDER = Path(__file__).parent / "eds"
+"""The nodes' electronic data sheets: what the station and whoever builds a node have both been told."""
+GATE_EDS = EDS_FOLDER / "reject_gate.eds"
+ENCODER_EDS = EDS_FOLDER / "line_encoder.eds"
+
+_INTERFACE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,14}")
+_FEWEST_BEATS = 2
+
+
+class CanSettings(Settings):
+    """The reject gate and the line encoder on CANopen."""
+
+    enabled: bool = setting(
+        False,  # noqa: FBT003 (the default of a field)
+        title="Enabled",
+        description="Whether the station diverts fruit itself by CAN; off, the line's PLC does.",
+    )
+    interface: Literal["virtual", "udp_multicast", "socketcan"] = setting(
+        "udp_multicast",
+        title="Interface",
+        description="`socketcan` for a real bus, `udp_multicast` between processes of this machine (the twin), "
+        "`virtual` within one process (tests).",
+    )
+    channel: str = setting(
+        "239.74.163.2",
+        title="Channel",
+        description="Name of the network interface for `socketcan` (can0), multicast address for `udp_multicast`, any "
+        "name for `virtual`.",
+        min_length=1,
+        max_length=64,
+    )
+    port: int = setting(
+        43113, title="Port", description="UDP port of `udp_multicast`; unused otherwise.", ge=1024, le=65_535
+    )
+    bitrate: int = setting(
+        250_000,
+        title="Bit rate",
+        description="Of a real bus. The system sets it, not the station: see docs/plc/can.md for the command.",
+        unit="bit/s",
+        ge=10_000,
+        le=1_000_000,
+    )
+    station_node: int = setting(
+        1, title="Station's node", description="Node id under which the station sends its heartbeat.", ge=1, le=127
+    )
+    gate_node: int = setting(16, title="Gate's node", description="Node id of the reject gate.", ge=1, le=127)
+    encoder_node: int = setting(17, title="Encoder's node", description="Node id of the line encoder.", ge=1, le=127)
+    heartbeat_s: float = setting(
+        0.1,
+        title="Heartbeat",
+        description="How often the station and each node say that they live.",
+        unit="s",
+        ge=0.01,
+        le=5.0,
+    )
+    heartbeat_lost_s: float = setting(
+        0.35,
+        title="Heartbeat lost after",
+        description="After so long a silence a node is lost, and a node takes the station for lost and puts out its "
+        "safe output by itself.",
+        unit="s",
+        ge=0.05,
+        le=30.0,
+    )
+    answer_timeout_s: float = setting(
+        0.5,
+        title="Answer time-out",
+        description="Longest wait for the answer to one SDO; a healthy node needs a few milliseconds.",
+        unit="s",
+        ge=0.02,
+        le=10.0,
+    )
+    retry_s: float = setting(
+        0.5,
+        title="Retry after",
+        description="Pause before the bus is brought up again; it doubles with each failure, up to 10 s.",
+        unit="s",
+        ge=0.05,
+        le=10.0,
+    )
+    encoder_period_s: float = setting(
+        0.01,
+        title="Encoder's period",
+        description="How often the encoder sends its count; at 0.01 s and 300 mm/s the belt moves 3 mm in between.",
+        unit="s",
+        ge=0.001,
+        le=1.0,
+    )
+    count_stale_s: float = setting(
+        0.1,
+        title="Count stale after",
+        description="An older encoder count is unknown: no shot is ordered on it, and the gate fires none.",
+        unit="s",
+        ge=0.005,
+        le=5.0,
+    )
+    distance_counts: int = setting(
+        12_000,
+        title="Nest to gate",
+        description="Encoder counts from the nest to the gate's flap; the default is the twin's. Measure yours.",
+        ge=1,
+        le=1_000_000_000,
+    )
+    tolerance_counts: int = setting(
+        100,
+        title="Tolerance of a shot",
+        description="How far from the ordered count the gate may report its shot; it has to cover the belt's way in "
+        "one period of the encoder, 30 counts on the twin.",
+        ge=0,
+        le=1_000_000,
+    )
+    pulse_ms: int = setting(
+        120, title="Pulse", description="How long the flap stays open for one fruit.", unit="ms", ge=5, le=255
+    )
+    echo_deadline_s: float = setting(
+        0.25,
+        title="Echo deadline",
+        description="How long the gate may take to confirm an order, and to report a shot once its count is reached.",
+        unit="s",
+        ge=0.01,
+        le=10.0,
+    )
+    shot_deadline_s: float = setting(
+        60.0,
+        title="Shot deadline",
+        description="How long an ordered shot may wait for its count, as when the belt stands still.",
+        unit="s",
+        ge=0.5,
+        le=3600.0,
+    )
+    safe_output: int = setting(
+        1,
+        title="Safe output",
+        description="What the gate puts out while the station is lost or not healthy: bit n opens the flap of lane "
+        "n + 1. 1 sends everything to lane 1, the rejects'.",
+        ge=0,
+        le=255,
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if len({self.station_node, self.gate_node, self.encoder_node}) < 3:
+            raise ValueError("station_node, gate_node and encoder_node have to be three different node ids")
+        if self.heartbeat_lost_s < _FEWEST_BEATS * self.heartbeat_s:
+            raise ValueError(
+                f"heartbeat_lost_s is {self.heartbeat_lost_s:g} s and has to be at least twice heartbeat_s, "
+                f"{2 * self.heartbeat_s:g} s: one late beat must not stop the line"
+            )
+        if self.count_stale_s < _FEWEST_BEATS * self.encoder_period_s:
+            raise ValueError(
+                f"count_stale_s is {self.count_stale_s:g} s and has to be at least twice encoder_period_s, "
+                f"{2 * self.encoder_period_s:g} s: one late count must not stop the line"
+            )
+        if self.interface == "udp_multicast" and not _is_multicast(self.channel):
+            raise ValueError(
+                f"channel is {self.channel!r} and has to be a multicast address, such as 239.74.163.2, for the "
+                "interface udp_multicast"
+            )
+        if self.interface == "socketcan" and not _INTERFACE_NAME.fullmatch(self.channel):
+            raise ValueError(
+                f"channel is {self.channel!r} and has to be the name of a network interface, such as can0, for the "
+                "interface socketcan"
+            )
+        return self
+
+
+def _is_multicast(channel: str) -> bool:
+    try:
+        return ipaddress.ip_address(channel).is_multicast
+    except ValueError:
+        return False

@@ -1,0 +1,113 @@
+"""How the PLC interface waits: for the PLC and for the station."""
+
+from pathlib import Path
+from typing import Self
+
+from pydantic import model_validator
+
+from station.errors import BadInputError
+from station.settings.model import Settings, setting
+
+LONGEST_SOCKET_PATH = 107
+"""Linux, unix(7): a socket's path with its closing NUL fits 108 bytes."""
+
+
+class HandshakeSettings(Settings):
+    """The handshake's deadlines and time-outs, and where the interface reaches the station."""
+
+    endpoint: str | None = setting(
+        None,
+        title="Station's endpoint",
+        description="Where the station answers the PLC interface: ipc://PATH or tcp://127.0.0.1:PORT; null for "
+        "run/line.ipc in the home folder.",
+        pattern=r"^(ipc://.+|tcp://127\..+:[0-9]+)$",
+        max_length=200,
+    )
+    beat_period_s: float = setting(
+        0.1,
+        title="Beat period",
+        description="How often the station is asked for its state; its heartbeat to the PLC changes as often.",
+        unit="s",
+        ge=0.02,
+        le=5.0,
+    )
+    station_lost_after_s: float = setting(
+        1.0,
+        title="Station lost after",
+        description="So long without an answered beat, and the station counts as lost: what was running ends as "
+        "NO_RESULT.",
+        unit="s",
+        ge=0.1,
+        le=30.0,
+    )
+    begin_deadline_s: float = setting(
+        0.5,
+        title="Trigger's answer within",
+        description="A trigger that the station has neither accepted nor refused by then is refused. The PLC waits "
+        "so long for trigger_acknowledged at most.",
+        unit="s",
+        ge=0.05,
+        le=10.0,
+    )
+    result_margin_s: float = setting(
+        0.3,
+        title="Result's margin",
+        description="So long after the deadline that the station itself keeps, the interface answers NO_RESULT for it.",
+        unit="s",
+        ge=0.0,
+        le=10.0,
+    )
+    command_deadline_s: float = setting(
+        30.0,
+        title="Command's deadline",
+        description="A command that the station has not ended by then is told as timed out.",
+        unit="s",
+        ge=0.1,
+        le=300.0,
+    )
+    plc_heartbeat_timeout_s: float = setting(
+        1.0,
+        title="PLC lost after",
+        description="A PLC whose heartbeat has once changed and then stands still so long is lost: disarmed, results "
+        "kept. A client that never changes it is not watched.",
+        unit="s",
+        ge=0.05,
+        le=60.0,
+    )
+    handshake_timeout_s: float = setting(
+        5.0,
+        title="Forgotten bit after",
+        description="A bit that the PLC has not taken back so long after its answer counts as taken back, as a fault.",
+        unit="s",
+        ge=0.05,
+        le=60.0,
+    )
+
+    @model_validator(mode="after")
+    def _beats_fit(self) -> Self:
+        if self.station_lost_after_s < 3 * self.beat_period_s:
+            raise ValueError(
+                f"station_lost_after_s is {self.station_lost_after_s:g} s, and beats come every "
+                f"{self.beat_period_s:g} s: expected at least three beats, so that one lost beat is no lost station"
+            )
+        return self
+
+
+def line_endpoint(settings: HandshakeSettings, home: Path) -> str:
+    """Where the station serves the line's channel and the PLC interface looks for it.
+
+    Args:
+        settings: with the endpoint, or null for the default.
+        home: the absolute home folder.
+
+    Raises:
+        BadInputError: the path is too long for a socket.
+    """
+    endpoint = settings.endpoint or f"ipc://{home / 'run' / 'line.ipc'}"
+    path = endpoint.removeprefix("ipc://")
+    if path != endpoint and len(path.encode()) > LONGEST_SOCKET_PATH:
+        raise BadInputError(
+            f"the line's socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
+            "choose a shorter home folder, or set handshake.endpoint to a short ipc:// path"
+        )
+    return endpoint

@@ -1,0 +1,34 @@
+"""What a site may set, and what it is told where that does not fit."""
+
+import re
+
+import pytest
+from pydantic import ValidationError
+
+from station.settings.can import CanSettings
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"gate_node": 17}, "three different node ids"),
+        ({"station_node": 16}, "three different node ids"),
+        ({"heartbeat_s": 0.2}, "heartbeat_lost_s is 0.35 s and has to be at least twice heartbeat_s, 0.4 s"),
+        ({"encoder_period_s": 0.06}, "count_stale_s is 0.1 s and has to be at least twice encoder_period_s"),
+        ({"channel": "can0"}, "has to be a multicast address"),
+        ({"channel": "192.0.2.1"}, "has to be a multicast address"),
+        ({"interface": "socketcan"}, "has to be the name of a network interface, such as can0"),
+        ({"interface": "pcan"}, "'virtual', 'udp_multicast' or 'socketcan'"),
+        ({"encoder_node": 128}, "less than or equal to 127"),
+        ({"pulse_ms": 256}, "less than or equal to 255"),
+    ],
+)
+def test_what_does_not_fit_is_refused(values, said):
+    with pytest.raises(ValidationError, match=re.escape(said)):
+        CanSettings(**values)
+
+
+def test_the_driver_is_off_unless_asked_for():
+    assert CanSettings().enabled is False
+    assert CanSettings(interface="socketcan", channel="can0").channel == "can0"
+    assert CanSettings(channel="ff15::1").channel == "ff15::1"
