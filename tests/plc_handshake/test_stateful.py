@@ -600,7 +600,7 @@ class Handshake(RuleBasedStateMachine):
 
 TestHandshake = Handshake.TestCase
 TestHandshake.settings = settings(
-    max_examples=150,
+    max_examples=80,
     stateful_step_count=40,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],

@@ -137,6 +137,44 @@ def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     assert made.state.journal.acknowledged == 41
 
 
+def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_online(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(refusal=Refusal.BUSY))
+    assert (made.state.last_refusal, made.state.link) == (Refusal.BUSY, Link.UP)
+    made.feed(ev.OpenTold, made.state.open_asked, Open(running=(41, 6), outcomes=()))
+    assert [action.outcome.sequence for action in made.of(do.TellPublished)] == [41]
+    assert (made.state.queue, made.state.journal.acknowledged) == ((), 41)
+
+
+def test_the_answer_to_another_begin_accepts_nothing(bench):
+    made = bench()
+    made.armed("buffer_results")
+    made.write("enable", "trigger", trigger_id=7)
+    first = made.state.asked.number
+    made.feed(ev.BeginFailed, first)
+    made.link()
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=8)
+    made.feed(ev.BeginAnswered, first, Begun(sequence=41, deadline_s=1.0))
+    assert (made.state.running, made.state.asked.trigger_id, made.state.stale) == (None, 8, 1)
+
+
+def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.RequestFailed, "a note was lost")
+    made.feed(ev.Beat, made.station_state())
+    asked_before = made.state.open_asked
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.OpenTold, asked_before, Open(running=None, outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
+    made.link(Open(running=(41, 7), outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
+
+
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
     made = bench()
     made.feed(ev.WriterCame)
