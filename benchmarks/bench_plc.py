@@ -193,9 +193,7 @@ def main(duration_s: float) -> int:
     ports = {name: free_port() for name in (OURS, PLAIN, STOCK, LIBMODBUS)}
     others_before = psutil.cpu_percent(1.0)
 
-    def start(
-        target: Callable[..., None], *arguments: object, **options: object
-    ) -> multiprocessing.process.BaseProcess:
+    def start(target: Callable[..., None], *arguments: object, **options: object) -> SpawnProcess:
         process = context.Process(target=target, args=arguments, kwargs=options, daemon=True)
         process.start()
         return process

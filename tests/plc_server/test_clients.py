@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
+from pymodbus.pdu.mei_message import ReadDeviceInformationResponse
 
 from plc_interface.modbus.lease import WriterChange
 
@@ -62,6 +63,7 @@ def test_pymodbus(serve):
             assert done.registers == [1, 76]
             assert (await plc.read_input_registers(60)).exception_code == 2
             identity = await plc.read_device_information(read_code=2)
+            assert isinstance(identity, ReadDeviceInformationResponse)
             assert identity.information[0] == b"fruit-station"
 
     asyncio.run(talk())
