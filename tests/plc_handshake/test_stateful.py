@@ -585,6 +585,7 @@ class Handshake(RuleBasedStateMachine):
             self.acknowledge(by_bit=False)
             self.heal()
         assert not self.bit("result_valid")
+        assert self.state.unlisted == 0
         assert self.state.queue == self.state.journal.verdicts == self.state.journal.hidden == ()
         shown_ids = [block["result_trigger_id"] for block in self.shown.values()]
         assert sorted(shown_ids) == sorted(self.accepted)

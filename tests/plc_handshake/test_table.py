@@ -175,6 +175,20 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
 
 
+def test_what_is_hidden_is_acknowledged_only_behind_what_still_waits(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeCame, made.outcome())
+    made.write("enable", "buffer_results")
+    made.write("enable", "buffer_results", "trigger", trigger_id=8)
+    made.feed(ev.BeginFailed, made.state.asked.number)
+    made.link(Open(running=(42, 8), outcomes=made.state.queue))
+    assert (made.state.journal.hidden, made.of(do.TellAcknowledged)) == ((42,), [])
+    made.write("enable", acknowledged_sequence=41)
+    assert [action.sequence for action in made.of(do.TellAcknowledged)] == [41, 42]
+    assert made.state.journal.hidden == ()
+
+
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
     made = bench()
     made.feed(ev.WriterCame)
