@@ -189,6 +189,26 @@ def test_what_is_hidden_is_acknowledged_only_behind_what_still_waits(bench):
     assert made.state.journal.hidden == ()
 
 
+def test_a_trigger_that_a_restart_interrupts_is_refused_and_what_it_began_is_never_shown(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    again = bench(made.of(do.Keep)[-1].journal)
+    assert (again.state.last_refusal, again.state.last_refused_id) == (Refusal.STATION_LOST, 7)
+    again.link(Open(running=(41, 7), outcomes=()))
+    assert (again.state.queue, again.state.running, again.state.journal.acknowledged) == ((), None, 41)
+
+
+def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench):
+    made = bench()
+    made.run()
+    made.now_s += 1.5
+    made.feed(ev.Tick)
+    assert Signal.RESULT_DEADLINE not in made.state.timers
+    told = made.link(Open(running=(41, 7), outcomes=()))
+    assert [action.outcome for action in told if isinstance(action, do.TellPublished)] == list(made.state.queue)
+
+
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
     made = bench()
     made.feed(ev.WriterCame)
