@@ -585,6 +585,7 @@ class Handshake(RuleBasedStateMachine):
             self.acknowledge(by_bit=False)
             self.heal()
         assert not self.bit("result_valid")
+        assert self.state.unlisted == 0
         assert self.state.queue == self.state.journal.verdicts == self.state.journal.hidden == ()
         shown_ids = [block["result_trigger_id"] for block in self.shown.values()]
         assert sorted(shown_ids) == sorted(self.accepted)
@@ -600,7 +601,7 @@ class Handshake(RuleBasedStateMachine):
 
 TestHandshake = Handshake.TestCase
 TestHandshake.settings = settings(
-    max_examples=150,
+    max_examples=80,
     stateful_step_count=40,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],
