@@ -16,7 +16,7 @@ CONTROL_BITS = _bits(
         "Rising edge: arm, so that triggers are accepted. Off: disarmed; what runs goes on and its result is kept",
     ),
     ("trigger", "Rising edge: inspect one fruit, by the trigger id written with or before it; hold until answered"),
-    ("acknowledge", "Confirms that the result shown, by the acknowledged sequence, is taken; hold until it is gone"),
+    ("acknowledge", "Rising edge: the result with the acknowledged sequence is taken; hold until result_valid falls"),
     ("buffer_results", "On: up to 8 results wait for their acknowledgement. Off: one; a trigger before it is refused"),
     ("execute_command", "Rising edge: carry out the command code with its argument; hold until done or failed"),
     ("clear_error", "Rising edge: overrun, missed and the last refusal are cleared"),
@@ -117,8 +117,7 @@ COMMAND_RESULT_CODES = {
     3: Code("failed", "The station could not; its log and its HMI say why"),
     4: Code("timed_out", "The station did not end it in time"),
     5: Code("station_lost", "The station does not answer"),
-    6: Code("busy", "Another command is being carried out"),
-    7: Code("no_command", "The command code is 0"),
+    6: Code("no_command", "The command code is 0"),
 }
 
 OUTCOME_CODES = {
