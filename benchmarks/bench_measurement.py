@@ -38,6 +38,7 @@ TWIN_SEEDS = (0, 700)
 """Of the first press of each fruit; nothing was chosen on the second."""
 DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
 DETECTION_UNITS = (None, 7)
+LIGHT_AREAS_MM2 = (1, 2, 3, 5)
 SIGMA_PIXEL, SIGMA_COLUMN, SIGMA_ROW, SIGMA_OFFSET = (3.1, 1.8, 2.5), (1.8, 1.3, 2.6), 1.0, 1.5
 """Noise measured on real presses, grey levels, B, G, R."""
 DRIFT_LEVELS = 4.0
@@ -285,11 +286,11 @@ def twin_table() -> list[str]:
     """The robust method on the twin, where the truth is exact."""
     found = measured_presses(TWIN_SEEDS)
     large = [one for one in found if one.true_mm2 > 2]
-    lines = [
+    header = (
         "| contacts over 2 mm² | frames | error of the area: median | p95 | judged | their median | their p95 "
-        + "| Spearman with closing: median | 0.99 or more |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+        "| Spearman with closing: median | 0.99 or more |"
+    )
+    lines = [header, "|---|---|---|---|---|---|---|---|---|"]
     for key in ("all", *FRUITS, *conditions()):
         rows = [one for one in large if key == "all" or key in one.keys]
         errors, judged = [one.error for one in rows], [one.error for one in rows if one.judged]
@@ -311,27 +312,31 @@ def twin_table() -> list[str]:
 
 
 def detection_table() -> list[str]:
-    """Whether contacts of about 1 mm² are found, at several places and on several units."""
-    lines = ["| contacts of 0.8 to 1.3 mm² | shown | with an area | undecided | no contact |", "|---|---|---|---|---|"]
+    """The share of light contacts that are found, by their area, at several places and on several units."""
+    header = "| found of contacts of | " + " | ".join(f"{area:g} mm²" for area in LIGHT_AREAS_MM2) + " |"
+    lines = [header, "|---" * (len(LIGHT_AREAS_MM2) + 1) + "|"]
     for kind in FRUITS:
-        outcomes = [0, 0, 0]
-        for seed, ((x_px, y_px), unit) in enumerate(itertools.product(DETECTION_PLACES, DETECTION_UNITS)):
+        found = np.zeros(len(LIGHT_AREAS_MM2), int)
+        shown = np.zeros(len(LIGHT_AREAS_MM2), int)
+        for seed, ((x_px, y_px), unit) in enumerate(itertools.product(DETECTION_PLACES, DETECTION_UNITS), 500):
             options = PressOptions(pose=Pose(x_px=x_px, y_px=y_px), unit=unit)
-            press = render_press(kind, 500 + seed, (one_mm2_closing(kind, 500 + seed, options),), options)
-            if 0.8 <= press.true_areas_mm2[0] <= 1.3:
-                contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
-                outcomes[0 if contact.found else 1 if Flag.UNDECIDED in contact.flags else 2] += 1
-        lines.append(f"| {kind} | {sum(outcomes)} | {outcomes[0]} | {outcomes[1]} | {outcomes[2]} |")
+            press = render_press(kind, seed, light_closings(kind, seed, options), options)
+            method = RobustMethod(press.references, RobustParameters())
+            for number, (frame, true_mm2) in enumerate(zip(press.frames, press.true_areas_mm2, strict=True)):
+                if abs(true_mm2 / LIGHT_AREAS_MM2[number] - 1) < 0.3:
+                    shown[number] += 1
+                    found[number] += method.measure(frame).found
+        lines.append(f"| {kind} | " + " | ".join(f"{f} of {n}" for f, n in zip(found, shown, strict=True)) + " |")
     return lines
 
 
-def one_mm2_closing(kind: str, seed: int, options: PressOptions) -> float:
-    """The closing at which a fruit's contact is nearest to 1 mm², by its own truth."""
-    closings = np.geomspace(0.002, 0.2, 10)
+def light_closings(kind: str, seed: int, options: PressOptions) -> list[float]:
+    """The closings at which a fruit's contact is nearest to each of the light areas, by its own truth."""
+    closings = np.geomspace(0.002, 0.5, 14)
     fruit = draw_fruit(kind, seed)
     on_gel, squeeze = FruitOnGel(fruit, options.pose, Gel()), Squeeze(fruit, Gel())
-    areas = [on_gel.pressed(squeeze.at(float(closing))).true_area_mm2 for closing in closings]
-    return float(closings[np.argmin(np.abs(np.array(areas) - 1))])
+    areas = np.array([on_gel.pressed(squeeze.at(float(closing))).true_area_mm2 for closing in closings])
+    return [float(closings[np.argmin(np.abs(areas - area))]) for area in LIGHT_AREAS_MM2]
 
 
 def spearman(values: list[int]) -> float:
