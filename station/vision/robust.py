@@ -85,12 +85,11 @@ class RobustMethod:
             )
         work = working_image(image)
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
-        calm = quiet(bending(without_bands(difference)), self._least_bend)
-        drift = self._drift.fit(difference, calm)
+        drift = self._drift.fit(difference, quiet(bending(difference), self._least_bend))
         change = difference - drift.levels
         if self._blind is not None:
             change[self._blind] = 0
-        change = without_streaks(change, calm)
+        change = without_streaks(change, quiet(bending(without_bands(difference)), self._least_bend))
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
