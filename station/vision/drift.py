@@ -155,7 +155,7 @@ def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImag
     """The lines' offsets along an axis, of length 1 along it."""
     prior = np.float32(_STREAK_PRIOR_SHARE * strips.shape[axis])
     first = _line_means(strips, background, axis, _NO_PRIOR)
-    away = cv2.transform((strips - first) ** 2, np.ones((1, 3), np.float32))
+    away = np.square(strips - first).sum(axis=2)
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)

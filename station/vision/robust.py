@@ -37,6 +37,8 @@ _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
 _LEAST_SUPPORT = 0.03
 _COARSE_STEP = 4
+_LEAST_TRUST = 0.25
+"""In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
 
 
@@ -90,7 +92,9 @@ class RobustMethod:
         change = difference - drift.levels
         if self._blind is not None:
             change[self._blind] = 0
-        change = without_streaks(change, self._quiet(without_bands(difference)))
+        calm = self._quiet(without_bands(difference))
+        fits = resized(drift.background, (calm.shape[1], calm.shape[0]))
+        change = without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits))
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
