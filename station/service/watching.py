@@ -75,6 +75,10 @@ class DeviceWatch:
         self._set(fault)
         self._again.set()
 
+    def look_again(self) -> None:
+        """Somebody has mended something: do not wait for the next look's time."""
+        self._again.set()
+
     async def run(self) -> None:
         """Look until cancelled."""
         pause_s = PERIOD_S
