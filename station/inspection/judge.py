@@ -203,6 +203,12 @@ def _area(evidence: Evidence, threshold: AreaThreshold) -> Iterator[Finding]:
     elif area is not None and sum(area) > limit:
         sentence = f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be over the limit of {limit:g} mm²."
         yield Finding(Reason.AREA_OVER_LIMIT, sentence, area[0], limit, closing_mm)
+    elif area is not None and area[0] - area[1] < threshold.least_area_mm2:
+        sentence = (
+            f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be less than any fruit's, "
+            f"{threshold.least_area_mm2:g} mm²: not all of the contact was seen."
+        )
+        yield Finding(Reason.LOW_CONFIDENCE, sentence, area[0], threshold.least_area_mm2, closing_mm)
 
 
 def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:

@@ -16,6 +16,7 @@ from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Contact, Method
 from station.vision.methods import make_method
+from station.vision.step import mean_image, measure_step
 
 ResultT = TypeVar("ResultT")
 
@@ -43,6 +44,7 @@ class Eye:
         self._golden, self._settings = golden, settings
         self._worker = ThreadPoolExecutor(1, "vision")
         self._method: Method | None = None
+        self._least_confidence = 0.0
 
     def close(self) -> None:
         """End the thread, after what it is doing."""
@@ -68,7 +70,10 @@ class Eye:
             looks = examine(images, golden, segmentation, self._settings)
             if golden is None:
                 self._golden.keep(images)
-            self._method = make_method(images, segmentation)
+            self._method, self._least_confidence = (
+                make_method(images, segmentation),
+                segmentation.robust.least_confidence,
+            )
             return looks
 
         return await self._do(take)
@@ -83,8 +88,8 @@ class Eye:
         def measure() -> Seen:
             if self._method is None:
                 raise RuntimeError("a step is measured before the reference was taken")
-            image = step.image
-            return Seen(step, image, self._method.measure(image))
+            images = [frame.image for frame in step.frames]
+            return Seen(step, mean_image(images), measure_step(self._method, images, self._least_confidence))
 
         return await self._do(measure)
 

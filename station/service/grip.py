@@ -5,14 +5,13 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, Image
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
+from station.vision.step import mean_image
 
 FRAME_DEADLINE_S = 1.0
 FINEST_STEP_MM = 0.4
@@ -49,8 +48,7 @@ class GripStep:
     @property
     def image(self) -> Image:
         """The frames' mean, shape (height, width, 3), dtype uint8, BGR."""
-        mean = np.mean([frame.image for frame in self.frames], axis=0)
-        return np.rint(mean).astype(np.uint8)
+        return mean_image([frame.image for frame in self.frames])
 
     @property
     def last_frame(self) -> Frame:
@@ -128,7 +126,7 @@ class Grip:
         return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
 
     async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
-        """Close step by step until the gel is touched, then once more from the step before, as finely as the gripper can.
+        """Close step by step until the gel is touched, then once more, as finely as the gripper can.
 
         The onset's width is what every closing is counted from, so it is found to a count of the gripper. On the way
         one frame without a pause is enough; where it shows a contact, a full step at the same width has to confirm it.
