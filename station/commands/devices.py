@@ -78,8 +78,6 @@ async def _recover(configuration: Configuration, what: RecoveryName) -> None:
 async def _recovered_by_the_station(configuration: Configuration, what: RecoveryName) -> bool:
     """Ask the station's process, which holds the arm's registers while it runs; False where none runs."""
     endpoint = line_endpoint(configuration.handshake, configuration.home)
-    if endpoint.startswith("ipc://") and not Path(endpoint.removeprefix("ipc://")).exists():
-        return False
     async with ChannelClient(endpoint, "the station") as station:
         try:
             await station.ask(Resume(), Open, deadline_s=_STATION_DEADLINE_S)

@@ -171,16 +171,18 @@ class Orders:
         await service.conductor.until(lambda state: state not in UNJUDGED)
         return ""
 
-    async def _reset(self) -> str:
-        service, state = self._service, self._service.state
-        if service.stop_asked:
+    def _no_reset(self) -> str:
+        if self._service.stop_asked:
             return "the station is told to end"
         if stop := self._crew.standing_stop:
             return f"{stop} That is a person's to confirm at the cell, with `station devices recover`, before the reset"
-        if STATES[state].refusal is Refusal.BUSY:
-            return "an inspection is under way; call it off first"
-        if state is State.IDLE:
-            return ""
+        busy = STATES[self._service.state].refusal is Refusal.BUSY
+        return "an inspection is under way; call it off first" if busy else ""
+
+    async def _reset(self) -> str:
+        service, state = self._service, self._service.state
+        if (why_not := self._no_reset()) or state is State.IDLE:
+            return why_not
         service.reset_wanted = True
         self._crew.confirmed_clear = True
         if state in {State.LATCHED, State.CARRIED}:

@@ -1,6 +1,7 @@
 """Looks at one device again and again: whether it answers, how long ago it did, and what is wrong with it."""
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable
@@ -102,12 +103,12 @@ class DeviceWatch:
         until_s = time.monotonic() + pause_s
         self._again.clear()
         while (left_s := until_s - time.monotonic()) > 0:
-            try:
+            with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(min(left_s, PERIOD_S)):
                     await self._again.wait()
+            if self._again.is_set():
                 return
-            except TimeoutError:
-                self._on_progress()
+            self._on_progress()
 
     def _set(self, fault: StationError | None) -> None:
         before, self.fault = self.fault, fault
