@@ -207,6 +207,12 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
+def line_client() -> type[LineClient]:
+    """What the PLC interface does, by hand, over a channel."""
+    return LineClient
+
+
+@pytest.fixture
 def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
     """Start a simulated bench and a station on it, in this process; both end with the block."""
 
