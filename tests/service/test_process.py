@@ -42,7 +42,9 @@ def cell(settings_file, line_client):
                 ask("127.0.0.1", self.console, {"do": do, "device": device, "fault": fault, "amount": 1.0})
 
         def recover(self, what):
-            return self.start("devices", "recover", what, "--yes").wait(timeout=60)
+            with self.start("devices", "recover", what, "--yes") as process:
+                process.communicate(timeout=60)
+                return process.returncode
 
         @contextlib.asynccontextmanager
         async def line(self):
