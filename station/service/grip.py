@@ -76,10 +76,18 @@ class Grip:
         cell: the devices, opened.
         recipe: width steps, speed, force, settle time and frames.
         frame_deadline_s: longest wait for one frame.
+        on_frame: gets every frame, also those with faults.
     """
 
-    def __init__(self, cell: Cell, recipe: Recipe, frame_deadline_s: float = FRAME_DEADLINE_S) -> None:
+    def __init__(
+        self,
+        cell: Cell,
+        recipe: Recipe,
+        frame_deadline_s: float = FRAME_DEADLINE_S,
+        on_frame: Callable[[Frame], None] = lambda _frame: None,
+    ) -> None:
         self._cell, self._recipe, self._frame_deadline_s = cell, recipe, frame_deadline_s
+        self._on_frame = on_frame
 
     async def go(self, *poses: PoseName) -> None:
         """Bring the arm to one pose after the other; without an arm nothing moves.
@@ -196,6 +204,7 @@ class Grip:
         faults: set[str] = set()
         for _ in range(_MOST_FAULTY_FRAMES):
             frame = await self._cell.camera.frame(newer_than_s, self._frame_deadline_s)
+            self._on_frame(frame)
             if not frame.faults:
                 return frame
             faults |= frame.faults

@@ -2,15 +2,18 @@
 
 import asyncio
 
+from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.cycle import REASONS, Event
 from station.inspection.judge import early_stop, judge
 from station.records.model import Image
+from station.service.alarm_desk import AlarmDesk
 from station.service.crew import CAMERA, GRIPPER, Crew
 from station.service.eye import Eye
 from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError
 from station.service.inspection import Inspection
-from station.service.reference import BadReferenceError
+from station.service.metrics import Metrics
+from station.service.reference import ALARMS, BadReferenceError
 from station.settings.service import ServiceSettings
 from station.vision.methods import median_image
 from station.vocabulary import Reason
@@ -25,10 +28,13 @@ class Inspector:
         crew: the devices.
         eye: the measurement.
         settings: placing, and how old a reference may be.
+        alarms: told of a reference that cannot serve.
+        metrics: counts the frames.
     """
 
-    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings) -> None:
+    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings, alarms: AlarmDesk, metrics: Metrics) -> None:
         self._crew, self._eye, self._settings = crew, eye, settings
+        self._alarms, self._metrics = alarms, metrics
         self._reached: MoveResult | None = None
 
     async def open_jaws(self) -> Event:
@@ -67,7 +73,11 @@ class Inspector:
             looks = await self._eye.take_reference(frames, recipe.segmentation)
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, str(error))
+            self._alarms.raise_(error.alarm, str(error))
             return Event.REFERENCE_BAD
+        for alarm in ALARMS:
+            self._alarms.clear(alarm)
+        self._metrics.reference(0.0, looks.drift_levels)
         now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
         return Event.REFERENCE_TAKEN
@@ -125,6 +135,7 @@ class Inspector:
     async def judge(self, now: Inspection) -> Event:
         """Judge what was measured."""
         age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
+        self._metrics.reference(age_s, float(now.measures.get("reference_drift_levels") or 0.0))
         if age_s > self._settings.reference.oldest_s:
             now.interrupt(
                 Reason.REFERENCE_BAD,
@@ -156,7 +167,11 @@ class Inspector:
         now.outcome_name = "NO_RESULT"
 
     def _grip(self, now: Inspection) -> Grip:
-        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience)
+        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience, self._count)
+
+    def _count(self, frame: Frame) -> None:
+        for fault in frame.faults or ("good",):
+            self._metrics.frame(fault)
 
     async def _touches(self, step: GripStep) -> bool:
         self._crew.watches[CAMERA].heard()

@@ -8,6 +8,7 @@ import numpy as np
 
 from station.devices.camera.interface import Image
 from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
 from station.service.keeping import Kept
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
@@ -20,8 +21,16 @@ _SATURATED_LEVEL = 250
 GOLDEN = "golden_reference.png"
 
 
+ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
+"""What a reference is refused with."""
+
+
 class BadReferenceError(StationError):
     """The picture cannot be a reference; the message says why and what to do."""
+
+    def __init__(self, alarm: AlarmId, text: str) -> None:
+        super().__init__(text)
+        self.alarm = alarm
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +87,9 @@ def examine(
     saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
     if saturated > settings.saturated_share:
         raise BadReferenceError(
+            AlarmId.CAMERA_SATURATED,
             f"reference: {saturated:.0%} of it are saturated, at most {settings.saturated_share:.0%} may be: "
-            "keep outside light off the gel, or lower the LEDs"
+            "keep outside light off the gel, or lower the LEDs",
         )
     detail = sharpness(image)
     if golden is None or golden.shape != image.shape:
@@ -89,18 +99,21 @@ def examine(
     share = detail / sharpness(golden)
     if share < settings.least_sharpness:
         raise BadReferenceError(
+            AlarmId.CAMERA_DIRTY,
             f"reference: {share:.0%} as sharp as the golden reference, at least {settings.least_sharpness:.0%} are "
-            "needed: clean the sensor's lens and gel"
+            "needed: clean the sensor's lens and gel",
         )
     if drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
         raise BadReferenceError(
+            AlarmId.CAMERA_LED_DEAD,
             f"reference: its light differs from the golden reference's by {drift:.0f} grey levels: look at the "
-            f"sensor's LEDs; after a change of gel or sensor remove {GOLDEN} from the home folder"
+            f"sensor's LEDs; after a change of gel or sensor remove {GOLDEN} from the home folder",
         )
     if contact.found if contact.gate is None else contact.gate > settings.most_change:
         raise BadReferenceError(
+            AlarmId.REFERENCE_BAD,
             "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
-            f"gel; if the gel was changed, remove {GOLDEN} from the home folder"
+            f"gel; if the gel was changed, remove {GOLDEN} from the home folder",
         )
     return Looks(detail, saturated, drift)
 

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import Awaitable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -30,12 +31,14 @@ from station.service.recipe_book import Active
 from station.service.triggers import Pending, Triggers
 from station.settings.arm import ArmSettings
 from station.settings.configuration import Configuration
-from station.vocabulary import Reason, Refusal
+from station.vocabulary import OutcomeName, Reason, Refusal
 
 log = logging.getLogger(__name__)
 
 CYCLE = "cycle"
 _LEASE_S = 2.0
+_LAST_OUTCOMES = 20
+_MANY = 5
 _MEASURE_S = 0.3
 _FRAMES_PER_S = 30.0
 _RECORD_NO_RESULT_S = 1.0
@@ -85,6 +88,7 @@ class Service:
         self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
         self._background: set[asyncio.Future[Event | None]] = set()
         self._told_late: State | None = None
+        self._last_outcomes: deque[OutcomeName] = deque(maxlen=_LAST_OUTCOMES)
 
     @property
     def state(self) -> State:
@@ -148,6 +152,7 @@ class Service:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
+            self._watch_outcomes(outcome)
 
     async def open(self) -> Open:
         """What was begun and not acknowledged."""
@@ -344,6 +349,15 @@ class Service:
     def _refused(self, refusal: Refusal) -> Begun:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
+
+    def _watch_outcomes(self, outcome: Outcome) -> None:
+        self._last_outcomes.append(outcome.outcome)
+        last = list(self._last_outcomes)
+        unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
+        self.alarms.show(AlarmId.MANY_NO_RESULT, f"the last {_MANY} fruit could not be judged" if unjudged else "")
+        failed = len(last) == _LAST_OUTCOMES and last.count("FAIL") > _LAST_OUTCOMES / 2
+        told = f"{last.count('FAIL')} of the last {_LAST_OUTCOMES} fruit failed" if failed else ""
+        self.alarms.show(AlarmId.REJECT_RATE, told)
 
     def _limits(self, active: Active) -> Deadlines:
         limits, patience = deadlines(active.recipe, self.pace()), self._settings.patience
