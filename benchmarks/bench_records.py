@@ -15,13 +15,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-
-from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
+from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
 from station.settings.records import RecordsSettings
@@ -29,7 +26,6 @@ from station.settings.records import RecordsSettings
 T = TypeVar("T")
 
 INSPECTIONS = 400
-IMAGES = 14
 TOGETHER = 16
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "records-speed.md"
 
@@ -69,18 +65,16 @@ async def timed(work: Awaitable[T], times_s: list[float]) -> T:
     return result
 
 
-async def station(folder: Path, together: int, *, images: bool = False) -> list[str]:
+async def station(folder: Path, together: int) -> list[str]:
     """The station's records, with so many inspections at a time."""
     records = await Records.open(folder, RecordsSettings(deadline_s=30.0, free_reserve_mb=1), "bench")
     begins_s: list[float] = []
     conclusions_s: list[float] = []
-    random = np.random.default_rng(1)
 
     async def inspections(number: int) -> None:
         for _ in range(number):
-            record = with_images(random) if images else RECORD
             sequence = await timed(records.begin(TRIGGER), begins_s)
-            outcome = await timed(records.conclude(sequence, record), conclusions_s)
+            outcome = await timed(records.conclude(sequence, RECORD), conclusions_s)
             await records.published(outcome)
 
     began_s = time.perf_counter()
@@ -88,14 +82,7 @@ async def station(folder: Path, together: int, *, images: bool = False) -> list[
     took_s = time.perf_counter() - began_s
     await records.close()
     name = f"station, {together} at a time" if together > 1 else "station, one after another"
-    return row(f"{name}, {IMAGES} images each" if images else name, begins_s, conclusions_s, took_s)
-
-
-def with_images(random: np.random.Generator) -> InspectionRecord:
-    """A rejected fruit with its frames, noisy as a sensor's and like no others."""
-    noise = random.integers(116, 124, (IMAGES, 640, 480, 3), dtype=np.uint8)
-    images = tuple(Image("step", step, frame) for step, frame in enumerate(noise))
-    return replace(RECORD, outcome="FAIL", reasons=("area_over_limit",), images=images)
+    return row(name, begins_s, conclusions_s, took_s)
 
 
 def bare(folder: Path) -> list[str]:
@@ -155,7 +142,6 @@ def main() -> int:
         bare,
         lambda folder: asyncio.run(station(folder, 1)),
         lambda folder: asyncio.run(station(folder, TOGETHER)),
-        lambda folder: asyncio.run(station(folder, 1, images=True)),
     ]
     rows = []
     with tempfile.TemporaryDirectory(dir=sys.argv[1] if len(sys.argv) > 1 else None) as place:
@@ -170,8 +156,7 @@ def main() -> int:
         "# How long the records take\n\n"
         "`./run bench records` writes this page. An inspection is three commits with `synchronous=FULL`: begin, "
         "conclude with 13\ncurve points, published. A begin of the station also makes the sequence's mark durable, "
-        "a second sync. Images are written\nbehind the inspections, and dropped where they come faster than the "
-        "disk takes them.\n\n"
+        "a second sync.\n\n"
         f"{table}\n\n"
         f"{INSPECTIONS} inspections each; {platform.machine()}, Python {platform.python_version()}, SQLite "
         f"{sqlite3.sqlite_version}; one sync of 4 KiB took {synced_ms:.2f} ms (median).\n"

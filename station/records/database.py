@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shutil
 import sqlite3
 import time
@@ -20,6 +21,7 @@ from sqlalchemy.pool import NullPool
 
 from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
 from station.records.failures import in_words
+from station.records.sequence_mark import sync_folder
 
 FILE_NAME = "records.sqlite3"
 MIGRATIONS = Path(__file__).parent / "migrations"
@@ -124,15 +126,12 @@ def stamp() -> str:
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
 
 
-def migrate(engine: Engine, folder: Path) -> bool:
+def migrate(engine: Engine, folder: Path) -> None:
     """Bring the schema up to date, with a copy of the database made before.
 
     Args:
         engine: of the database.
         folder: where `backups` lies.
-
-    Returns:
-        Whether the database was a new one.
 
     Raises:
         SchemaError: it is a newer program's, or a migration failed; then it is as it was.
@@ -145,7 +144,7 @@ def migrate(engine: Engine, folder: Path) -> bool:
     with engine.begin() as connection:
         found = MigrationContext.configure(connection).get_current_revision()
         if found == scripts.get_current_head():
-            return False
+            return
         known = {script.revision for script in scripts.walk_revisions()}
         if found is not None and found not in known:
             raise SchemaError(
@@ -167,7 +166,6 @@ def migrate(engine: Engine, folder: Path) -> bool:
             f"the database could not be brought from form {found} to {scripts.get_current_head()}: {error}",
             f"it is as it was; install the earlier version again and report this{kept}",
         ) from error
-    return found is None
 
 
 def _backed_up(folder: Path, revision: str) -> Path:
@@ -180,7 +178,10 @@ def _backed_up(folder: Path, revision: str) -> Path:
     partial = backup.with_suffix(".partial")
     with closing(sqlite3.connect(folder / FILE_NAME)) as source, closing(sqlite3.connect(partial)) as target:
         source.backup(target)
+    with partial.open("rb") as file:
+        os.fsync(file.fileno())
     partial.rename(backup)
+    sync_folder(backup.parent)
     return backup
 
 

@@ -14,13 +14,17 @@ from station.records.errors import DamagedError, LockedError, RecordsError, Sequ
 from station.records.failures import DAMAGED_REMEDY, in_words
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
-from station.records.sequence_mark import SequenceMark
+from station.records.sequence_mark import SequenceMark, sync_folder
 from station.records.writer import Writer
 from station.records.writing import add_event, end_what_was_left
 from station.settings.records import RecordsSettings
 
 MARK_NAME = "sequence"
 LOCK_NAME = "lock"
+
+_BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
+"""What is moved aside together. The database goes last: while it is there the next start goes on moving, and a new one
+never meets an old one's write-ahead log or takes its images for orphans."""
 
 log = logging.getLogger(__name__)
 
@@ -95,11 +99,9 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
     path = folder / FILE_NAME
     try:
         mark = SequenceMark(folder / MARK_NAME)
-        notices = list(_make_sound(folder, mark))
-        new = _migrated(folder)
-        if new and not notices and mark.value:
-            cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
-            notices.append(Notice("damaged", cause, "look for the old one: somebody moved or removed it"))
+        notices = _make_sound(folder, mark)
+        _migrate(folder)
+        sync_folder(folder)
         writer = Writer(*_connector(path, mark), str(path))
         try:
             lost = writer.submit(lambda connection: _begin_again(connection, mark, boot, notices)).result()
@@ -109,13 +111,17 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
             raise
     except OSError as error:
         raise in_words(error, str(folder)) from error
-    return Opened(writer, images, mark, tuple(notices), lost)
+    return Opened(writer, images, mark, notices, lost)
 
 
 def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
-    """Move a damaged database aside, if the numbers can go on without it."""
+    """Move a damaged database aside, and what a missing one left, if the numbers can go on without it."""
     path = folder / FILE_NAME
-    if not path.exists():
+    if not path.exists() or not path.stat().st_size:
+        if mark.value:
+            aside = move_aside(folder, *_BELONGING)
+            cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
+            return (Notice("damaged", cause, f"look for the old one; its images are in {aside}"),)
         if not mark.known and (folder / "aside").exists():
             raise _lost_mark(mark)
         return ()
@@ -124,7 +130,7 @@ def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
     except DamagedError as error:
         if not mark.known:
             raise _lost_mark(mark) from error
-        aside = move_aside(folder, FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FOLDER_NAME)
+        aside = move_aside(folder, *_BELONGING)
         log.exception("%s; moved to %s", error.cause, aside)
         remedy = f"the old one and its images are in {aside}: `sqlite3 FILE .recover` reads what is left of it"
         return (Notice(error.code, f"{error.cause}; a new one was begun after number {mark.value}", remedy),)
@@ -138,11 +144,11 @@ def _lost_mark(mark: SequenceMark) -> SequenceError:
     )
 
 
-def _migrated(folder: Path) -> bool:
-    """Bring the schema up to date; whether the database is new."""
+def _migrate(folder: Path) -> None:
+    """Bring the schema up to date."""
     engine = open_engine(folder / FILE_NAME, "rwc")
     try:
-        return migrate(engine, folder)
+        migrate(engine, folder)
     except RecordsError:
         raise
     except Exception as error:
@@ -177,7 +183,7 @@ def _connector(path: Path, mark: SequenceMark) -> tuple[Callable[[], Connection]
     return connect, before_commit
 
 
-def _begin_again(connection: Connection, mark: SequenceMark, boot: str, notices: list[Notice]) -> tuple[int, ...]:
+def _begin_again(connection: Connection, mark: SequenceMark, boot: str, notices: tuple[Notice, ...]) -> tuple[int, ...]:
     """The first transaction of a start."""
     mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
     lost = end_what_was_left(connection)

@@ -190,7 +190,7 @@ class Records:
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
         reserved = wanted and opened.images.reserve()
         state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
-        accepted = PENDING if reserved and accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
+        accepted = state if accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
         future = opened.writer.submit(
             lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
         )
@@ -330,5 +330,8 @@ class Records:
             with reading(self.folder) as connection:
                 return question(connection)
 
-        async with asyncio.timeout(READING_S):
-            return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
+        try:
+            async with asyncio.timeout(READING_S):
+                return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
+        except TimeoutError:
+            raise RecordsDeadlineError(f"no answer within {READING_S:g} s", "look at the disk, or ask again") from None

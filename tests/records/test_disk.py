@@ -259,11 +259,14 @@ def test_a_damaged_database_is_moved_aside_and_the_numbers_go_on(
     scenario(steps)
 
 
-def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(opened, scenario, trigger, failed, folder):
+def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(
+    opened, scenario, trigger, failed, folder, noise, settled
+):
     async def steps():
         async with opened() as records:
             sequence = await records.begin(trigger)
-            outcome = await records.conclude(sequence, failed)
+            outcome = await records.conclude(sequence, replace(failed, images=(noise(),)))
+            await settled(records)
             for file in folder.glob(f"{FILE_NAME}*"):
                 file.unlink()
             for _ in range(2):
@@ -272,6 +275,7 @@ def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(opened, scena
             await records.reopen()
             (notice,) = records.notices
             assert "there was none, though" in notice.cause
+            assert len(list(folder.glob("aside/*/images/*/*.png"))) == 1, "no images are taken for orphans"
             assert await records.published(outcome), "what only the interface still knows is taken from it"
             full = await records.inspection(sequence)
             assert (full.standing, full.judged, full.trigger.lot) == (outcome, None, "A-17")
