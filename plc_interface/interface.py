@@ -12,7 +12,7 @@ from plc_interface.handshake import events as ev
 from plc_interface.handshake.machine import next_due_s, step
 from plc_interface.handshake.modes import Link
 from plc_interface.handshake.state import restarted
-from plc_interface.handshake.view import line, view
+from plc_interface.handshake.view import Value, line, view
 from plc_interface.journal_file import JournalFile
 from plc_interface.line_output import LineOutput
 from plc_interface.modbus.image import RegisterImage
@@ -25,6 +25,7 @@ from station.channel.line import Line
 from station.settings.plc import HandshakeSettings
 
 _CONTROL = BY_NAME["control"]
+_NEVER = object()
 
 log = logging.getLogger(__name__)
 
@@ -52,8 +53,10 @@ class Interface:
         self._state = restarted(journal.read(), now(), settings.station_lost_after_s)
         self._statistics = Statistics()
         self._before_reset = (0, 0)
+        self._shown: dict[str, Value] = {}
+        self._writer: Peer | None = None
         journal.write(self._state.journal, durable=True)
-        image.commit(view(self._state))
+        self._show()
 
     def start(self, statistics: Statistics) -> None:
         """Begin to ask the station.
@@ -75,7 +78,7 @@ class Interface:
         """Tell the PLC that the station is offline: nothing is begun any more."""
         self.feed(ev.Leaving(now()))
 
-    def on_write(self, _peer: Peer, values: Mapping[str, int | float | str]) -> None:
+    def on_write(self, _writer: Peer, values: Mapping[str, int | float | str]) -> None:
         """The writer wrote these fields; the answer stands in the registers before its request is answered."""
         known: dict[str, Any] = {name: value for name, value in values.items() if name != "write_key"}
         if "control" in known:
@@ -87,6 +90,7 @@ class Interface:
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:
         """The right to write changed hands."""
+        self._writer = peer
         if peer is None or change is WriterChange.TAKEN_OVER:
             self.feed(ev.WriterWent(now()))
         if peer is not None:
@@ -102,12 +106,18 @@ class Interface:
         for action in actions:
             if isinstance(action, do.Keep):
                 self._journal.write(action.journal, durable=action.durable)
-        self._image.commit(view(self._state) | self._server_counts())
+        self._show()
         for action in actions:
             self._carry_out(action)
         if isinstance(event, ev.Beat) and self._state.link is Link.UP and event.station.healthy:
             self._output.renew_health(self._settings.station_lost_after_s)
         self._wake_when_due()
+
+    def _show(self) -> None:
+        values = view(self._state) | self._server_counts()
+        changed = {name: value for name, value in values.items() if self._shown.get(name, _NEVER) != value}
+        self._image.commit(changed)
+        self._shown = values
 
     def _carry_out(self, action: do.Action) -> None:
         match action:
@@ -117,6 +127,9 @@ class Interface:
                 self._output.publish(outcome)
             case do.ClearFaults():
                 self._output.acknowledge_faults()
+            case do.AskCommand(command=command, argument=argument):
+                log.info("%s orders %s, argument %d", self._writer, command.value, argument)
+                self._station.carry_out(action)
             case _:
                 self._station.carry_out(action)
 

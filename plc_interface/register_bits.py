@@ -11,9 +11,12 @@ def _bits(*named: tuple[str, str]) -> tuple[Bit, ...]:
 
 
 CONTROL_BITS = _bits(
-    ("enable", "Triggers may be accepted. Off: disarmed; what runs is ended and its result kept"),
+    (
+        "enable",
+        "Rising edge: arm, so that triggers are accepted. Off: disarmed; what runs goes on and its result is kept",
+    ),
     ("trigger", "Rising edge: inspect one fruit, by the trigger id written with or before it; hold until answered"),
-    ("acknowledge", "Rising edge: results up to the acknowledged sequence are taken; hold until the next is shown"),
+    ("acknowledge", "Confirms that the result shown, by the acknowledged sequence, is taken; hold until it is gone"),
     ("buffer_results", "On: up to 8 results wait for their acknowledgement. Off: one; a trigger before it is refused"),
     ("execute_command", "Rising edge: carry out the command code with its argument; hold until done or failed"),
     ("clear_error", "Rising edge: overrun, missed and the last refusal are cleared"),
@@ -25,8 +28,8 @@ CONTROL_BITS = _bits(
 STATUS_BITS = _bits(
     ("online", "The station answers this interface and is not taken offline"),
     ("trigger_ready", "A trigger would be accepted now"),
-    ("trigger_acknowledged", "The trigger was answered: accepted, or refused (missed) with its reason; falls with it"),
-    ("acquiring", "The fruit is still being measured: it must stay where it is"),
+    ("trigger_acknowledged", "The trigger was answered, by accepted_trigger_id or by last_refusal; falls with it"),
+    ("acquiring", "The fruit must stay where it is"),
     ("inspecting", "An inspection is under way"),
     ("result_valid", "The result block holds a result that is not acknowledged"),
     ("overrun", "A trigger was refused because results wait; latched until clear_error"),

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from plc_interface.can import bring_up
 from plc_interface.can.counts import RANGE, Count, ahead, further
@@ -27,7 +27,7 @@ from plc_interface.can.errors import (
     ShotRefusedError,
 )
 from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
-from plc_interface.can.shots import Fired, Order, PendingShot, Shots
+from plc_interface.can.shots import DivertEcho, Fired, Order, PendingShot, Shots
 from station.settings.can import CanSettings
 
 _LONGEST_PAUSE_S = 10.0
@@ -42,16 +42,8 @@ Result = TypeVar("Result")
 log = logging.getLogger(__name__)
 
 
-class DivertEcho(NamedTuple):
-    """A shot that the gate has fired as ordered."""
-
-    sequence: int
-    lane: int
-    at_count: int
-    fired_count: int
-    """The encoder's count as the gate fired."""
-    confirmed_s: float
-    """From the order to the gate's confirmation that it is armed."""
+class _HealthEndedError(LineIoError):
+    """The station's lease is over: no failure of the bus."""
 
 
 class LineIo:
@@ -239,6 +231,7 @@ class LineIo:
                 while not self._healthy:
                     await asyncio.sleep(_POLL_S)
                 await self._session()
+            except _HealthEndedError:
                 self._trouble, pause_s = None, self._settings.retry_s
                 continue
             except NodeLostError as error:
@@ -259,10 +252,10 @@ class LineIo:
         self._trouble = why
 
     async def _session(self) -> None:
-        """Open the bus, bring both nodes up and watch them; returns when the station is no longer healthy.
+        """Open the bus, bring both nodes up and watch them until that ends.
 
         Raises:
-            LineIoError: the bus or a node cannot be had, or was lost.
+            LineIoError: the bus or a node cannot be had or was lost, or the station is no longer healthy.
         """
         loop = asyncio.get_running_loop()
         link = CanLink(
@@ -278,7 +271,6 @@ class LineIo:
             self._operational, self._trouble = True, None
             self._counters["bring_ups"] += 1
             await self._watch(link)
-            why = _UNHEALTHY
         except LineIoError as error:
             why = str(error)
             raise
@@ -328,6 +320,8 @@ class LineIo:
         deadline_s = time.monotonic() + max(_NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
         while not condition():
             link.check()
+            if not self._healthy:
+                raise _HealthEndedError(_UNHEALTHY)
             if time.monotonic() > deadline_s:
                 raise BringUpError(why)
             await asyncio.sleep(_POLL_S)
@@ -346,6 +340,7 @@ class LineIo:
                         "was restarted, or lost the station's heartbeat; it is brought up again"
                     )
             await asyncio.sleep(_POLL_S)
+        raise _HealthEndedError(_UNHEALTHY)
 
     def _on_emergency(self, emergency: Emergency) -> None:
         node, code, register = emergency

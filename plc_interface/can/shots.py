@@ -45,6 +45,18 @@ class Order(NamedTuple):
         return self.sequence & _WIRE
 
 
+class DivertEcho(NamedTuple):
+    """A shot that the gate has fired as ordered."""
+
+    sequence: int
+    lane: int
+    at_count: int
+    fired_count: int
+    """The encoder's count as the gate fired."""
+    confirmed_s: float
+    """From the order to the gate's confirmation that it is armed."""
+
+
 class PendingShot:
     """An order under way."""
 

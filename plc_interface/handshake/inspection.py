@@ -83,8 +83,8 @@ def refuse_as_told(work: Work) -> None:
     event = work.event
     begun = event.begun if isinstance(event, BeginAnswered) else Begun()
     refuse_asked(work, begun.refusal or Refusal.NOT_READY)
-    if begun.refusal is Refusal.BUSY:  # with something that this interface knows nothing of
-        work.signals.append(Signal.CHANNEL_FAILED)
+    if begun.refusal is Refusal.BUSY:
+        work.signals.append(Signal.STATION_BUSY)
 
 
 def refuse_asked(work: Work, reason: Refusal) -> None:

@@ -59,10 +59,13 @@ ROWS = (
     row(RESUMING, Signal.STATION_ANSWERED, hear),
     row(RESUMING, Signal.STATION_RESTARTED, hear, ask_open),
     row(RESUMING, Signal.OPENED, settle, to=UP),
+    row(RESUMING, Signal.STATION_BUSY),
     row(RESUMING, Signal.CHANNEL_FAILED, forget_question),
     row(RESUMING, Signal.STATION_SILENT, forget_station, to=LOST),
     row(UP, Signal.STATION_ANSWERED, hear, beat),
     row(UP, Signal.STATION_RESTARTED, hear, ask_open, to=RESUMING),
+    row(UP, Signal.STATION_BUSY, ask_open),
+    row(UP, Signal.OPENED, settle),
     row(UP, Signal.CHANNEL_FAILED, forget_question, to=RESUMING),
     row(UP, Signal.STATION_SILENT, forget_station, to=LOST),
 )

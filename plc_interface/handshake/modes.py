@@ -120,6 +120,7 @@ class Signal(StrEnum):
     BEGUN = "begun"
     BEGIN_REFUSED = "begin refused"
     BEGIN_FAILED = "begin failed"
+    STATION_BUSY = "station busy, with what is not known here"
     OUTCOME = "outcome"
     FOREIGN_OUTCOME = "outcome of another sequence"
     COMMAND_DONE = "command done"

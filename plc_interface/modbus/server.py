@@ -117,12 +117,19 @@ class ModbusServer:
         try:
             await listener.open()
         except OSError as error:
-            raise ModbusServerError(_why_not(section, host, port, error)) from error
+            raise ModbusServerError(why_not(section, host, port, error)) from error
         self._listeners.append(listener)
 
 
-def _why_not(section: str, host: str, port: int, error: OSError) -> str:
-    """What keeps a port from being served, and what to do."""
+def why_not(section: str, host: str, port: int, error: OSError) -> str:
+    """What keeps a port from being served, and what to do.
+
+    Args:
+        section: of the settings that name the port.
+        host: where it should be served.
+        port: the same.
+        error: of the attempt to listen.
+    """
     place = f"Modbus TCP cannot be served on {host}, port {port}"
     if error.errno == errno.EADDRINUSE:
         return f"{place}: another program listens there: stop it (ss -ltnp names it), or set {section}.port"

@@ -65,7 +65,7 @@ class CanSettings(Settings):
         le=5.0,
     )
     heartbeat_lost_s: float = setting(
-        0.35,
+        0.5,
         title="Heartbeat lost after",
         description="After so long a silence a node is lost, and a node takes the station for lost and puts out its "
         "safe output by itself.",
@@ -98,7 +98,7 @@ class CanSettings(Settings):
         le=1.0,
     )
     count_stale_s: float = setting(
-        0.1,
+        0.2,
         title="Count stale after",
         description="An older encoder count is unknown: no shot is ordered on it, and the gate fires none.",
         unit="s",

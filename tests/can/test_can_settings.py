@@ -13,8 +13,8 @@ from station.settings.can import CanSettings
     [
         ({"gate_node": 17}, "three different node ids"),
         ({"station_node": 16}, "three different node ids"),
-        ({"heartbeat_s": 0.2}, "heartbeat_lost_s is 0.35 s and has to be at least twice heartbeat_s, 0.4 s"),
-        ({"encoder_period_s": 0.06}, "count_stale_s is 0.1 s and has to be at least twice encoder_period_s"),
+        ({"heartbeat_s": 0.3}, "heartbeat_lost_s is 0.5 s and has to be at least twice heartbeat_s, 0.6 s"),
+        ({"encoder_period_s": 0.11}, "count_stale_s is 0.2 s and has to be at least twice encoder_period_s"),
         ({"channel": "can0"}, "has to be a multicast address"),
         ({"channel": "192.0.2.1"}, "has to be a multicast address"),
         ({"interface": "socketcan"}, "has to be the name of a network interface, such as can0"),

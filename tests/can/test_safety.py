@@ -39,8 +39,9 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         assert not gate.fired
         await rig.io.start()
         await rig.ready()
+        await rig.until(lambda: gate.read(0x1001) == 0)
         assert gate.output == 0
-        assert gate.read(0x1001) == 0
+        assert not gate.fired
         assert [text.split(" before")[0] for text in rig.io.faults] == ["shot 1: the gate was lost"]
 
     on_bus(scenario, safe_output=0b101)
@@ -260,6 +261,21 @@ def test_a_bug_is_logged_and_does_not_end_the_driver(on_bus, monkeypatch, caplog
             await rig.until(lambda: "the CAN driver failed" in rig.io.why_not_ready)
         await rig.until(lambda: rig.io.ready)
         assert "ZeroDivisionError" in caplog.text
+
+    on_bus(scenario)
+
+
+def test_a_station_that_falls_ill_during_the_bring_up_ends_it_and_blames_nobody(on_bus):
+    async def scenario(rig):
+        rig.faults.set("gate_silent")
+        rig.io.renew_health(40)
+        await rig.until(lambda: rig.io._link)
+        rig.io.renew_health(0)
+        await rig.until(lambda: rig.io._link is None)
+        assert rig.io.faults == ()
+        assert "bring_up_failures" not in rig.io.counters
+        rig.faults.clear()
+        await rig.ready()
 
     on_bus(scenario)
 

@@ -8,7 +8,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -252,7 +252,7 @@ class Plc:
         answer = await self._client.read_input_registers(group.address, count=group.words)
         return self._decoded(group.registers, group.address, answer.registers)
 
-    def _decoded(self, registers: Any, start: int, words: list[int]) -> dict[str, Any]:
+    def _decoded(self, registers: Any, start: int, words: Sequence[int]) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for register in registers:
             value = decode(register, words[register.address - start : register.end - start], self._order)

@@ -2,6 +2,7 @@
 
 import asyncio
 import signal
+from typing import Any
 
 import pytest
 
@@ -325,7 +326,7 @@ def test_commands_are_carried_out_once(cell):
             station, plc = made.station, await made.plc()
             await plc.wait("online")
 
-            async def order(code: int, argument: int, sequence: int) -> dict[str, object]:
+            async def order(code: int, argument: int, sequence: int) -> dict[str, Any]:
                 await plc.set(
                     "execute_command", command_code=code, command_argument=argument, command_sequence=sequence
                 )

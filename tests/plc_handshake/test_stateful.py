@@ -507,6 +507,27 @@ class Handshake(RuleBasedStateMachine):
         self.trigger(armed=True, link=True)
         self.everything_arrives()
 
+    @rule(restarted=st.booleans())
+    def station_dies_over_a_fruit_and_then_the_interface(self, restarted: bool) -> None:
+        self.whole_cycle()
+        self.station_dies()
+        self.time_passes(1.1, beats=False)
+        if restarted:
+            self.station_restarts()
+        self.interface_restarts()
+
+    @rule(passed_s=st.sampled_from([0.0, 0.45, 1.1]), interface=st.booleans())
+    def begun_is_lost(self, passed_s: float, interface: bool) -> None:
+        """The station has begun; its answer never comes."""
+        self.heal()
+        self.trigger(armed=True, link=True)
+        while self.to_station:
+            self.serve(self.to_station.pop(0))
+        self.answers.clear()
+        self.time_passes(passed_s, beats=True)
+        if interface:
+            self.interface_restarts()
+
     @precondition(lambda self: self.station.up)
     @rule()
     def station_dies(self) -> None:
@@ -564,6 +585,7 @@ class Handshake(RuleBasedStateMachine):
             self.acknowledge(by_bit=False)
             self.heal()
         assert not self.bit("result_valid")
+        assert self.state.unlisted == 0
         assert self.state.queue == self.state.journal.verdicts == self.state.journal.hidden == ()
         shown_ids = [block["result_trigger_id"] for block in self.shown.values()]
         assert sorted(shown_ids) == sorted(self.accepted)
@@ -579,7 +601,7 @@ class Handshake(RuleBasedStateMachine):
 
 TestHandshake = Handshake.TestCase
 TestHandshake.settings = settings(
-    max_examples=150,
+    max_examples=80,
     stateful_step_count=40,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],

@@ -131,11 +131,82 @@ def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     made.feed(ev.BeginAnswered, 1, Begun(sequence=41, deadline_s=1.0))
     assert made.state.running is None
     actions = made.link(Open(running=(41, 7), outcomes=()))
-    told = [action for action in actions if isinstance(action, do.TellPublished | do.TellAcknowledged)]
-    assert [type(action) for action in told] == [do.TellPublished, do.TellAcknowledged]
-    assert (told[0].outcome.sequence, told[0].outcome.outcome) == (41, "NO_RESULT")
+    told, taken = [action for action in actions if not isinstance(action, do.Keep | do.Say)]
+    assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.TellAcknowledged(41))
     assert view(made.state)["result_sequence"] == 0
     assert made.state.journal.acknowledged == 41
+
+
+def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_online(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(refusal=Refusal.BUSY))
+    assert (made.state.last_refusal, made.state.link) == (Refusal.BUSY, Link.UP)
+    made.feed(ev.OpenTold, made.state.open_asked, Open(running=(41, 6), outcomes=()))
+    assert [action.outcome.sequence for action in made.of(do.TellPublished)] == [41]
+    assert (made.state.queue, made.state.journal.acknowledged) == ((), 41)
+
+
+def test_the_answer_to_another_begin_accepts_nothing(bench):
+    made = bench()
+    made.armed("buffer_results")
+    made.write("enable", "trigger", trigger_id=7)
+    first = made.state.asked.number
+    made.feed(ev.BeginFailed, first)
+    made.link()
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=8)
+    made.feed(ev.BeginAnswered, first, Begun(sequence=41, deadline_s=1.0))
+    assert (made.state.running, made.state.asked.trigger_id, made.state.stale) == (None, 8, 1)
+
+
+def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.RequestFailed, "a note was lost")
+    made.feed(ev.Beat, made.station_state())
+    asked_before = made.state.open_asked
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.OpenTold, asked_before, Open(running=None, outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
+    made.link(Open(running=(41, 7), outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
+
+
+def test_what_is_hidden_is_acknowledged_only_behind_what_still_waits(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeCame, made.outcome())
+    made.write("enable", "buffer_results")
+    made.write("enable", "buffer_results", "trigger", trigger_id=8)
+    made.feed(ev.BeginFailed, made.state.asked.number)
+    made.link(Open(running=(42, 8), outcomes=made.state.queue))
+    assert (made.state.journal.hidden, made.of(do.TellAcknowledged)) == ((42,), [])
+    made.write("enable", acknowledged_sequence=41)
+    assert [action.sequence for action in made.of(do.TellAcknowledged)] == [41, 42]
+    assert made.state.journal.hidden == ()
+
+
+def test_a_trigger_that_a_restart_interrupts_is_refused_and_what_it_began_is_never_shown(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    again = bench(made.of(do.Keep)[-1].journal)
+    assert (again.state.last_refusal, again.state.last_refused_id) == (Refusal.STATION_LOST, 7)
+    again.link(Open(running=(41, 7), outcomes=()))
+    assert (again.state.queue, again.state.running, again.state.journal.acknowledged) == ((), None, 41)
+
+
+def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench):
+    made = bench()
+    made.run()
+    made.now_s += 1.5
+    made.feed(ev.Tick)
+    assert Signal.RESULT_DEADLINE not in made.state.timers
+    told = made.link(Open(running=(41, 7), outcomes=()))
+    assert [action.outcome for action in told if isinstance(action, do.TellPublished)] == list(made.state.queue)
 
 
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):

@@ -120,27 +120,29 @@ def laid_out(members: list[tuple[str, str, int]]) -> tuple[dict[str, int], int]:
     return offsets, at
 
 
-def l5x_members(name):
+def inside(element: ET.Element, path: str) -> ET.Element:
+    found = element.find(path, {"p": PLCOPEN})
+    assert found is not None, path
+    return found
+
+
+def l5x_members(name: str) -> list[tuple[str, str, int]]:
     root = ET.fromstring(studio_5000().encode())
     assert root.get("TargetName") == "FruitStation"
-    data_type = root.find(f".//DataType[@Name='FruitStation_{name}']")
-    assert data_type is not None
-    return [(m.get("Name"), m.get("DataType"), int(m.get("Dimension")) or 1) for m in data_type.iter("Member")]
+    data_type = inside(root, f".//DataType[@Name='FruitStation_{name}']")
+    return [(m.attrib["Name"], m.attrib["DataType"], int(m.attrib["Dimension"]) or 1) for m in data_type.iter("Member")]
 
 
-def plcopen_members(name):
-    space = {"p": PLCOPEN}
-    root = ET.fromstring(codesys().encode())
-    data_type = root.find(f".//p:dataType[@name='FruitStation_{name}']", space)
-    assert data_type is not None
+def plcopen_members(name: str) -> list[tuple[str, str, int]]:
+    data_type = inside(ET.fromstring(codesys().encode()), f".//p:dataType[@name='FruitStation_{name}']")
     members = []
-    for variable in data_type.findall("p:baseType/p:struct/p:variable", space):
-        (kind,) = variable.find("p:type", space)
+    for variable in inside(data_type, "p:baseType/p:struct"):
+        (kind,) = inside(variable, "p:type")
         count = 1
         if kind.tag.endswith("array"):
-            count = int(kind.find("p:dimension", space).get("upper")) + 1
-            (kind,) = kind.find("p:baseType", space)
-        members.append((variable.get("name"), kind.tag.rpartition("}")[2], count))
+            count = int(inside(kind, "p:dimension").attrib["upper"]) + 1
+            (kind,) = inside(kind, "p:baseType")
+        members.append((variable.attrib["name"], kind.tag.rpartition("}")[2], count))
     return members
 
 

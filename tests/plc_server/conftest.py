@@ -36,7 +36,7 @@ class Serving:
         self.server: ModbusServer
         self.loop = asyncio.new_event_loop()
         self.again: asyncio.Handle | None = None
-        self._thread = threading.Thread(target=self.loop.run_forever, name="modbus server")
+        self._thread = threading.Thread(target=self.loop.run_forever, name="modbus server", daemon=True)
 
     def start(self) -> None:
         self._thread.start()
@@ -189,8 +189,8 @@ def connect(serve: Callable[..., Serving]) -> Iterator[Callable[..., Wire]]:
     """Open connections; they are closed after the test."""
     wires: list[Wire] = []
 
-    def open_(serving: Serving, source: str = "127.0.0.1") -> Wire:
-        wires.append(Wire(serving.settings.port, source=source))
+    def open_(serving: Serving, source: str = "127.0.0.1", port: int | None = None) -> Wire:
+        wires.append(Wire(port or serving.settings.port, source=source))
         return wires[-1]
 
     yield open_

@@ -120,20 +120,24 @@ class TestTime:
         assert [line for line in caplog.messages if line.startswith("127.0.0.9:") and "no whole request" in line]
 
     def test_half_a_request_at_the_end_of_a_segment_has_its_own_time(self, serve, connect, eventually):
-        serving = serve(frame_timeout_s=0.5)
+        serving = serve(frame_timeout_s=2.0)
         wire = connect(serving)
-        whole = wire.request(READ)
-        wire.send(whole[:5])
+        begun = wire.request(READ)
+        wire.send(begun[:5])
 
         def go_on():
-            wire.send(whole[5:] + whole[:5])
-            return wire.receive()[2] == GOOD and serving.server.statistics.requests > 40
+            nonlocal begun
+            following = wire.request(READ)
+            wire.send(begun[5:] + following[:5])
+            begun = following
+            assert wire.receive() == (wire.transaction - 1, 1, GOOD)
+            return serving.server.statistics.requests > 120
 
         eventually(go_on)
         assert not serving.server.statistics.troubles
 
     def test_the_idle_are_parted_from(self, serve, connect, eventually):
-        serving = serve(idle_timeout_s=1.0)
+        serving = serve(idle_timeout_s=2.0)
         idle, plc = connect(serving, "127.0.0.9"), connect(serving)
         eventually(lambda: plc.ask(READ) == GOOD and serving.server.statistics.troubles[Trouble.IDLE])
         assert idle.is_closed()

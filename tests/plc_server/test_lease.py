@@ -119,7 +119,8 @@ class TestOnTheWire:
         eventually(lost)
         assert plc.write(TRIGGER_ID, 7)[0] == 16
 
-    def test_a_writer_whose_old_connection_hangs_takes_over(self, serve, connect, eventually):
+    def test_a_writer_whose_old_connection_hangs_takes_over(self, serve, connect, eventually, monkeypatch):
+        monkeypatch.setattr("plc_interface.modbus.lease.SILENCE_S", 3.0)  # time enough for a machine that is busy
         serving = serve()
         hanging, back = connect(serving), connect(serving)
         hanging.claim()

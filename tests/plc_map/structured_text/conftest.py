@@ -11,12 +11,15 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import pytest
-from blark import transform as tree
+from blark import transform
 from blark.parse import parse_source_code
 
 from plc_interface.codec import WordOrder, decode, encode
 from plc_interface.generate.structured_text import data_types, example, function_block
 from plc_interface.register_map import BY_NAME, CONTROL, RESULT, STATUS
+
+tree: Any = transform
+"""Its classes are made by decorators that hide their fields from the type checker."""
 
 RANGES = {
     "UINT": (0, 2**16 - 1),

@@ -140,6 +140,21 @@ def test_a_pass_that_comes_with_a_dead_heartbeat_is_not_used(plc):
     assert not plc.block["busy"]
 
 
+def test_after_a_lost_heartbeat_a_held_inspect_triggers_nothing(plc):
+    plc.accepted()
+    plc.station.beating = False
+    plc.scan(205)
+    plc.station.beating = True
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(20, fruit_id=8)
+    assert plc.block["alive"]
+    assert (plc.block["busy"], plc.block["done"]) == (False, False)
+    assert "trigger" not in plc.control()
+    plc.scan(3, inspect=False)
+    plc.scan(inspect=True)
+    assert "trigger" in plc.control()
+
+
 def test_a_lost_link_is_a_lost_heartbeat_and_one_lost_exchange_is_not(plc):
     plc.accepted()
     plc.scan(connected=False)
@@ -341,7 +356,7 @@ def play(plc, what, number, sequence):
 
 
 @given(STEPS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_whatever_comes_only_the_asked_fruits_own_whole_result_passes(make_plc_for_examples, steps):
     plc = make_plc_for_examples()
     plc.scan(3)

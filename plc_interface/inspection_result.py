@@ -1,0 +1,72 @@
+"""The result block as a client sees it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from plc_interface.register_map import BY_NAME
+
+
+@dataclass(frozen=True, slots=True)
+class InspectionResult:
+    """One inspection's outcome, as read from the result block."""
+
+    sequence: int
+    trigger_id: int
+    outcome: str
+    """PASS, FAIL or NO_RESULT."""
+    flags: frozenset[str]
+    """Of `pass`, `area_valid`, `late`, `partial`, `simulated`."""
+    reasons: frozenset[str]
+    """Empty only for PASS; the bits' names of `result_reasons`."""
+    area_mm2: float | None
+    """To a hundredth; None where nothing valid was measured."""
+    area_px: int | None
+    closing_mm: float | None
+    """To a hundredth."""
+    confidence_pct: int | None
+    recipe: int
+    recipe_checksum: int
+    ended_utc_ms: int
+    duration_ms: int
+    encoder: int
+    lot_checksum: int
+
+    @property
+    def passed(self) -> bool:
+        """The fruit may go on: PASS without a flag that says otherwise. A simulated result counts as its outcome."""
+        return self.outcome == "PASS" and "pass" in self.flags and "late" not in self.flags
+
+
+def result_shown(block: Mapping[str, Any]) -> InspectionResult | None:
+    """The result in one read of status and result block, by register names; None where none is shown, or read torn.
+
+    Args:
+        block: decoded values, None where a register says that there is none.
+    """
+    sequence = block["result_sequence"]
+    if "result_valid" not in BY_NAME["status"].names(block["status"]):
+        return None
+    if sequence == 0 or sequence != block["result_sequence_again"]:
+        return None
+    return InspectionResult(
+        sequence=sequence,
+        trigger_id=block["result_trigger_id"],
+        outcome=BY_NAME["result_outcome"].codes[block["result_outcome"]].name,
+        flags=BY_NAME["result_flags"].names(block["result_flags"]),
+        reasons=BY_NAME["result_reasons"].names(block["result_reasons"]),
+        area_mm2=_hundredth(block["result_area_mm2_x100"]),
+        area_px=block["result_area_px"],
+        closing_mm=_hundredth(block["result_closing_mm_x100"]),
+        confidence_pct=block["result_confidence_pct"],
+        recipe=block["result_recipe"],
+        recipe_checksum=block["result_recipe_checksum"],
+        ended_utc_ms=block["result_ended_utc_ms"],
+        duration_ms=block["result_duration_ms"],
+        encoder=block["result_encoder"],
+        lot_checksum=block["result_lot_checksum"],
+    )
+
+
+def _hundredth(value: int | None) -> float | None:
+    return None if value is None else value / 100
