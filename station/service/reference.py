@@ -1,6 +1,5 @@
 """Whether a picture of the untouched gel may serve as the reference that everything is measured against."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -12,8 +11,8 @@ from station.inspection.alarm_table import AlarmId
 from station.service.keeping import Kept
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
-from station.vision.contact import Flag
-from station.vision.methods import make_method, median_image
+from station.vision.contact import Flag, Method
+from station.vision.methods import make_method
 
 _DETAIL_PX = (5.0, 15.0)
 """Between these two blurs lies what a lens shows and fog hides: structure of the light, above the pixels' noise."""
@@ -44,6 +43,15 @@ class Looks:
     """Root mean square of the light's change since the golden reference; 0 where there is none yet."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """A golden reference that others are compared with."""
+
+    shape: tuple[int, ...]
+    sharpness: float
+    method: Method
+
+
 class Golden:
     """The golden reference: the gel as it was when a person last saw that it was clean, kept in the home folder.
 
@@ -53,37 +61,50 @@ class Golden:
 
     def __init__(self, kept: Kept) -> None:
         self._kept = kept
+        self._prepared: tuple[bytes, Segmentation, Prepared] | None = None
 
-    def image(self) -> Image | None:
-        """The picture, shape (height, width, 3); None where there is none that can be read."""
-        data = self._kept.read(GOLDEN)
-        picture = None if data is None else cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-        return None if picture is None else np.asarray(picture, np.uint8)
-
-    def keep(self, images: Sequence[Image]) -> None:
-        """Make frames of the untouched gel the golden reference.
+    def prepared(self, segmentation: Segmentation) -> Prepared | None:
+        """The golden reference, ready to be compared with; None where there is none that can be read.
 
         Args:
-            images: of one shape (height, width, 3), dtype uint8, BGR.
+            segmentation: the recipe's method, which looks for a contact between it and another reference.
         """
-        self._kept.write(GOLDEN, cv2.imencode(".png", median_image(images))[1].tobytes())
+        data = self._kept.read(GOLDEN)
+        if data is None:
+            return None
+        if self._prepared is None or self._prepared[:2] != (data, segmentation):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+            if picture is None:
+                return None
+            image = np.asarray(picture, np.uint8)
+            self._prepared = (
+                data,
+                segmentation,
+                Prepared(image.shape, sharpness(image), make_method([image], segmentation)),
+            )
+        return self._prepared[2]
+
+    def keep_first(self, image: Image) -> None:
+        """Make a picture the golden reference where there is none yet.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8, BGR.
+        """
+        if self._kept.read(GOLDEN) is None:
+            self._kept.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
 
 
-def examine(
-    images: Sequence[Image], golden: Image | None, segmentation: Segmentation, settings: ReferenceSettings
-) -> Looks:
-    """Judge the frames that are to be a reference.
+def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) -> Looks:
+    """Judge what is to be a reference.
 
     Args:
-        images: the frames, taken with nothing touching the gel.
-        golden: the golden reference, of the frames' shape; None where there is none yet.
-        segmentation: the recipe's method, which looks for a contact between the golden reference and this one.
+        image: the median of frames taken with nothing touching the gel, shape (height, width, 3), dtype uint8.
+        golden: the golden reference; None where there is none yet.
         settings: what is good enough.
 
     Raises:
         BadReferenceError: it cannot serve.
     """
-    image = median_image(images)
     saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
     if saturated > settings.saturated_share:
         raise BadReferenceError(
@@ -94,9 +115,9 @@ def examine(
     detail = sharpness(image)
     if golden is None or golden.shape != image.shape:
         return Looks(detail, saturated, 0.0)
-    contact = make_method([golden], segmentation).measure(image)
+    contact = golden.method.measure(image)
     drift = contact.drift_levels or 0.0
-    share = detail / sharpness(golden)
+    share = detail / golden.sharpness
     if share < settings.least_sharpness:
         raise BadReferenceError(
             AlarmId.CAMERA_DIRTY,
