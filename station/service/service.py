@@ -220,19 +220,20 @@ class Service:
     def refused(self, state: State, event: Event) -> None:
         """Count what the table does not list; a trigger among it is answered."""
         self._metrics.unexpected()
-        if event is Event.TRIGGER and self._pending is not None:
+        if event is Event.TRIGGER and self._pending is not None and not self._pending.is_answered:
             self._pending.answer(self._refused(STATES[state].refusal or Refusal.NOT_READY))
 
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Keep the phases' times, and what hangs on a state."""
         self._told_late = None
-        if self._now is not None and STATES[after].refusal is Refusal.BUSY:
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY and after is not State.ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state is not State.ACCEPTING
         self._crew.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
+            self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
         if state is State.STOPPED and self.reset_wanted and not self.stop_asked:
             self.conductor.post(Event.RESET)
@@ -301,7 +302,8 @@ class Service:
         if now.sequence is None:
             if pending.recording is not None:
                 pending.recording.cancel()  # which takes the record back
-            pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
+            if not pending.is_answered:
+                pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
             return
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
