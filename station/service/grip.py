@@ -152,14 +152,14 @@ class Grip:
         expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
         widest_mm = self._cell.gripper.max_width_mm
         seen_mm, _ = await self._search(min(expected.largest_mm, widest_mm), step_mm, touches, one_ahead=True)
-        await self.close_to(min(seen_mm + step_mm, widest_mm))
-        from_mm = min(seen_mm + step_mm, widest_mm) - FINEST_STEP_MM
-        while True:
+        from_mm, before = seen_mm, None
+        while before is None and from_mm < widest_mm:  # back to where nothing touches, however faintly it began
+            from_mm = min(from_mm + step_mm, widest_mm)
             seen_mm, before = await self._search(from_mm, FINEST_STEP_MM, touches, one_ahead=False)
-            start = await self.step(0, seen_mm)
-            if await touches(start):
-                return before, start
-            from_mm = seen_mm - FINEST_STEP_MM
+        while not await touches(start := await self.step(0, seen_mm)):
+            seen_mm, nearer = await self._search(seen_mm - FINEST_STEP_MM, FINEST_STEP_MM, touches, one_ahead=False)
+            before = nearer or before
+        return before, start
 
     async def _search(
         self, from_mm: float, stride_mm: float, touches: Touches, *, one_ahead: bool

@@ -36,6 +36,7 @@ class Inspector:
         self._alarms, self._metrics = alarms, metrics
         self._reached: MoveResult | None = None
         self._glanced: Seen | None = None
+        self._examining: asyncio.Future[bool] | None = None
 
     async def open_jaws(self) -> Event:
         """Let go of whatever is held."""
@@ -68,24 +69,30 @@ class Inspector:
         frames = await self._grip(now).sound_frames(recipe.imaging.reference_frames)
         self._crew.watches[CAMERA].heard()
         now.reference_s = frames[-1].captured_s
+        self._examining = asyncio.ensure_future(self._examine(now, frames))
+        return Event.REFERENCE_TAKEN
+
+    async def approach(self, now: Inspection) -> Event:
+        """Bring the open jaws to the fruit, while the reference is examined."""
+        await self._grip(now).go("above_nest", "nest")
+        good = self._examining is not None and await self._examining
+        return Event.ARRIVED if good else Event.REFERENCE_BAD
+
+    async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
+        """Whether the frames may serve as the reference; tells why not."""
         try:
-            image, looks = await self._eye.take_reference(frames, recipe.segmentation)
+            image, looks = await self._eye.take_reference(frames, now.active.recipe.segmentation)
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, str(error))
             self._alarms.raise_(error.alarm, str(error))
-            return Event.REFERENCE_BAD
+            return False
         now.reference_image = Image("reference", None, image)
         for alarm in ALARMS:
             self._alarms.clear(alarm)
         self._metrics.reference(0.0, looks.drift_levels)
         now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
-        return Event.REFERENCE_TAKEN
-
-    async def approach(self, now: Inspection) -> Event:
-        """Bring the open jaws to the fruit."""
-        await self._grip(now).go("above_nest", "nest")
-        return Event.ARRIVED
+        return True
 
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""

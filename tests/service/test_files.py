@@ -1,7 +1,6 @@
 """What the home folder keeps: the last good form of every file, whole after a crash in the middle of writing."""
 
 import json
-import os
 
 import pytest
 
@@ -66,6 +65,6 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path):
     assert (tmp_path / "a" / "b.json").stat().st_ino == before, "nothing is written where nothing changes"
     assert kept.write("a/b.json", b"second")
     assert kept.read("a/b.json") == b"second"
-    assert os.listdir(tmp_path / "a") == ["b.json"]
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["b.json"]
     (tmp_path / "file").write_bytes(b"")
     assert not kept.write("file/inside", b"x")
