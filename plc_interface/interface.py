@@ -86,6 +86,7 @@ class Interface:
         self._inputs = replace(self._inputs, **known)
         count = self._output.encoder_count()
         inputs = self._inputs if count is None else replace(self._inputs, encoder=count)
+        self._tell_output()
         self.feed(ev.PlcWrote(now(), inputs, frozenset(known)))
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:
@@ -111,7 +112,13 @@ class Interface:
             self._carry_out(action)
         if isinstance(event, ev.Beat) and self._state.link is Link.UP and event.station.healthy:
             self._output.renew_health(self._settings.station_lost_after_s)
+        if isinstance(event, ev.Beat):
+            self._tell_output()
         self._wake_when_due()
+
+    def _tell_output(self) -> None:
+        if self._output.ready != self._state.diverts:
+            self.feed(ev.OutputTold(now(), self._output.ready))
 
     def _show(self) -> None:
         values = view(self._state) | self._server_counts()

@@ -3,14 +3,25 @@
 import asyncio
 import logging
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Protocol
 
-from plc_interface.can.errors import LineIoError
+from plc_interface.can.counts import ahead
+from plc_interface.can.errors import (
+    EchoMissingError,
+    InterfaceError,
+    LineIoError,
+    NotReadyError,
+    ShotLostError,
+    ShotRefusedError,
+)
 from plc_interface.can.line_io import LineIo
+from plc_interface.shot_file import ShotFile
 from station.channel.line import Outcome
 from station.settings.can import CanSettings
 
 REJECTS_LANE = 1
+_RETRY_S = 0.05
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +54,11 @@ class LineOutput(Protocol):
         ...
 
     @property
+    def ready(self) -> bool:
+        """Whether a fruit can be diverted; where not, none is begun."""
+        ...
+
+    @property
     def faults(self) -> tuple[str, ...]:
         """One sentence each."""
         ...
@@ -56,6 +72,7 @@ class LineOutput(Protocol):
 class NoOutput:
     """The line's PLC diverts."""
 
+    ready = True
     faults: tuple[str, ...] = ()
     counters: Mapping[str, int] = {}
 
@@ -88,17 +105,34 @@ class NoOutput:
 
 
 class RejectGate:
-    """Everything that is not PASS is shot into the rejects' lane, at the count at which it reaches the gate."""
+    """Everything that is not PASS is shot into the rejects' lane, at the count at which it reaches the gate.
 
-    def __init__(self, settings: CanSettings) -> None:
-        self._io = LineIo(settings)
+    A shot is ordered again whenever the gate, the bus or this process was lost, as long as its count lies ahead: the
+    gate takes an order that it has for the same one, and fires none that is past.
+    """
+
+    def __init__(self, settings: CanSettings, folder: Path) -> None:
+        """Take over the shots that the run before still had to fire.
+
+        Args:
+            settings: the bus, and the way from the nest to the gate.
+            folder: of the journal.
+        """
+        self._io, self._distance = LineIo(settings), settings.distance_counts
+        self._file = ShotFile(folder)
+        self._due = self._file.read()
         self._shots: set[asyncio.Task[None]] = set()
-        self.start = self._io.start
         self.renew_health = self._io.renew_health
         self.acknowledge_faults = self._io.acknowledge_faults
 
+    async def start(self) -> None:
+        """Begin to bring the bus up, and order what is still to be fired."""
+        await self._io.start()
+        for sequence, at_count in self._due.items():
+            self._order(sequence, at_count)
+
     async def stop(self) -> None:
-        """Stop the heartbeat: the gate puts out its safe output. Shots ordered before stay the gate's."""
+        """Stop the heartbeat: the gate puts out its safe output. What is not fired is ordered by the next run."""
         for shot in self._shots:
             shot.cancel()
         await asyncio.gather(*self._shots, return_exceptions=True)
@@ -110,16 +144,49 @@ class RejectGate:
         Args:
             outcome: with the encoder's count at its trigger.
         """
-        if outcome.outcome != "PASS":
-            shot = asyncio.create_task(self._divert(outcome), name=f"shot {outcome.sequence}")
-            self._shots.add(shot)
-            shot.add_done_callback(self._shots.discard)
+        if outcome.outcome != "PASS" and outcome.sequence not in self._due:
+            self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
+            self._file.write(self._due)
+            self._order(outcome.sequence, at_count)
 
-    async def _divert(self, outcome: Outcome) -> None:
-        try:
-            await self._io.divert(outcome.sequence, REJECTS_LANE, self._io.count_at_gate(outcome.encoder))
-        except LineIoError as error:
-            log.warning("inspection %d was not diverted by CAN: %s", outcome.sequence, error)
+    def _order(self, sequence: int, at_count: int) -> None:
+        shot = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
+        self._shots.add(shot)
+        shot.add_done_callback(self._shots.discard)
+
+    async def _divert(self, sequence: int, at_count: int) -> None:
+        said = ""
+        while not self._is_too_far(sequence, at_count):
+            try:
+                await self._io.divert(sequence, REJECTS_LANE, at_count)
+            except (NotReadyError, InterfaceError, EchoMissingError, ShotLostError) as error:
+                if said != (said := type(error).__name__):
+                    log.warning("inspection %d: %s; its shot is ordered until its count is past", sequence, error)
+                await asyncio.sleep(_RETRY_S)
+                continue
+            except LineIoError as error:
+                log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
+            break
+        del self._due[sequence]
+        self._file.write(self._due)
+
+    def _is_too_far(self, sequence: int, at_count: int) -> bool:
+        count = self._io.encoder_count()
+        if count is None or ahead(count.value, at_count) <= self._distance:
+            return False
+        error = ShotRefusedError(
+            sequence,
+            f"count {at_count} lies further ahead than the way from the nest to the gate, the belt is at "
+            f"{count.value}: the encoder was set anew, or not known at the trigger; look at the fruit",
+        )
+        log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
+        self._io.give_up(error)
+        return True
+
+    @property
+    def ready(self) -> bool:
+        """Whether what is not PASS would be diverted."""
+        return self._io.ready
 
     def encoder_count(self) -> int | None:
         """The count that the encoder on the bus said last."""
@@ -128,8 +195,8 @@ class RejectGate:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Of the bus, its nodes and recent shots."""
-        return self._io.faults
+        """Of the bus, its nodes and recent shots, each named as CAN's."""
+        return tuple(f"CAN: {fault}" for fault in self._io.faults)
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -137,6 +204,11 @@ class RejectGate:
         return {f"can_{name}": count for name, count in self._io.counters.items()}
 
 
-def make_output(settings: CanSettings) -> LineOutput:
-    """The outputs that the settings name."""
-    return RejectGate(settings) if settings.enabled else NoOutput()
+def make_output(settings: CanSettings, folder: Path) -> LineOutput:
+    """The outputs that the settings name.
+
+    Args:
+        settings: of the line's CAN.
+        folder: the journal's, where shots are kept.
+    """
+    return RejectGate(settings, folder) if settings.enabled else NoOutput()

@@ -41,7 +41,7 @@ async def serve(configuration: Configuration) -> None:
     modbus, handshake = configuration.modbus, configuration.handshake
     endpoint = line_endpoint(handshake, configuration.home)
     journal = JournalFile(configuration.home / JOURNAL_FOLDER)
-    output = make_output(configuration.can)
+    output = make_output(configuration.can, configuration.home / JOURNAL_FOLDER)
     image = RegisterImage(WordOrder(modbus.word_order))
     image.commit(
         {
@@ -62,7 +62,8 @@ async def serve(configuration: Configuration) -> None:
         await output.start()
         feeding = asyncio.create_task(feed_watchdog(lambda: True))
         notify("READY=1")
-        log.info("Modbus TCP is served on %s, port %d, unit %d", modbus.host, modbus.port, modbus.unit)
+        tls = f", with TLS on port {modbus.tls.port}" if modbus.tls.enabled else ""
+        log.info("Modbus TCP is served on %s, port %d%s, unit %d", modbus.host, modbus.port, tls, modbus.unit)
         await ended.wait()
         log.info("told to end: the PLC reads offline, then its connection closes")
         interface.leave()
@@ -77,10 +78,11 @@ async def serve(configuration: Configuration) -> None:
 
 
 def log_to_stderr() -> None:
-    """One line an event, with its time in UTC and its place; what pymodbus has to say is said by our own server."""
+    """One line an event, with its time in UTC and its place; what the libraries have to say, our own parts say."""
     handler = logging.StreamHandler(sys.stderr)
     formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+    for library in ("pymodbus", "can", "canopen"):
+        logging.getLogger(library).setLevel(logging.CRITICAL)

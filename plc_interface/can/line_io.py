@@ -24,6 +24,7 @@ from plc_interface.can.errors import (
     LineIoError,
     NodeLostError,
     NotReadyError,
+    ShotError,
     ShotRefusedError,
 )
 from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
@@ -107,6 +108,10 @@ class LineIo:
         """What is wrong with the bus, its nodes and recent shots, one sentence each."""
         trouble = (self._trouble,) if self._trouble else ()
         return (*trouble, *self._emergencies.values(), *self._shots.faults)
+
+    def give_up(self, error: ShotError) -> None:
+        """Count a shot that is not ordered at all, and keep it as a fault."""
+        self._shots.blame(error)
 
     def acknowledge_faults(self) -> None:
         """Forget the faults of shots; those of the bus and its nodes go when their cause goes."""

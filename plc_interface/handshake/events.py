@@ -71,6 +71,14 @@ class Beat:
 
 
 @dataclass(frozen=True, slots=True)
+class OutputTold:
+    """Whether the line's output can divert a fruit now."""
+
+    at: Moment
+    ready: bool
+
+
+@dataclass(frozen=True, slots=True)
 class BeginAnswered:
     """The station's answer to `AskBegin` with this number."""
 
@@ -162,6 +170,7 @@ Event = (
     | WriterWent
     | Tick
     | Beat
+    | OutputTold
     | BeginAnswered
     | BeginFailed
     | OutcomeCame

@@ -14,6 +14,7 @@ from plc_interface.handshake.events import (
     OutcomeCame,
     OutcomeFailed,
     OutcomeNoted,
+    OutputTold,
     PlcWrote,
     RequestFailed,
     Tick,
@@ -53,6 +54,10 @@ def _writer_went(work: Work, _event: WriterWent) -> None:
 def _beat(work: Work, event: Beat) -> None:
     same = event.station.boot == work.state.last_boot
     work.signals.append(Signal.STATION_ANSWERED if same else Signal.STATION_RESTARTED)
+
+
+def _output_told(work: Work, event: OutputTold) -> None:
+    work.state.diverts = event.ready
 
 
 def _outcome_came(work: Work, event: OutcomeCame) -> None:
@@ -175,6 +180,7 @@ _TAKERS: dict[type, Callable[[Work, Any], None]] = {
     WriterWent: _writer_went,
     Tick: lambda _work, _event: None,
     Beat: _beat,
+    OutputTold: _output_told,
     BeginAnswered: _begin_answered,
     BeginFailed: _begin_answered,
     OutcomeCame: _outcome_came,

@@ -95,6 +95,10 @@ class State:
     open_asked: int | None = None
     """The number of `AskOpen` that is not answered."""
 
+    # the line
+    diverts: bool = True
+    """Whether the line's output can divert a fruit; where it cannot, none is begun."""
+
     # inspections
     asked: Asked | None = None
     running: Running | None = None

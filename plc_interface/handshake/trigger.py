@@ -13,6 +13,7 @@ def obstacle(state: State) -> Refusal | None:
         (state.service is Service.OFFLINE, Refusal.OFFLINE),
         (state.link is not Link.UP, Refusal.STATION_LOST),
         (state.arming is not Arming.ARMED, Refusal.NOT_ENABLED),
+        (not state.diverts, Refusal.NOT_READY),
         (state.inspection is not Inspection.NONE, Refusal.BUSY),
         (waiting >= state.places, Refusal.QUEUE_FULL),
         (state.order is Order.EXECUTING and state.command_changes_recipe, Refusal.RECIPE_CHANGING),

@@ -126,6 +126,25 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell):
     asyncio.run(scenario())
 
 
+def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventually):
+    """An interface that this machine does not have: told to the station, and every trigger is refused."""
+
+    async def scenario():
+        async with cell(can_enabled=True, can_interface="socketcan", can_channel="nocan7") as made:
+            station, plc = made.station, await made.plc()
+            await plc.wait("online")
+            await plc.write(control=0)
+            await plc.set("enable")
+            await eventually(lambda: station.lines[-1].faults)
+            (fault,) = station.lines[-1].faults
+            assert fault.startswith("CAN: the CAN interface socketcan nocan7 cannot be opened")
+            seen = await plc.trigger(1)
+            assert (seen["last_refusal"], "trigger_ready" in seen["status"]) == ("not_ready", False)
+            assert station.begun == {}
+
+    asyncio.run(scenario())
+
+
 def test_eight_results_wait_and_none_is_dropped(cell):
     async def scenario():
         async with cell() as made:

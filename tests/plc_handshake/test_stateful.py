@@ -500,6 +500,10 @@ class Handshake(RuleBasedStateMachine):
         if self.station.up:
             self.feed(ev.Beat(self.at(), self.station.state()))
 
+    @rule(ready=st.booleans())
+    def output_told(self, ready: bool) -> None:
+        self.feed(ev.OutputTold(self.at(), ready))
+
     @rule()
     def whole_cycle(self) -> None:
         """A good moment, so that what follows starts somewhere interesting."""
@@ -559,6 +563,7 @@ class Handshake(RuleBasedStateMachine):
         """The station answers, the wire works, and time passes until the link is up."""
         if not self.station.up:
             self.station.restart()
+        self.output_told(ready=True)
         for _ in range(200):
             self.time_passes(0.1, beats=True)
             self.everything_arrives()

@@ -270,6 +270,27 @@ def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
     assert len(made.of(do.ClearFaults)) == 1
 
 
+def status(made):
+    word = view(made.state)["status"]
+    assert isinstance(word, int)
+    return BY_NAME["status"].names(word)
+
+
+def test_a_trigger_is_accepted_only_while_its_fruit_could_be_diverted(bench):
+    made = bench()
+    made.armed()
+    made.feed(ev.OutputTold, False)
+    made.write("enable", "trigger", trigger_id=7)
+    assert made.of(do.AskBegin) == []
+    assert made.state.last_refusal is Refusal.NOT_READY
+    assert "trigger_ready" not in status(made)
+    made.feed(ev.OutputTold, True)
+    assert "trigger_ready" in status(made)
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=7)
+    assert len(made.of(do.AskBegin)) == 1
+
+
 def test_timers_that_ran_out_together_go_in_a_fixed_order(bench):
     made = bench()
     made.run()

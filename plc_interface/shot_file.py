@@ -1,0 +1,49 @@
+"""The shots that are still to be fired, on the disk: fruit between the nest and the gate outlives the interface."""
+
+import json
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+_RANGE = 2**32
+
+
+class ShotFile:
+    """One file, replaced as a whole. It belongs to whoever holds the journal's lock."""
+
+    def __init__(self, folder: Path) -> None:
+        """Nothing is read or written yet.
+
+        Args:
+            folder: the journal's.
+        """
+        self._path, self._new = folder / "shots.json", folder / "shots.new"
+
+    def read(self) -> dict[int, int]:
+        """The counts at which flaps are to open, by sequence; none where the file is absent or damaged."""
+        try:
+            shots = {int(sequence): int(count) for sequence, count in json.loads(self._path.read_bytes()).items()}
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError, TypeError, AttributeError) as error:
+            log.error(  # noqa: TRY400 (the file is at fault, not the code)
+                "the shots in %s cannot be read (%s): look at the fruit between the nest and the gate",
+                self._path,
+                type(error).__name__,
+            )
+            return {}
+        return {sequence: count for sequence, count in shots.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
+
+    def write(self, shots: Mapping[int, int]) -> None:
+        """Replace the file. A failure is logged: the line goes on.
+
+        Args:
+            shots: as `read` gives them.
+        """
+        try:
+            self._new.write_text(json.dumps(shots))
+            self._new.replace(self._path)
+        except OSError as error:
+            log.error("the shots cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400
