@@ -24,7 +24,9 @@ def cell(settings_file, line_client):
     class Cell:
         def __init__(self):
             self.twin = self.start("twin", "--fruit", "blueberry", "--console", "0")
-            self.console = next(int(line.split(":")[1]) for line in self.twin.stdout if line.startswith("console"))
+            self.console = next(
+                int(line.split(":")[1]) for line in self.twin.stdout or () if line.startswith("console")
+            )
             self.started = [self.twin]
 
         def start(self, *arguments):
@@ -34,6 +36,8 @@ def cell(settings_file, line_client):
         def service(self):
             process = self.start("service", "--log", "json")
             self.started.append(process)
+            assert process.stdout is not None
+            assert process.stderr is not None
             assert any(line.startswith("running") for line in process.stdout), process.stderr.read()
             return process
 
