@@ -26,8 +26,6 @@ def cell(settings_file, line_client):
             self.twin = self.start("twin", "--fruit", "blueberry", "--console", "0")
             lines = self.twin.stdout or ()
             self.console = next(int(line.split(":")[1]) for line in lines if line.startswith("console"))
-                int(line.split(":")[1]) for line in self.twin.stdout or () if line.startswith("console")
-            )
             self.started = [self.twin]
 
         def start(self, *arguments):
