@@ -3,10 +3,14 @@
 import asyncio
 import contextlib
 from pathlib import Path
-from typing import Literal
+from typing import get_args
 
 import click
 
+from station.channel.client import ChannelClient
+from station.channel.line import CommandDone, Open, Resume
+from station.channel.messages import DeadlineError
+from station.channel.panel import Recover, RecoveryName
 from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
@@ -15,9 +19,11 @@ from station.devices.finding import Finding
 from station.devices.gripper.probe import probe_gripper
 from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.plc import line_endpoint
 
 _ARM_DEADLINE_S = 15.0
 _LEASE_S = 60.0
+_STATION_DEADLINE_S = 3.0
 _COLOURS = {"ok": "green", "warning": "yellow", "fault": "red"}
 
 
@@ -45,14 +51,14 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
         raise StationError(f"not usable: {', '.join(faulty)}")
 
 
-VERBS = ("protective-stop", "power", "program")
+VERBS = get_args(RecoveryName)
 
 
 @devices.command("recover")
 @click.argument("what", type=click.Choice(VERBS))
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 @click.option("--yes", is_flag=True, help="Do not ask: a person has looked.")
-def recover(what: Literal["protective-stop", "power", "program"], config: Path | None, yes: bool) -> None:  # noqa: FBT001
+def recover(what: RecoveryName, config: Path | None, yes: bool) -> None:  # noqa: FBT001
     """Bring the arm back after a stop, once a person has looked at the cell.
 
     protective-stop: confirm it and start the program again; power: power on and release the brakes, after an
@@ -64,7 +70,27 @@ def recover(what: Literal["protective-stop", "power", "program"], config: Path |
     click.echo("the arm is ready")
 
 
-async def _recover(configuration: Configuration, what: str) -> None:
+async def _recover(configuration: Configuration, what: RecoveryName) -> None:
+    if not await _recovered_by_the_station(configuration, what):
+        await _recover_alone(configuration, what)
+
+
+async def _recovered_by_the_station(configuration: Configuration, what: RecoveryName) -> bool:
+    """Ask the station's process, which holds the arm's registers while it runs; False where none runs."""
+    endpoint = line_endpoint(configuration.handshake, configuration.home)
+    async with ChannelClient(endpoint, "the station") as station:
+        try:
+            await station.ask(Resume(), Open, deadline_s=_STATION_DEADLINE_S)
+        except DeadlineError:
+            return False
+        deadline_s = configuration.arm.recovery_deadline_s + _STATION_DEADLINE_S
+        done = await station.ask(Recover(what=what), CommandDone, deadline_s=deadline_s)
+    if not done.done:
+        raise StationError(done.why)
+    return True
+
+
+async def _recover_alone(configuration: Configuration, what: RecoveryName) -> None:
     async with UrArm(configuration.arm) as arm:
         with contextlib.suppress(ArmFault):  # being not ready is what brings a person here
             await arm.ready(_ARM_DEADLINE_S)

@@ -87,9 +87,9 @@ class Action(StrEnum):
     ACCEPT_TRIGGER = "accept_trigger"
     """Answer the trigger: an inspection has begun. Its deadline starts."""
     TAKE_REFERENCE = "take_reference"
-    """REFERENCE_TAKEN or REFERENCE_BAD."""
+    """REFERENCE_TAKEN, also while it is still examined, or REFERENCE_BAD."""
     APPROACH = "approach"
-    """ARRIVED."""
+    """ARRIVED, or REFERENCE_BAD where that was found on the way."""
     CLOSE_TO_ONSET = "close_to_onset"
     """ONSET_FOUND or NO_ONSET."""
     CLOSE_STEP = "close_step"
@@ -246,7 +246,7 @@ ROWS: tuple[Row, ...] = (
     Row(PLACING, (E.PLACED,), S.RETREATING, (A.GO_HOME,)),
     Row((S.RETREATING,), (E.HOME,), S.CHECKING, (A.CHECK_DEVICES,)),
     # It cannot be judged, and the arm can still move: the fruit is let go where it is.
-    Row((S.REFERENCE,), (E.REFERENCE_BAD,), S.RECORDING_RELEASE, _NO_RESULT),
+    Row((S.REFERENCE, S.APPROACHING), (E.REFERENCE_BAD,), S.RECORDING_RELEASE, _NO_RESULT),
     Row((S.CLOSING_TO_ONSET,), (E.NO_ONSET,), S.RECORDING_RELEASE, _NO_RESULT),
     Row(BEFORE_LAST_IMAGE, (E.CAMERA_FAULT, E.STOP), S.RECORDING_RELEASE, _NO_RESULT),
     Row(UNJUDGED, (E.CALLED_OFF, E.RECORDS_FAULT, E.INTERNAL_FAULT), S.RECORDING_RELEASE, _NO_RESULT),

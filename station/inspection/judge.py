@@ -134,10 +134,11 @@ def early_stop(press: Press, recipe: Recipe) -> Finding | None:
     Returns:
         Why, with reason `EARLY_STOP`; None where the next step may be made.
     """
-    points, limits = Evidence(press, recipe).points, recipe.early_stop
+    evidence = Evidence(press, recipe)
+    points, limits = evidence.points, recipe.early_stop
     if not points:
         return None
-    last, growth = points[-1], Evidence(press, recipe).latest_growth
+    last, growth = points[-1], evidence.latest_growth
     place = f"No further step was made at {last.closing_mm:.1f} mm of closing"
     over = max(points, key=lambda point: point.area_mm2)
     if over.area_mm2 > limits.area_mm2:
@@ -153,7 +154,22 @@ def early_stop(press: Press, recipe: Recipe) -> Finding | None:
     if last.closing_mm >= limit_mm:
         sentence = f"{place}: that is the recipe's closing limit of {limit_mm:g} mm."
         return Finding(Reason.EARLY_STOP, sentence, last.closing_mm, limit_mm, last.closing_mm)
-    return None
+    return _hopeless(evidence, recipe, place)
+
+
+def _hopeless(evidence: Evidence, recipe: Recipe, place: str) -> Finding | None:
+    """Past the last damage threshold, whether a PASS is out of reach: then more closing can only hurt the fruit.
+
+    Without this a contact of which only a seed was seen would be pressed up to the gripper's force.
+    """
+    threshold, last = recipe.damage.area[-1], evidence.points[-1]
+    area = evidence.area_at(threshold.closing_mm)
+    if last.closing_mm < threshold.closing_mm or area is None:
+        return None
+    if area[0] - area[1] >= threshold.least_area_mm2 and all(evidence.bounds(point) for point in evidence.needed):
+        return None
+    sentence = f"{place}: what was measured by then cannot be trusted, so the fruit cannot pass any more."
+    return Finding(Reason.EARLY_STOP, sentence, area[0], threshold.least_area_mm2, threshold.closing_mm)
 
 
 def _void(press: Press, recipe: Recipe) -> Iterator[Finding]:
@@ -203,6 +219,12 @@ def _area(evidence: Evidence, threshold: AreaThreshold) -> Iterator[Finding]:
     elif area is not None and sum(area) > limit:
         sentence = f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be over the limit of {limit:g} mm²."
         yield Finding(Reason.AREA_OVER_LIMIT, sentence, area[0], limit, closing_mm)
+    elif area is not None and area[0] - area[1] < threshold.least_area_mm2:
+        sentence = (
+            f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be less than any fruit's, "
+            f"{threshold.least_area_mm2:g} mm²: not all of the contact was seen."
+        )
+        yield Finding(Reason.LOW_CONFIDENCE, sentence, area[0], threshold.least_area_mm2, closing_mm)
 
 
 def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:

@@ -5,6 +5,7 @@ import contextlib
 import time
 from collections.abc import Callable
 
+from station.channel.panel import RecoveryName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
 from station.devices.camera.interface import CameraError
@@ -27,6 +28,8 @@ STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SA
 _BAD_FRAMES = 3
 _STALE_LOOKS = 3
 """So often in a row a device may look ill before it counts: a moment's delay of this machine is no fault of its."""
+_ARM_PAUSE_S = 0.5
+"""The driver tries to reach the arm by itself, and is only asked."""
 _OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
@@ -65,7 +68,7 @@ class Crew:
             name: DeviceWatch(
                 name,
                 look,
-                configuration.service.retry_longest_s,
+                _ARM_PAUSE_S if name == ARM else configuration.service.retry_longest_s,
                 lambda fault, name=name: on_change(name, fault),
                 lambda name=name: on_progress(name),
             )
@@ -166,6 +169,26 @@ class Crew:
             quietly(self.cell.gripper.stop), quietly(self._arm.stop if self._arm is not None else lambda: None)
         )
 
+    async def recover(self, what: RecoveryName) -> None:
+        """Bring the arm back after a stop, as a person at the cell has asked for; nothing moves by it.
+
+        Args:
+            what: which stop the person has looked at.
+
+        Raises:
+            ArmFault: it could not be brought back.
+        """
+        if self._arm is None:
+            return
+        match what:
+            case "protective-stop":
+                await self._arm.confirm_protective_stop()
+            case "power":
+                await self._arm.power_on_and_release_brakes()
+            case "program":
+                await self._arm.upload_again()
+        self.watches[ARM].look_again()
+
     async def play_again(self) -> None:
         """Have the arm's program play again after a stop whose cause is gone; a playing one is left alone.
 
@@ -174,7 +197,7 @@ class Crew:
         """
         if self._arm is not None:
             await self._arm.upload_again()
-            self.watches[ARM].failed(ArmFault(ArmCause.STALE, "the arm's program has just begun to play"))
+            self.watches[ARM].look_again()
 
     async def activate_if_safe(self) -> None:
         """Activate a gripper that lost its activation, unless a fruit may be between the jaws, which it would crush.

@@ -15,7 +15,8 @@ from station.service.reference import Golden, Looks, examine
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Contact, Method
-from station.vision.methods import make_method
+from station.vision.methods import make_method, median_image
+from station.vision.step import mean_image, measure_step
 
 ResultT = TypeVar("ResultT")
 
@@ -43,12 +44,13 @@ class Eye:
         self._golden, self._settings = golden, settings
         self._worker = ThreadPoolExecutor(1, "vision")
         self._method: Method | None = None
+        self._least_confidence = 0.0
 
     def close(self) -> None:
         """End the thread, after what it is doing."""
         self._worker.shutdown()
 
-    async def take_reference(self, frames: Sequence[Frame], segmentation: Segmentation) -> Looks:
+    async def take_reference(self, frames: Sequence[Frame], segmentation: Segmentation) -> tuple[Image, Looks]:
         """Examine frames of the untouched gel, and measure against them from now on.
 
         The first reference of a sensor becomes the golden one.
@@ -57,19 +59,23 @@ class Eye:
             frames: of one shape.
             segmentation: the recipe's method.
 
+        Returns:
+            The reference, shape (height, width, 3), dtype uint8, BGR, and what it looks like.
+
         Raises:
             BadReferenceError: they cannot serve; there is no reference then.
         """
-        images = [frame.image for frame in frames]
 
-        def take() -> Looks:
+        def take() -> tuple[Image, Looks]:
             self._method = None
-            golden = self._golden.image()
-            looks = examine(images, golden, segmentation, self._settings)
-            if golden is None:
-                self._golden.keep(images)
-            self._method = make_method(images, segmentation)
-            return looks
+            image = median_image([frame.image for frame in frames])
+            looks = examine(image, self._golden.prepared(segmentation), self._settings)
+            self._golden.keep_first(image)
+            self._method, self._least_confidence = (
+                make_method([image], segmentation),
+                segmentation.robust.least_confidence,
+            )
+            return image, looks
 
         return await self._do(take)
 
@@ -83,8 +89,8 @@ class Eye:
         def measure() -> Seen:
             if self._method is None:
                 raise RuntimeError("a step is measured before the reference was taken")
-            image = step.image
-            return Seen(step, image, self._method.measure(image))
+            images = [frame.image for frame in step.frames]
+            return Seen(step, mean_image(images), measure_step(self._method, images, self._least_confidence))
 
         return await self._do(measure)
 

@@ -5,14 +5,13 @@ import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, Image
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
+from station.vision.step import mean_image
 
 FRAME_DEADLINE_S = 1.0
 FINEST_STEP_MM = 0.4
@@ -49,8 +48,7 @@ class GripStep:
     @property
     def image(self) -> Image:
         """The frames' mean, shape (height, width, 3), dtype uint8, BGR."""
-        mean = np.mean([frame.image for frame in self.frames], axis=0)
-        return np.rint(mean).astype(np.uint8)
+        return mean_image([frame.image for frame in self.frames])
 
     @property
     def last_frame(self) -> Frame:
@@ -78,10 +76,18 @@ class Grip:
         cell: the devices, opened.
         recipe: width steps, speed, force, settle time and frames.
         frame_deadline_s: longest wait for one frame.
+        on_frame: gets every frame, also those with faults.
     """
 
-    def __init__(self, cell: Cell, recipe: Recipe, frame_deadline_s: float = FRAME_DEADLINE_S) -> None:
+    def __init__(
+        self,
+        cell: Cell,
+        recipe: Recipe,
+        frame_deadline_s: float = FRAME_DEADLINE_S,
+        on_frame: Callable[[Frame], None] = lambda _frame: None,
+    ) -> None:
         self._cell, self._recipe, self._frame_deadline_s = cell, recipe, frame_deadline_s
+        self._on_frame = on_frame
 
     async def go(self, *poses: PoseName) -> None:
         """Bring the arm to one pose after the other; without an arm nothing moves.
@@ -128,7 +134,7 @@ class Grip:
         return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
 
     async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
-        """Close step by step until the gel is touched, then once more from the step before, as finely as the gripper can.
+        """Close step by step until the gel is touched, then once more, as finely as the gripper can.
 
         The onset's width is what every closing is counted from, so it is found to a count of the gripper. On the way
         one frame without a pause is enough; where it shows a contact, a full step at the same width has to confirm it.
@@ -144,26 +150,44 @@ class Grip:
             UnseenContactError: the gripper was stopped by something and the gel shows nothing.
         """
         expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
-        width_mm = min(expected.largest_mm, self._cell.gripper.max_width_mm)
-        stride_mm, before = step_mm, None
-        while width_mm >= expected.smallest_mm - step_mm:
-            step = await self._glance(width_mm)
+        widest_mm = self._cell.gripper.max_width_mm
+        seen_mm, _ = await self._search(min(expected.largest_mm, widest_mm), step_mm, touches, one_ahead=True)
+        from_mm, before = seen_mm, None
+        while before is None and from_mm < widest_mm:  # back to where nothing touches, however faintly it began
+            from_mm = min(from_mm + step_mm, widest_mm)
+            seen_mm, before = await self._search(from_mm, FINEST_STEP_MM, touches, one_ahead=False)
+        while not await touches(start := await self.step(0, seen_mm)):
+            seen_mm, nearer = await self._search(seen_mm - FINEST_STEP_MM, FINEST_STEP_MM, touches, one_ahead=False)
+            before = nearer or before
+        return before, start
+
+    async def _search(
+        self, from_mm: float, stride_mm: float, touches: Touches, *, one_ahead: bool
+    ) -> tuple[float, GripStep | None]:
+        """Close stride by stride with one frame each, where wanted with the next stride made while a frame is judged.
+
+        Returns:
+            The width at which the gel was touched first, and the step before it.
+        """
+        expected = self._recipe.expected_width
+        width_mm, before = from_mm, None
+        step = await self._glance(width_mm)
+        while width_mm >= expected.smallest_mm - self._recipe.steps.step_mm:
+            judging = asyncio.ensure_future(touches(step))
+            try:
+                ahead = await self._glance(width_mm - stride_mm) if one_ahead else None
+            finally:
+                touched = await judging
             held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
-            if held or await touches(step):
-                if stride_mm > FINEST_STEP_MM:
-                    stride_mm = FINEST_STEP_MM
-                    width_mm = await self._back(width_mm + step_mm)
-                    continue
-                step = await self.step(0, width_mm)
-                if await touches(step):
-                    return before, step
-                if held:
-                    raise UnseenContactError(
-                        f"the gripper holds something at {step.move.width_mm:.1f} mm which the gel does not show: look "
-                        "for what stands between the fingers beside the gel, then `station devices check`"
-                    )
-            before = step
-            width_mm -= stride_mm
+            if touched:
+                return width_mm, before
+            if held:
+                raise UnseenContactError(
+                    f"the gripper holds something at {step.move.width_mm:.1f} mm which the gel does not show: look "
+                    "for what stands between the fingers beside the gel, then `station devices check`"
+                )
+            width_mm, before = width_mm - stride_mm, step
+            step = ahead or await self._glance(width_mm)
         raise NothingTouchedError(
             f"nothing was touched from {expected.largest_mm:g} down to {expected.smallest_mm:g} mm: is a "
             f"{self._recipe.name} in the nest, and is the arm there?"
@@ -172,11 +196,6 @@ class Grip:
     async def _glance(self, width_mm: float) -> GripStep:
         move = await self.close_to(width_mm)
         return GripStep(-1, move, await self.sound_frames(1))
-
-    async def _back(self, width_mm: float) -> float:
-        """Open to where nothing was touched; give the next width to look at."""
-        await self.close_to(min(width_mm, self._cell.gripper.max_width_mm))
-        return width_mm - FINEST_STEP_MM
 
     async def let_go(self) -> str | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
@@ -198,6 +217,7 @@ class Grip:
         faults: set[str] = set()
         for _ in range(_MOST_FAULTY_FRAMES):
             frame = await self._cell.camera.frame(newer_than_s, self._frame_deadline_s)
+            self._on_frame(frame)
             if not frame.faults:
                 return frame
             faults |= frame.faults

@@ -2,17 +2,19 @@
 
 import asyncio
 
+from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.cycle import REASONS, Event
 from station.inspection.judge import early_stop, judge
 from station.records.model import Image
+from station.service.alarm_desk import AlarmDesk
 from station.service.crew import CAMERA, GRIPPER, Crew
-from station.service.eye import Eye
+from station.service.eye import Eye, Seen
 from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError
 from station.service.inspection import Inspection
-from station.service.reference import BadReferenceError
+from station.service.metrics import Metrics
+from station.service.reference import ALARMS, BadReferenceError
 from station.settings.service import ServiceSettings
-from station.vision.methods import median_image
 from station.vocabulary import Reason
 
 _OPEN_WITHIN_MM = 2.0
@@ -25,11 +27,16 @@ class Inspector:
         crew: the devices.
         eye: the measurement.
         settings: placing, and how old a reference may be.
+        alarms: told of a reference that cannot serve.
+        metrics: counts the frames.
     """
 
-    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings) -> None:
+    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings, alarms: AlarmDesk, metrics: Metrics) -> None:
         self._crew, self._eye, self._settings = crew, eye, settings
+        self._alarms, self._metrics = alarms, metrics
         self._reached: MoveResult | None = None
+        self._glanced: Seen | None = None
+        self._examining: asyncio.Future[bool] | None = None
 
     async def open_jaws(self) -> Event:
         """Let go of whatever is held."""
@@ -62,20 +69,30 @@ class Inspector:
         frames = await self._grip(now).sound_frames(recipe.imaging.reference_frames)
         self._crew.watches[CAMERA].heard()
         now.reference_s = frames[-1].captured_s
-        now.reference_image = Image("reference", None, median_image([frame.image for frame in frames]))
-        try:
-            looks = await self._eye.take_reference(frames, recipe.segmentation)
-        except BadReferenceError as error:
-            now.interrupt(Reason.REFERENCE_BAD, str(error))
-            return Event.REFERENCE_BAD
-        now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
-        now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
+        self._examining = asyncio.ensure_future(self._examine(now, frames))
         return Event.REFERENCE_TAKEN
 
     async def approach(self, now: Inspection) -> Event:
-        """Bring the open jaws to the fruit."""
+        """Bring the open jaws to the fruit, while the reference is examined."""
         await self._grip(now).go("above_nest", "nest")
-        return Event.ARRIVED
+        good = self._examining is not None and await self._examining
+        return Event.ARRIVED if good else Event.REFERENCE_BAD
+
+    async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
+        """Whether the frames may serve as the reference; tells why not."""
+        try:
+            image, looks = await self._eye.take_reference(frames, now.active.recipe.segmentation)
+        except BadReferenceError as error:
+            now.interrupt(Reason.REFERENCE_BAD, str(error))
+            self._alarms.raise_(error.alarm, str(error))
+            return False
+        now.reference_image = Image("reference", None, image)
+        for alarm in ALARMS:
+            self._alarms.clear(alarm)
+        self._metrics.reference(0.0, looks.drift_levels)
+        now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
+        now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
+        return True
 
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
@@ -90,7 +107,8 @@ class Inspector:
             now.interrupt(Reason.NO_CONTACT, str(error))
             return Event.NO_ONSET
         now.steps.append(start)
-        now.seen.append(await self._eye.measure(start))
+        known = self._glanced is not None and self._glanced.step is start
+        now.seen.append(self._glanced if known and self._glanced else await self._eye.measure(start))
         return Event.ONSET_FOUND
 
     async def close_step(self, now: Inspection) -> Event:
@@ -125,6 +143,7 @@ class Inspector:
     async def judge(self, now: Inspection) -> Event:
         """Judge what was measured."""
         age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
+        self._metrics.reference(age_s, float(now.measures.get("reference_drift_levels") or 0.0))
         if age_s > self._settings.reference.oldest_s:
             now.interrupt(
                 Reason.REFERENCE_BAD,
@@ -156,9 +175,14 @@ class Inspector:
         now.outcome_name = "NO_RESULT"
 
     def _grip(self, now: Inspection) -> Grip:
-        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience)
+        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience, self._count)
+
+    def _count(self, frame: Frame) -> None:
+        for fault in frame.faults or ("good",):
+            self._metrics.frame(fault)
 
     async def _touches(self, step: GripStep) -> bool:
         self._crew.watches[CAMERA].heard()
         self._crew.watches[GRIPPER].heard()
-        return (await self._eye.measure(step)).contact.found
+        self._glanced = await self._eye.measure(step)
+        return self._glanced.contact.found

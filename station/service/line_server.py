@@ -1,4 +1,4 @@
-"""The station's end of the channel to the PLC interface: `station.channel.line` answered."""
+"""The station's end of the channel: what the PLC interface and a person at the cell ask, answered."""
 
 from station.channel.line import (
     Acknowledged,
@@ -15,6 +15,7 @@ from station.channel.line import (
     Resume,
     StationState,
 )
+from station.channel.panel import Recover
 from station.channel.server import ChannelServer
 from station.service.orders import Orders
 from station.service.readiness import Gate
@@ -43,6 +44,7 @@ class LineServer:
                 Resume: self._resume,
                 Line: self._line,
                 Command: self._command,
+                Recover: self._recover,
             },
         )
 
@@ -70,6 +72,9 @@ class LineServer:
     async def _line(self, request: Line) -> StationState:
         self._orders.line(request)
         return self._gate.state()
+
+    async def _recover(self, request: Recover) -> CommandDone:
+        return await self._orders.recover(request)
 
     async def _command(self, request: Command) -> CommandDone:
         return await self._orders.carry_out(request)

@@ -5,6 +5,7 @@ import logging
 import time
 
 from station.channel.line import Command, CommandDone, CommandName, Line
+from station.channel.panel import Recover
 from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
@@ -146,6 +147,21 @@ class Orders:
         self._service.active = active
         log.info("recipe %s (%d) is active", active.recipe.name, active.recipe.plc_number)
 
+    async def recover(self, request: Recover) -> CommandDone:
+        """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
+
+        Args:
+            request: which stop.
+        """
+        if STATES[self._service.state].refusal is Refusal.BUSY:
+            return CommandDone(done=False, why="an inspection is under way")
+        log.info("a person at the cell asks for: %s", request.what)
+        try:
+            await self._crew.recover(request.what)
+        except ArmFault as fault:
+            return CommandDone(done=False, why=str(fault))
+        return CommandDone(done=True, why="")
+
     async def _call_off(self) -> str:
         service = self._service
         if service.state not in UNJUDGED:
@@ -155,16 +171,18 @@ class Orders:
         await service.conductor.until(lambda state: state not in UNJUDGED)
         return ""
 
-    async def _reset(self) -> str:
-        service, state = self._service, self._service.state
-        if service.stop_asked:
+    def _no_reset(self) -> str:
+        if self._service.stop_asked:
             return "the station is told to end"
         if stop := self._crew.standing_stop:
-            return f"{stop} A safety stop is a person's to confirm at the cell: `station devices recover`"
-        if STATES[state].refusal is Refusal.BUSY:
-            return "an inspection is under way; call it off first"
-        if state is State.IDLE:
-            return ""
+            return f"{stop} That is a person's to confirm at the cell, with `station devices recover`, before the reset"
+        busy = STATES[self._service.state].refusal is Refusal.BUSY
+        return "an inspection is under way; call it off first" if busy else ""
+
+    async def _reset(self) -> str:
+        service, state = self._service, self._service.state
+        if (why_not := self._no_reset()) or state is State.IDLE:
+            return why_not
         service.reset_wanted = True
         self._crew.confirmed_clear = True
         if state in {State.LATCHED, State.CARRIED}:

@@ -39,6 +39,10 @@ class Gate:
             return Refusal.NOT_READY, "The station is told to end; start it again."
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.sentence
+        return self._idle_refusal()
+
+    def _idle_refusal(self) -> tuple[Refusal | None, str]:
+        service = self._service
         if stuck := self._liveness.stuck():
             names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
             return Refusal.NOT_READY, f"No progress of {names}: restart the station if it stays."

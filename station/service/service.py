@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import Awaitable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -30,12 +31,14 @@ from station.service.recipe_book import Active
 from station.service.triggers import Pending, Triggers
 from station.settings.arm import ArmSettings
 from station.settings.configuration import Configuration
-from station.vocabulary import Reason, Refusal
+from station.vocabulary import OutcomeName, Reason, Refusal
 
 log = logging.getLogger(__name__)
 
 CYCLE = "cycle"
 _LEASE_S = 2.0
+_LAST_OUTCOMES = 20
+_MANY = 5
 _MEASURE_S = 0.3
 _FRAMES_PER_S = 30.0
 _RECORD_NO_RESULT_S = 1.0
@@ -85,6 +88,7 @@ class Service:
         self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
         self._background: set[asyncio.Future[Event | None]] = set()
         self._told_late: State | None = None
+        self._last_outcomes: deque[OutcomeName] = deque(maxlen=_LAST_OUTCOMES)
 
     @property
     def state(self) -> State:
@@ -148,6 +152,7 @@ class Service:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
+            self._watch_outcomes(outcome)
 
     async def open(self) -> Open:
         """What was begun and not acknowledged."""
@@ -215,19 +220,20 @@ class Service:
     def refused(self, state: State, event: Event) -> None:
         """Count what the table does not list; a trigger among it is answered."""
         self._metrics.unexpected()
-        if event is Event.TRIGGER and self._pending is not None:
+        if event is Event.TRIGGER and self._pending is not None and not self._pending.is_answered:
             self._pending.answer(self._refused(STATES[state].refusal or Refusal.NOT_READY))
 
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Keep the phases' times, and what hangs on a state."""
         self._told_late = None
-        if self._now is not None and STATES[after].refusal is Refusal.BUSY:
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY and after is not State.ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state is not State.ACCEPTING
         self._crew.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
+            self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
         if state is State.STOPPED and self.reset_wanted and not self.stop_asked:
             self.conductor.post(Event.RESET)
@@ -296,7 +302,8 @@ class Service:
         if now.sequence is None:
             if pending.recording is not None:
                 pending.recording.cancel()  # which takes the record back
-            pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
+            if not pending.is_answered:
+                pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
             return
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
@@ -344,6 +351,15 @@ class Service:
     def _refused(self, refusal: Refusal) -> Begun:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
+
+    def _watch_outcomes(self, outcome: Outcome) -> None:
+        self._last_outcomes.append(outcome.outcome)
+        last = list(self._last_outcomes)
+        unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
+        self.alarms.show(AlarmId.MANY_NO_RESULT, f"the last {_MANY} fruit could not be judged" if unjudged else "")
+        failed = len(last) == _LAST_OUTCOMES and last.count("FAIL") > _LAST_OUTCOMES / 2
+        told = f"{last.count('FAIL')} of the last {_LAST_OUTCOMES} fruit failed" if failed else ""
+        self.alarms.show(AlarmId.REJECT_RATE, told)
 
     def _limits(self, active: Active) -> Deadlines:
         limits, patience = deadlines(active.recipe, self.pace()), self._settings.patience

@@ -92,7 +92,7 @@ class Station:
                 metrics.heard(name)
 
         crew = Crew(configuration, device_changed, progress)
-        inspector = Inspector(crew, eye, settings)
+        inspector = Inspector(crew, eye, settings, alarms, metrics)
         self.service = service = Service(configuration, records, crew, inspector, alarms, metrics, liveness, versions)
         try:
             await records.reopen()

@@ -100,13 +100,18 @@ class Pending:
         """Makes it durable; where it is cancelled, the record is taken back."""
         self._answer: asyncio.Future[Begun] = asyncio.get_running_loop().create_future()
 
+    @property
+    def is_answered(self) -> bool:
+        """Whether the request has its answer."""
+        return self._answer.done()
+
     def answer(self, begun: Begun) -> None:
         """Answer the request; the first answer stands.
 
         Args:
             begun: accepted or refused.
         """
-        if not self._answer.done():
+        if not self.is_answered:
             self._answer.set_result(begun)
 
     async def answered(self) -> Begun:

@@ -1,6 +1,7 @@
 """Looks at one device again and again: whether it answers, how long ago it did, and what is wrong with it."""
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Awaitable, Callable
@@ -75,6 +76,10 @@ class DeviceWatch:
         self._set(fault)
         self._again.set()
 
+    def look_again(self) -> None:
+        """Somebody has mended something: do not wait for the next look's time."""
+        self._again.set()
+
     async def run(self) -> None:
         """Look until cancelled."""
         pause_s = PERIOD_S
@@ -98,12 +103,12 @@ class DeviceWatch:
         until_s = time.monotonic() + pause_s
         self._again.clear()
         while (left_s := until_s - time.monotonic()) > 0:
-            try:
+            with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(min(left_s, PERIOD_S)):
                     await self._again.wait()
+            if self._again.is_set():
                 return
-            except TimeoutError:
-                self._on_progress()
+            self._on_progress()
 
     def _set(self, fault: StationError | None) -> None:
         before, self.fault = self.fault, fault

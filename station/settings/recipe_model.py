@@ -155,6 +155,21 @@ class AreaThreshold(Settings):
     area_mm2: float = setting(
         title="Area", description="A larger area fails the fruit.", unit="mm²", gt=0.0, le=LARGEST_AREA_MM2
     )
+    least_area_mm2: float = setting(
+        0.0,
+        title="Least area",
+        description="A smaller area is no fruit's: not all of the contact was seen, and the fruit is not judged.",
+        unit="mm²",
+        ge=0.0,
+        le=LARGEST_AREA_MM2,
+    )
+
+    @model_validator(mode="after")
+    def _leaves_room(self) -> Self:
+        if self.least_area_mm2 >= self.area_mm2:
+            text = f"expected less than area_mm2, {self.area_mm2:g} mm², got {self.least_area_mm2:g}"
+            raise Contradiction([(("least_area_mm2",), text)])
+        return self
 
 
 class DamageThresholds(Settings):

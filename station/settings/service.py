@@ -82,7 +82,7 @@ class ServiceSettings(Settings):
     patience: float = setting(
         2.0,
         title="Patience",
-        description="Factor on the time that each phase is expected to take, before it counts as a device's fault; more "
+        description="Factor on the time that each phase is expected to take, before it is a device's fault; more "
         "for a machine that has other work.",
         ge=1.0,
         le=50.0,

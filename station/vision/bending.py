@@ -20,23 +20,24 @@ _NOISE_CAP = 0.35
 _LEAST_BACKGROUND = 0.02
 
 
-def bending(change: FloatImage) -> FloatImage:
-    """The bending at half the change's size.
+def bending(change: FloatImage, step: int = 2) -> FloatImage:
+    """The bending at a fraction of the change's size.
 
     Args:
         change: signed, shape (height, width, 3), grey levels.
+        step: by how much the result is smaller, 2 or 4.
 
     Returns:
-        Shape (half the height, half the width), grey levels per pixel of `change`.
+        Shape (height / step, width / step), rounded up, grey levels per pixel of `change`.
     """
     height, width = change.shape[:2]
-    half = resized(change, ((width + 1) // 2, (height + 1) // 2))
-    smooth = cv2.GaussianBlur(half, (0, 0), _SIGMA_PX / 2)
-    slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / 16)
-    slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / 16)
+    less = resized(change, (-(-width // step), -(-height // step)))
+    smooth = cv2.GaussianBlur(less, (0, 0), _SIGMA_PX / step)
+    slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / (8 * step))
+    slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / (8 * step))
     ones = np.ones((1, 3), np.float32)
     xx, yy, xy = (
-        cv2.GaussianBlur(cv2.transform(cv2.multiply(a, b), ones), (0, 0), _WINDOW_SIGMA_PX / 2)
+        cv2.GaussianBlur(cv2.transform(cv2.multiply(a, b), ones), (0, 0), _WINDOW_SIGMA_PX / step)
         for a, b in ((slope_x, slope_x), (slope_y, slope_y), (slope_x, slope_y))
     )
     determinant = np.maximum(xx * yy - xy * xy, 0)

@@ -34,6 +34,7 @@ _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
 _STRIPS = 32
+_NO_PRIOR = np.float32(1e-3)
 _MEDIAN_SIDE_PX = 60
 
 _Floats = npt.NDArray[np.float64]
@@ -153,8 +154,8 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
 def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
     prior = np.float32(_STREAK_PRIOR_SHARE * strips.shape[axis])
-    first = _line_means(strips, background, axis, prior)
-    away = cv2.transform((strips - first) ** 2, np.ones((1, 3), np.float32))
+    first = _line_means(strips, background, axis, _NO_PRIOR)
+    away = np.square(strips - first).sum(axis=2)
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)

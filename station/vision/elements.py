@@ -18,7 +18,7 @@ def are_few(inside: Mask, element_px: float) -> bool:
         inside: the outline filled, shape (height, width), 0 or not.
         element_px: from `edge_signal.element_px`.
     """
-    return np.count_nonzero(inside) < np.pi * (_FEW * element_px) ** 2
+    return bool(np.count_nonzero(inside) < np.pi * (_FEW * element_px) ** 2)
 
 
 def union(length: FloatImage, inside: Mask) -> Mask:

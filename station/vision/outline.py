@@ -69,24 +69,24 @@ def find_outline(length: FloatImage, bend: FloatImage, place: Place, stiffness: 
     """
     region, shape = place.region, (length.shape[0], length.shape[1])
     element = element_px(length, bend, region)
-    textured = is_textured(element, radius_px(region))
     signal, doubt = length, 1.0
-    if not textured:
-        edge = find_edge(length, region, place.middle, stiffness)
+    edge = None if is_textured(element, radius_px(region)) else find_edge(length, region, place.middle, stiffness)
+    if edge is not None and place.widen is not None:
         inside = filled(edge, shape)
-        if place.widen is not None and np.count_nonzero(inside) < _LARGEST_ELEMENT_SHARE * inside.size:
+        if np.count_nonzero(inside) < _LARGEST_ELEMENT_SHARE * inside.size:
             wide = place.widen()
             doubt = unexplained(length, wide, edge, inside, weighted_median(length, place.background))
-            textured = doubt > _UNEXPLAINED
-            region = wide if textured else region
-    if textured:
+            if doubt > _UNEXPLAINED:
+                edge, region = None, wide
+    textured = edge is None
+    if edge is None:
         signal = envelope(length, region, _FIRST_CAP, element)
         edge = find_edge(signal, region, place.middle, stiffness)
         core = filled(_shrunk(edge, _CORE_SHARE), shape)
         if core.any():
             signal = envelope(length, core, _SECOND_CAP, element)
             edge = find_edge(signal, filled(edge, shape), _centre(edge, shape), stiffness)
-        inside = filled(edge, shape)
+    inside = filled(edge, shape)
     confidence = edge_confidence(edge, background_spread(signal, place.background)) / max(1.0, doubt)
     apart = textured and inside.any() and elements.are_few(inside, element)
     return Outline(edge, elements.union(length, inside) if apart else inside, bool(apart), confidence)

@@ -36,6 +36,9 @@ _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
 _LEAST_SUPPORT = 0.03
+_COARSE_STEP = 4
+_LEAST_TRUST = 0.25
+"""In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
 
 
@@ -85,12 +88,13 @@ class RobustMethod:
             )
         work = working_image(image)
         difference = np.minimum(work, SATURATED_LEVEL) - self._light
-        calm = quiet(bending(without_bands(difference)), self._least_bend)
-        drift = self._drift.fit(difference, calm)
+        drift = self._drift.fit(difference, self._quiet(difference))
         change = difference - drift.levels
         if self._blind is not None:
             change[self._blind] = 0
-        change = without_streaks(change, calm)
+        calm = self._quiet(without_bands(difference))
+        fits = resized(drift.background, (calm.shape[1], calm.shape[0]))
+        change = without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits))
         bend = bending(change)
         noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
@@ -124,6 +128,10 @@ class RobustMethod:
             gate=gate,
             drift_levels=drift.strength_levels,
         )
+
+    def _quiet(self, difference: FloatImage) -> FloatImage:
+        """Where the difference hardly bends; it need not be known finely."""
+        return quiet(bending(difference, _COARSE_STEP), self._least_bend)
 
     def _outlines(
         self,

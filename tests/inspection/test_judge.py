@@ -1,5 +1,6 @@
 """The judge: what passes, what is proven damaged, and what is neither."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -16,8 +17,24 @@ from station.vision.contact import Flag as MeasurementFlag
 from station.vocabulary import Reason
 
 ROOT = Path(__file__).resolve().parents[2]
-STRAWBERRY = load_recipe(ROOT / "recipes" / "strawberry.yaml")
-BLUEBERRY = load_recipe(ROOT / "recipes" / "blueberry.yaml")
+
+
+def recipe_with(name: str, areas: dict[float, float], growth: float, stop: tuple[float, float]) -> Recipe:
+    """A shipped recipe with limits of its own: these tests are about the judge, not about what is shipped."""
+    values = load_recipe(ROOT / "recipes" / f"{name}.yaml").model_dump(mode="json")
+    values["damage"] = {
+        "area": [{"closing_mm": closing, "area_mm2": area} for closing, area in areas.items()],
+        "growth_mm2_per_mm": growth,
+    }
+    values["early_stop"] = {"area_mm2": stop[0], "growth_mm2_per_mm": stop[1]}
+    values["steps"]["result_closings_mm"] = [
+        closing for closing in values["steps"]["result_closings_mm"] if closing > 3
+    ]
+    return Recipe.model_validate_json(json.dumps(values))
+
+
+STRAWBERRY = recipe_with("strawberry", {4: 165}, 41, (190, 55))
+BLUEBERRY = recipe_with("blueberry", {8: 149, 12: 190}, 18.6, (190, 24.8))
 
 
 def point(closing_mm: float, area_mm2: float, *flags: Flag, confidence: float | None = 0.9) -> Measured:
@@ -319,3 +336,20 @@ def test_both_passes_and_fails_are_drawn():
     outcomes = {judge(Press(15.0, 0.4, tuple(point(float(c), g * c) for c in range(17))), BLUEBERRY).outcome
                 for g in (8.0, 16.5, 30.0)}  # fmt: skip
     assert outcomes == {"PASS", "NO_RESULT", "FAIL"}
+
+
+def test_what_cannot_pass_any_more_is_not_pressed_on():
+    threshold = STRAWBERRY.damage.area[0].model_copy(update={"least_area_mm2": 60.0})
+    damage = STRAWBERRY.damage.model_copy(update={"area": (threshold,)})
+    recipe = STRAWBERRY.model_copy(update={"damage": damage})
+
+    def stopped(area_mm2: float, *flags: Flag) -> list[bool]:
+        points = [point(float(closing), area_mm2 * closing / 4, *flags) for closing in range(6)]
+        return [early_stop(Press(35.0, 0.4, tuple(points[: n + 1])), recipe) is not None for n in range(6)]
+
+    assert stopped(100) == [False] * 6
+    assert stopped(55) == [False] * 4 + [True] * 2, "less than any fruit's"
+    assert stopped(100, Flag.LOW_CONFIDENCE) == [False] * 4 + [True] * 2
+    small = judge(Press(35.0, 0.4, tuple(point(float(c), 55 * c / 4) for c in range(6))), recipe)
+    assert small.outcome == "NO_RESULT"
+    assert Reason.LOW_CONFIDENCE in small.reasons

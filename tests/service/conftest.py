@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from canopen.network import _UninitializedNetwork
 
 from station.channel.client import ChannelClient
 from station.channel.line import (
@@ -39,15 +38,8 @@ from station.settings.plc import line_endpoint
 from station.settings.recipe import load_recipes
 from station.twin.process import Twin, TwinOptions
 
-# The twin brings canopen, whose placeholder refuses even to say what it is to whoever asks all objects for their class.
-_refuse = _UninitializedNetwork.__getattribute__
-setattr(  # noqa: B010 (typed as final)
-    _UninitializedNetwork,
-    "__getattribute__",
-    lambda self, name: type(self) if name == "__class__" else _refuse(self, name),
-)
-
 PATIENCE_S = 60.0
+LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
 _HOSTS = itertools.count(1)
 
@@ -76,11 +68,10 @@ class LineClient:
     """What the PLC interface does, by hand."""
 
     client: ChannelClient
-    said: Line = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
     ids: Any = field(default_factory=lambda: itertools.count(1))
 
     async def state(self) -> StationState:
-        return await self.client.ask(self.said, StationState, deadline_s=20)
+        return await self.client.ask(LINE, StationState, deadline_s=20)
 
     async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
         return await self.client.ask(Command(command=command, argument=argument), CommandDone, deadline_s=40)
@@ -175,7 +166,6 @@ def quick_recipes(folder: Path) -> Path:
         values = load_recipes()[name].model_dump(mode="json")
         values["steps"] |= {"number": 4, "result_closings_mm": [3], "closing_limit_mm": 4.5}
         values["imaging"] |= {"settle_s": 0.02, "frames_per_step": 1, "reference_frames": 3}
-        values["damage"]["area"] = [{"closing_mm": 3, "area_mm2": 110}]
         values["damage"]["growth_mm2_per_mm"] = 60
         values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
         width = values["expected_width"]
@@ -205,6 +195,12 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
         return file
 
     return write
+
+
+@pytest.fixture
+def line_client() -> type[LineClient]:
+    """What the PLC interface does, by hand, over a channel."""
+    return LineClient
 
 
 @pytest.fixture

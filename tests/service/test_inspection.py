@@ -1,19 +1,84 @@
 """One fruit, from the trigger to the outcome that the PLC gets, on a simulated bench."""
 
 import asyncio
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from station.inspection.states import State
+from station.twin.fruit import Kind, draw_fruit
+from station.vocabulary import Reason
 
-@pytest.mark.parametrize("kind", ["strawberry", "raspberry", "blueberry"])
-def test_a_fruit_gets_one_outcome_with_its_area_near_the_truth(bench, kind):
+
+@pytest.mark.parametrize(("kind", "seed"), [("strawberry", 4), ("raspberry", 1), ("blueberry", 1)])
+def test_a_sound_fruit_is_measured_and_a_bruised_one_never_passes(bench, kind, seed):
+    """The area at each step lies near what the twin's gel truly felt."""
+    truths = {}
+
     async def scenario():
         async with bench() as cell:
             await cell.choose(kind)
-            outcome = await cell.line.inspect()
-            record = await cell.station.service.records.inspection(outcome.sequence)
-            return outcome, record
+            outcomes = []
+            for bruised in (False, True):
+                cell.lay(kind, seed, bruised=bruised)
+                await cell.line.ready()
+                cell.at(State.JUDGING, lambda bruised=bruised: truths.update({bruised: cell.twin.world.footprint()}))
+                outcomes.append(await cell.line.inspect())
+            service = cell.station.service
+            return [(outcome, await service.records.inspection(outcome.sequence)) for outcome in outcomes]
 
-    outcome, record = asyncio.run(scenario())
-    print(outcome, record.judged.explanation)
-    assert outcome.outcome in {"PASS", "FAIL"}
+    (sound, record), (bruised, _) = asyncio.run(scenario())
+    judged = record.judged
+    assert judged is not None
+    assert sound.outcome == "PASS", judged.explanation
+    assert sound.area_mm2 == pytest.approx(judged.curve[3].area_mm2)
+    assert [point.width_mm for point in judged.curve] == sorted((p.width_mm for p in judged.curve), reverse=True)
+    assert judged.curve[-1].area_mm2 == pytest.approx(truths[False].true_area_px * 0.0266**2, rel=0.25)
+    assert record.standing == sound
+    assert bruised.outcome in {"FAIL", "NO_RESULT"}
+    assert bruised.reasons
+
+
+def test_what_cannot_be_measured_is_no_result(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            cell.twin.world.remove()
+            empty = await cell.line.inspect()
+
+            cell.lay("blueberry")
+            assert (await cell.line.inspect()).outcome in {"PASS", "NO_RESULT", "FAIL"}
+            touching = replace(draw_fruit(Kind.STRAWBERRY, 1), width_mm=56.0)
+            cell.twin.world.place(touching)
+            in_contact = await cell.line.inspect()
+            record = await cell.station.service.records.inspection(in_contact.sequence)
+            return empty, in_contact, record.judged.explanation
+
+    empty, in_contact, explanation = asyncio.run(scenario())
+    assert (empty.outcome, empty.reasons, empty.area_mm2) == ("NO_RESULT", (Reason.NO_CONTACT,), None)
+    assert (in_contact.outcome, in_contact.reasons) == ("NO_RESULT", (Reason.REFERENCE_BAD,))
+    assert "something touches the gel" in " ".join(explanation)
+
+
+def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench):
+    """The gripper never runs two steps ahead of the measurement."""
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("raspberry")
+            service = cell.station.service
+            active = service.active
+            stop = active.recipe.early_stop.model_copy(update={"area_mm2": 40.0})
+            recipe = active.recipe.model_copy(update={"early_stop": stop})
+            service.active = type(active).of(recipe)
+            await cell.line.ready()
+            outcome = await cell.line.inspect()
+            record = await service.records.inspection(outcome.sequence)
+            return outcome, record.judged.curve
+
+    outcome, curve = asyncio.run(scenario())
+    areas = np.array([point.area_mm2 for point in curve])
+    assert Reason.EARLY_STOP in outcome.reasons
+    assert areas[-1] > 40
+    assert np.count_nonzero(areas > 40) <= 2

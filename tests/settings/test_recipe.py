@@ -202,9 +202,9 @@ class TestShipped:
     def test_the_four_are_there_with_their_own_numbers(self):
         recipes = load_recipes()
         assert sorted(recipes) == ["blueberry", "raspberry", "rubber_ball", "strawberry"]
-        assert recipes["strawberry"].steps.result_closings_mm == (4, 8, 12)
-        assert recipes["blueberry"].steps.result_closings_mm == (8, 12, 16)
-        assert recipes["raspberry"].steps.result_closings_mm == (8, 12, 16)
+        assert recipes["strawberry"].steps.result_closings_mm == (3, 4, 8, 12)
+        assert recipes["blueberry"].steps.result_closings_mm == (3, 8, 12, 16)
+        assert recipes["raspberry"].steps.result_closings_mm == (3, 8, 12, 16)
         ball = recipes["rubber_ball"].steps
         assert (ball.start_width_mm, ball.step_mm, ball.number) == (46, 1, 13)
 

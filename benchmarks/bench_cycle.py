@@ -1,0 +1,238 @@
+"""What one fruit's cycle is made of: motion, settling, camera, ours; beside the same moves bare.
+
+Run with `./run bench cycle`. Starts a twin with an arm and the station's process, has fruit inspected over the
+channel, then makes the same moves and waits without the station: the same drivers, the measured widths, as many
+frames, nothing else. Writes `docs/cycle-time.md`.
+"""
+
+import asyncio
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable
+from pathlib import Path
+from typing import NamedTuple
+
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    CommandName,
+    Line,
+    Noted,
+    Outcome,
+    Published,
+    StationState,
+)
+from station.devices.arm.ur import UrArm
+from station.devices.camera.open import camera_from
+from station.devices.gripper.robotiq import make_gripper
+from station.records.model import FullRecord
+from station.records.records import Records
+from station.service.grip import FINEST_STEP_MM, Cell, Grip
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.plc import line_endpoint
+from station.settings.recipe import Recipe, load_recipes
+from station.twin.console import ask
+
+ROOT = Path(__file__).resolve().parents[1]
+HOST = "127.0.0.11"
+CONSOLE = 49311
+FRUIT = (("strawberry", 1), ("raspberry", 3), ("blueberry", 2))
+REPEATS = 4
+PATIENCE_S = 120.0
+LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
+
+
+class Inspected(NamedTuple):
+    """One fruit as the station inspected it."""
+
+    to_outcome_s: float
+    to_ready_s: float
+    sequence: int
+
+
+def start(name: str, file: Path, *arguments: str) -> subprocess.Popen[str]:
+    """One of the station's programs; returns once it runs."""
+    command = [sys.executable, "-m", "station", name, *arguments, "--config", str(file)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    for line in process.stdout or ():
+        if line.startswith("running"):
+            break
+    return process
+
+
+async def inspect(configuration: Configuration) -> dict[str, list[Inspected]]:
+    """Every fruit some times over the channel."""
+    recipes, results = load_recipes(), {}
+    endpoint = line_endpoint(configuration.handshake, configuration.home)
+    async with ChannelClient(endpoint, "the station") as client:
+
+        async def ready() -> None:
+            deadline_s = time.monotonic() + PATIENCE_S
+            while not (state := await client.ask(LINE, StationState, deadline_s=20)).ready:
+                if time.monotonic() > deadline_s:
+                    raise SystemExit(f"the station does not become ready: {state.why_not_ready}")
+                await asyncio.sleep(0.005)
+
+        for kind, seed in FRUIT:
+            order = Command(command=CommandName.CHANGE_RECIPE, argument=recipes[kind].plc_number)
+            await client.ask(order, CommandDone, deadline_s=40)
+            for repeat in range(REPEATS):
+                ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
+                await ready()
+                began_s = time.monotonic()
+                trigger = Begin(trigger_id=repeat + 1, encoder=0, lot="")
+                begun = await client.ask(trigger, Begun, deadline_s=5)
+                if begun.sequence is None:
+                    raise SystemExit(f"the station refuses: {begun.refusal}")
+                outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
+                told_s = time.monotonic() - began_s
+                await ready()
+                again_s = time.monotonic() - began_s
+                await client.ask(Published(outcome=outcome), Noted, deadline_s=5)
+                await client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
+                results.setdefault(kind, []).append(Inspected(told_s, again_s, outcome.sequence))
+    return results
+
+
+def widths_mm(recipe: Recipe, record: FullRecord, widest_mm: float) -> tuple[list[float], list[float]]:
+    """The widths that the station asked for: at a glance on the way to the onset, and in full steps."""
+    judged = record.judged
+    if judged is None or not judged.curve:
+        raise SystemExit(f"inspection {record.sequence} was not measured: {judged and judged.explanation}")
+    onset_mm, step_mm = judged.curve[0].width_mm, recipe.steps.step_mm
+    glances = [min(recipe.expected_width.largest_mm, widest_mm)]
+    while glances[-1] > onset_mm:
+        glances.append(glances[-1] - step_mm)
+    fine = [glances[-1] + step_mm]
+    while fine[-1] > onset_mm + FINEST_STEP_MM / 2:
+        fine.append(fine[-1] - FINEST_STEP_MM)
+    steps = [onset_mm - number * step_mm for number in range(len(judged.curve))]
+    return [*glances, *fine], steps
+
+
+class Stopwatch:
+    """Adds up what is waited for, by kind."""
+
+    def __init__(self) -> None:
+        self.spent_s: dict[str, float] = {"motion": 0.0, "settling": 0.0, "camera": 0.0}
+
+    async def time(self, kind: str, work: Awaitable[object]) -> None:
+        """Wait for something."""
+        began_s = time.monotonic()
+        await work
+        self.spent_s[kind] += time.monotonic() - began_s
+
+
+async def bare(cell: Cell, recipe: Recipe, record: FullRecord) -> dict[str, float]:
+    """The same moves, waits and frames as in an inspection, and nothing else."""
+    grip, watch, imaging = Grip(cell, recipe), Stopwatch(), recipe.imaging
+    glances, steps = widths_mm(recipe, record, cell.gripper.max_width_mm)
+    await watch.time("motion", cell.gripper.open())
+    await watch.time("camera", grip.sound_frames(imaging.reference_frames))
+    await watch.time("motion", grip.go("above_nest", "nest"))
+    for width_mm in glances:
+        await watch.time("motion", grip.close_to(width_mm))
+        await watch.time("camera", grip.sound_frames(1))
+    for width_mm in steps:
+        await watch.time("motion", grip.close_to(width_mm))
+        await watch.time("settling", asyncio.sleep(imaging.settle_s))
+        await watch.time("camera", grip.sound_frames(imaging.frames_per_step))
+    await watch.time("motion", cell.gripper.open())
+    await watch.time("motion", grip.go("above_nest", "home"))
+    return watch.spent_s
+
+
+async def floors(
+    configuration: Configuration, results: dict[str, list[Inspected]]
+) -> dict[str, list[dict[str, float]]]:
+    """The bare moves of every inspection."""
+    recipes, spent = load_recipes(), {}
+    records = Records(configuration.home / "records", configuration.records, "bench")
+    await records.reopen()
+    camera, gripper = camera_from(configuration.camera), make_gripper(configuration.gripper)
+    await camera.open()
+    async with UrArm(configuration.arm) as arm:
+        await arm.ready(PATIENCE_S)
+        arm.renew_health(600.0)
+        await gripper.activate()
+        await arm.move_to("home")
+        for kind, seed in FRUIT:
+            for inspected in results[kind]:
+                ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
+                record = await records.inspection(inspected.sequence)
+                spent.setdefault(kind, []).append(await bare(Cell(camera, gripper, arm), recipes[kind], record))
+    await gripper.close()
+    await camera.close()
+    await records.close()
+    return spent
+
+
+def table(results: dict[str, list[Inspected]], spent: dict[str, list[dict[str, float]]]) -> list[str]:
+    """Medians over the repeats."""
+    rows = []
+    for kind, _ in FRUIT:
+        outcome_s = statistics.median(each.to_outcome_s for each in results[kind])
+        cycle_s = statistics.median(each.to_ready_s for each in results[kind])
+        parts = {name: statistics.median(each[name] for each in spent[kind]) for name in spent[kind][0]}
+        floor_s = sum(parts.values())
+        ours_s = cycle_s - floor_s
+        rows.append(
+            f"| {kind} | {outcome_s:.2f} | {cycle_s:.2f} | {parts['motion']:.2f} | {parts['settling']:.2f} | "
+            f"{parts['camera']:.2f} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / cycle_s:.1f} % |"
+        )
+    return rows
+
+
+def main() -> None:
+    """Measure, print and write the table."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "station.yaml"
+        file.write_text(
+            f"home: {folder}\narm: {{host: {HOST}}}\n"
+            f"gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}}}\n"
+            "camera: {twin: {port: 49310}}\nmetrics: {port: 49312}\nrecords: {free_reserve_mb: 1}\n"
+            "service: {patience: 10.0}\n"
+        )
+        configuration = load_configuration(file, {})
+        twin = start("twin", file, "--console", str(CONSOLE))
+        try:
+            service = start("service", file)
+            try:
+                results = asyncio.run(inspect(configuration))
+            finally:
+                service.terminate()
+                service.communicate()
+            spent = asyncio.run(floors(configuration, results))
+        finally:
+            twin.terminate()
+            twin.communicate()
+    load = os.getloadavg()[0]
+    lines = [
+        "# How long a fruit takes, and what of it is ours",
+        "",
+        f"Written by `./run bench cycle`: medians of {REPEATS} inspections of each fruit on the twin with its arm,",
+        f"with a load of {load:.1f} on {os.cpu_count()} cores. The cycle is from trigger to ready again. Beside it,",
+        "in the same run, the floor: the same drivers make the same moves to the same widths, settle as long and take",
+        "as many frames, with no reference examined, nothing measured, judged, recorded or told. Ours is the cycle",
+        "less the floor; what others make of a busy machine's processors counts as ours.",
+        "",
+        "| fruit | to outcome, s | cycle, s | motion, s | settling, s | camera, s | floor, s | ours, s | ours, share |",
+        "|---|---|---|---|---|---|---|---|---|",
+        *table(results, spent),
+        "",
+    ]
+    print("\n".join(lines))
+    (ROOT / "docs" / "cycle-time.md").write_text("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

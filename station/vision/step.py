@@ -1,0 +1,50 @@
+"""The contact of one width step, from all of its frames."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from station.vision.confidence import agreement
+from station.vision.contact import Contact, Flag, Image, Method
+
+
+def measure_step(method: Method, frames: Sequence[Image], least_confidence: float) -> Contact:
+    """Measure the mean of a step's frames, and doubt it as far as the frames measured one by one disagree.
+
+    It takes one measurement more than there are frames, or one for a single frame.
+
+    Args:
+        method: prepared for the reference.
+        frames: one or more of one shape (height, width, 3), dtype uint8, in which nothing has moved.
+        least_confidence: the recipe's; below it the contact is flagged.
+
+    Returns:
+        The mean image's contact. A confidence that the method gives is multiplied by the frames' `agreement`.
+
+    Raises:
+        ValueError: there is no frame, or they are not of the reference's shape and of one dtype.
+    """
+    if not frames:
+        raise ValueError("no frame to measure: a step needs at least one")
+    if len(frames) == 1:
+        return method.measure(frames[0])
+    alone = [method.measure(frame) for frame in frames]
+    contact = method.measure(mean_image(frames))
+    if contact.confidence is None:
+        return contact
+    confidence = contact.confidence * agreement([one.area_px for one in alone])
+    doubted = frozenset({Flag.LOW_CONFIDENCE}) if confidence < least_confidence else frozenset[Flag]()
+    return replace(contact, confidence=confidence, flags=contact.flags | doubted)
+
+
+def mean_image(frames: Sequence[Image]) -> Image:
+    """The mean of frames, rounded.
+
+    Args:
+        frames: one or more of one shape, dtype uint8.
+    """
+    total = np.zeros(frames[0].shape, np.uint16)
+    for frame in frames:
+        total += frame
+    return ((total + len(frames) // 2) // len(frames)).astype(np.uint8)

@@ -1,0 +1,124 @@
+"""The station as a process of its own on a whole simulated cell: killed, told to end, stopped by the arm."""
+
+import asyncio
+import contextlib
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from station.channel.client import ChannelClient
+from station.channel.line import CommandName, PackmlState
+from station.settings.configuration import load_configuration
+from station.settings.plc import line_endpoint
+from station.twin.console import ask
+from station.vocabulary import Reason
+
+
+@pytest.fixture
+def cell(settings_file, line_client):
+    """A twin with an arm; starts and ends the station's processes."""
+    file = settings_file(bench=False)
+
+    class Cell:
+        def __init__(self):
+            self.twin = self.start("twin", "--fruit", "blueberry", "--console", "0")
+            self.console = next(
+                int(line.split(":")[1]) for line in self.twin.stdout or () if line.startswith("console")
+            )
+            self.started = [self.twin]
+
+        def start(self, *arguments):
+            command = [sys.executable, "-m", "station", *arguments, "--config", str(file)]
+            return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+        def service(self):
+            process = self.start("service", "--log", "json")
+            self.started.append(process)
+            assert process.stdout is not None
+            assert process.stderr is not None
+            assert any(line.startswith("running") for line in process.stdout), process.stderr.read()
+            return process
+
+        def fault(self, device, fault):
+            for do in ("set", "clear"):
+                ask("127.0.0.1", self.console, {"do": do, "device": device, "fault": fault, "amount": 1.0})
+
+        def recover(self, what):
+            with self.start("devices", "recover", what, "--yes") as process:
+                process.communicate(timeout=60)
+                return process.returncode
+
+        @contextlib.asynccontextmanager
+        async def line(self):
+            configuration = load_configuration(file, {})
+            async with ChannelClient(line_endpoint(configuration.handshake, configuration.home), "the station") as c:
+                yield line_client(c)
+
+    made = Cell()
+    yield made
+    for process in reversed(made.started):
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+
+
+@pytest.mark.timeout(240)
+def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
+    first = cell.service()
+
+    async def until_killed():
+        async with cell.line() as line:
+            assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
+            await line.ready()
+            begun = await line.begin()
+            assert (await line.state()).packml_state in {PackmlState.STARTING, PackmlState.EXECUTE}
+            first.kill()
+            first.wait()
+            return begun
+
+    begun = asyncio.run(until_killed())
+    second = cell.service()
+
+    async def until_ended():
+        async with cell.line() as line:
+            ready = await line.ready()
+            assert ready.recipe_number == 2, "the recipe chosen last is active again"
+            held = await line.open()
+            assert held.running is None
+            [lost] = held.outcomes
+            assert (lost.sequence, lost.outcome, lost.reasons) == (begun.sequence, "NO_RESULT", (Reason.STATION_LOST,))
+            assert await line.outcome(begun.sequence) == lost
+            await line.publish(lost)
+            assert (await line.open()).outcomes == ()
+
+            stopped = await line.begin()
+            assert stopped.sequence == begun.sequence + 1
+            cell.fault("arm", "protective_stop")
+            outcome = await line.outcome(stopped.sequence)
+            assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.ARM_FAULT)
+            await line.publish(outcome)
+            state = await line.state()
+            assert (state.ready, state.packml_state, state.error_code) == (False, PackmlState.ABORTED, 2)
+            refused = await line.order(CommandName.RESET)
+            assert not refused.done
+            assert "station devices recover" in refused.why
+            assert await asyncio.to_thread(cell.recover, "protective-stop") == 0
+            assert not (await line.state()).ready, "only a reset lets the station go on"
+            done = await line.order(CommandName.RESET)
+            assert done.done, done.why
+            await line.ready()
+
+            called_off = await line.begin()
+            waiting = asyncio.create_task(line.outcome(called_off.sequence))
+            await asyncio.sleep(0)
+            second.send_signal(signal.SIGTERM)
+            second.send_signal(signal.SIGTERM)
+            return await waiting
+
+    outcome = asyncio.run(until_ended())
+    assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
+    _, log = second.communicate(timeout=60)
+    assert second.returncode == 0, log
+    assert "Traceback" not in log

@@ -1,0 +1,59 @@
+"""A width step measured from all of its frames."""
+
+import numpy as np
+import pytest
+
+from station.settings.segmentation import PaperParameters, RobustParameters
+from station.vision.contact import Flag
+from station.vision.paper import PaperMethod
+from station.vision.robust import RobustMethod
+from station.vision.step import mean_image, measure_step
+
+
+def test_one_frame_is_measured_as_it_is(sphere_press):
+    press = sphere_press()
+    method = RobustMethod([press.reference], RobustParameters())
+    alone = method.measure(press.image)
+    step = measure_step(method, [press.image], 0.5)
+    assert (step.area_px, step.confidence, step.flags) == (alone.area_px, alone.confidence, alone.flags)
+
+
+def test_frames_that_agree_keep_the_confidence_and_their_mean_is_measured(sphere_press, overlap):
+    frames = [sphere_press(seed=seed).image for seed in range(3)]
+    press = sphere_press()
+    method = RobustMethod([press.reference], RobustParameters())
+    step = measure_step(method, frames, 0.5)
+    assert overlap(step.mask, press.truth) > 0.85
+    assert step.area_px == method.measure(mean_image(frames)).area_px
+    assert step.confidence is not None
+    assert step.confidence > 0.7
+    assert Flag.LOW_CONFIDENCE not in step.flags
+
+
+def test_frames_that_disagree_are_doubted_and_flagged(sphere_press):
+    press = sphere_press()
+    method = RobustMethod([press.reference], RobustParameters())
+    frames = [sphere_press(radius_px=radius).image for radius in (40, 70, 100)]
+    step = measure_step(method, frames, 0.5)
+    assert step.area_px > 0
+    assert step.confidence is not None
+    assert step.confidence < 0.3
+    assert Flag.LOW_CONFIDENCE in step.flags
+
+
+def test_a_method_without_a_confidence_stays_without(sphere_press):
+    small = [np.ascontiguousarray(sphere_press(seed=seed).image[::8, ::8]) for seed in range(2)]
+    method = PaperMethod(small[0], PaperParameters())
+    assert measure_step(method, small, 0.5).confidence is None
+
+
+def test_the_mean_is_rounded():
+    frames = [np.full((2, 2, 3), level, np.uint8) for level in (255, 254, 254)]
+    assert (mean_image(frames) == 254).all()
+    assert mean_image(frames[:2]).max() == 255
+
+
+def test_a_step_without_frames_is_refused(sphere_press):
+    method = RobustMethod([sphere_press().reference], RobustParameters())
+    with pytest.raises(ValueError, match="at least one"):
+        measure_step(method, [], 0.5)
