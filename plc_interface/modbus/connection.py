@@ -65,8 +65,10 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
             self._hub.note(trouble, self.peer, f"{why}: its connection is closed")
         self._end("")
         transport = cast("asyncio.Transport | None", self.transport)
+        # asked before it is closed: a TLS transport that is closed twice has forgotten its buffer
+        stuck = transport is not None and (transport.is_closing() or transport.get_write_buffer_size() > 0)
         self.close()
-        if transport is not None and transport.get_write_buffer_size():
+        if transport is not None and stuck:
             transport.abort()
 
     def get_buffer(self, sizehint: int) -> memoryview:

@@ -270,6 +270,52 @@ def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
     assert len(made.of(do.ClearFaults)) == 1
 
 
+@pytest.mark.parametrize("lost", ["writer", "heartbeat", "interface"])
+def test_an_enable_left_high_over_a_loss_never_arms_again(bench, lost):
+    made = bench()
+    made.armed()
+    if lost == "writer":
+        made.feed(ev.WriterWent)
+        made.feed(ev.WriterCame)
+    elif lost == "heartbeat":
+        made.write("enable", plc_heartbeat=1)
+        made.now_s += made.settings.plc_heartbeat_timeout_s
+        made.feed(ev.Tick)
+    else:
+        made = bench(made.state.journal)
+        made.feed(ev.WriterCame)
+        made.write("enable")
+    made.link(boot="2")
+    for trigger_id in (7, 8):
+        made.write("enable")
+        made.write("enable", "trigger", trigger_id=trigger_id)
+        assert (made.state.last_refusal, made.state.last_refused_id) == (Refusal.NOT_ENABLED, trigger_id)
+    assert made.of(do.AskBegin) == []
+    made.write()
+    made.write("enable")
+    assert made.state.arming is Arming.ARMED
+
+
+def test_a_lost_station_gives_one_outcome_and_what_it_says_later_does_not_replace_it(bench):
+    made = bench()
+    made.run()
+    made.now_s += made.settings.station_lost_after_s
+    made.feed(ev.Tick)
+    (lost,) = made.state.queue
+    assert (lost.sequence, lost.outcome, lost.reasons) == (41, "NO_RESULT", (Reason.STATION_LOST,))
+    assert made.of(do.PassOn) == [do.PassOn(lost)]
+    made.feed(ev.OutcomeCame, made.outcome())
+    made.link(Open(running=None, outcomes=(made.outcome(),)), boot="2")
+    made.feed(ev.OutcomeCame, made.outcome())
+    assert made.state.queue == (lost,)
+    assert view(made.state)["result_outcome"] == BY_NAME["result_outcome"].code("NO_RESULT")
+    assert made.of(do.PassOn) == [do.PassOn(lost)]
+    assert {action.outcome for action in made.of(do.TellPublished)} == {lost}
+    made.write("enable", acknowledged_sequence=41)
+    made.feed(ev.OutcomeCame, made.outcome())
+    assert made.state.queue == ()
+
+
 def status(made):
     word = view(made.state)["status"]
     assert isinstance(word, int)

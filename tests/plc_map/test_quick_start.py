@@ -44,12 +44,12 @@ def test_every_command_answers_what_the_document_says(serve, mbpoll):
             for command, expected in steps:
                 async with asyncio.timeout(DEADLINE_S):
                     while (got := await answer([mbpoll, *command[1:]], rig.port)) != expected:
-                        polled = command[command.index("-r") + 1] in {"103", "112", "128"}
+                        polled = command[command.index("-r") + 1] in {"103", "106", "112", "128"}
                         assert polled, f"{shlex.join(command)}: {got}"
                         await asyncio.sleep(0.05)
-            return rig.begun, rig.state.queue
+            return rig.commands, rig.begun, rig.state.queue
 
-    assert asyncio.run(main()) == ([(7, 0, "")], ())
+    assert asyncio.run(main()) == ([("change_recipe", 3)], [(7, 0, "")], ())
 
 
 def test_the_python_in_the_document_inspects_a_fruit(serve, capsys):

@@ -2,8 +2,12 @@
 
 import datetime as dt
 import ipaddress
+import os
+import re
+import shutil
 import socket
 import ssl
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -18,6 +22,7 @@ from station.errors import StationError
 from station.settings.modbus import ModbusTlsSettings
 
 REFERENCE = BY_NAME["reference_u16"].address
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "plc" / "server.md"
 NOW = dt.datetime.now(dt.UTC)
 YEAR = dt.timedelta(days=365)
 
@@ -139,6 +144,14 @@ class TestRoles:
         assert is_parted_from(dial(*authority.issue("somebody", role)))
         assert serving.server.statistics.troubles[Trouble.NOT_ALLOWED] == 1
 
+    def test_one_that_closes_while_the_server_ends_does_not_keep_it(self, serving, dial, authority):
+        """A TLS transport that was closed once is closed again."""
+        dial(*authority.issue("line-plc", "writer")).read(REFERENCE, 1)
+        (member,) = serving.server._hub._members.values()
+        serving.call(lambda: (member.transport.close(), serving.server._hub.close()))
+        serving.wait(lambda: member.transport is None)
+        assert serving.server.connections == 0
+
     def test_pipelined_requests_over_tls(self, dial, authority):
         plc = dial(*authority.issue("line-plc", "writer"))
         requests = [plc.request(bytes([3, 0, REFERENCE, 0, 1])) for _ in range(200)]
@@ -216,6 +229,25 @@ class TestBadFiles:
             other.listen()
             assert "modbus.tls.port" in refusal()
         assert serve().server.connections == 0
+
+
+def test_the_commands_in_the_document_make_a_writer(connect, serve, tls_port, tmp_path):
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        assert os.environ.get("CI") != "true", "openssl is missing, and CI=true says that nothing may be"
+        pytest.skip("openssl is missing on this machine")
+    (commands,) = re.findall(r"```\n(new=.*?)```", DOCUMENT.read_text("utf-8"), re.DOTALL)
+    done = subprocess.run(["bash", "-ec", commands], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    files = {name: tmp_path / f"{name}.pem" for name in ("station", "authority")}
+    tls = {"certificate": files["station"], "key": tmp_path / "station.key", "client_authority": files["authority"]}
+    serving = serve(tls={"enabled": True, "port": tls_port, **tls})
+    context = ssl.create_default_context(cafile=files["authority"])
+    context.load_cert_chain(tmp_path / "plc.pem", tmp_path / "plc.key")
+    plc = connect(serving, "127.0.0.1", tls_port)
+    plc.socket = context.wrap_socket(plc.socket, server_hostname="127.0.0.1")
+    plc.claim()
+    assert str(serving.server.writer).endswith("(CN=plc)")
 
 
 def test_the_settings_want_the_files():
