@@ -79,7 +79,10 @@ class Orders:
         silent = age_s > LINE_SILENT_S
         alarms.show(AlarmId.PLC_INTERFACE_LOST, self.line_trouble() if silent else "")
         alarms.show(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_trouble())
-        alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in line.faults if "CAN" in fault), ""))
+        can = [fault for fault in line.faults if fault.startswith("CAN:")]
+        shots = [fault for fault in can if fault.startswith(("CAN: shot ", "CAN: the gate reports"))]
+        alarms.show(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
+        alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
 
     async def carry_out(self, command: Command) -> CommandDone:
         """Carry out one command.

@@ -141,7 +141,7 @@ class Service:
         return await self.triggers.outcome(sequence)
 
     async def published(self, outcome: Outcome) -> None:
-        """Note durably what the PLC was told, and count it, once.
+        """Note durably what the PLC was told, and count it, once; a fruit that is still inspected is called off by it.
 
         Args:
             outcome: what stands from now on.
@@ -153,6 +153,8 @@ class Service:
             fruit = "" if now is None else now.active.recipe.name
             self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
             self._watch_outcomes(outcome)
+        if self.running is not None and self.running.sequence == outcome.sequence and self.state in UNJUDGED:
+            self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
 
     async def open(self) -> Open:
         """What was begun and not acknowledged."""

@@ -106,9 +106,9 @@ class CanSettings(Settings):
         le=5.0,
     )
     distance_counts: int = setting(
-        12_000,
+        90_000,
         title="Nest to gate",
-        description="Encoder counts from the nest to the gate's flap; the default is the twin's. Measure yours.",
+        description="Encoder counts from the nest to the gate's flap; measure yours. The default gives the twin 30 s.",
         ge=1,
         le=1_000_000_000,
     )

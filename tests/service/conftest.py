@@ -70,8 +70,8 @@ class LineClient:
     client: ChannelClient
     ids: Any = field(default_factory=lambda: itertools.count(1))
 
-    async def state(self) -> StationState:
-        return await self.client.ask(LINE, StationState, deadline_s=20)
+    async def state(self, *faults: str) -> StationState:
+        return await self.client.ask(LINE.model_copy(update={"faults": faults}), StationState, deadline_s=20)
 
     async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
         return await self.client.ask(Command(command=command, argument=argument), CommandDone, deadline_s=40)

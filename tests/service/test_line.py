@@ -4,8 +4,9 @@ import asyncio
 
 import pytest
 
-from station.channel.line import CommandName, PackmlState
+from station.channel.line import CommandName, Outcome, PackmlState
 from station.channel.messages import RefusedError
+from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.states import State
 from station.vocabulary import Reason, Refusal
 
@@ -68,6 +69,52 @@ def test_the_life_of_triggers_and_commands(bench):
             assert (await line.ready()).mode == 1
             with pytest.raises(RefusedError, match="no inspection 999"):
                 await line.outcome(999)
+
+    asyncio.run(scenario())
+
+
+def test_a_fruit_that_was_given_another_outcome_is_not_pressed_on(bench):
+    async def scenario():
+        async with bench() as cell:
+            line = cell.line
+            await cell.choose("blueberry")
+            await line.ready()
+            begun = await line.begin()
+            await cell.reach(State.CLOSING_TO_ONSET)
+            judged = []
+            cell.at(State.JUDGING, lambda: judged.append(begun.sequence))
+            told = Outcome(
+                sequence=begun.sequence, trigger_id=1, outcome="NO_RESULT", reasons=(Reason.STATION_LOST,),
+                late=False, partial=True, simulated=True, area_mm2=None, area_px=None, closing_mm=None, confidence=None,
+                recipe_number=2, recipe_checksum=0, began_utc_ms=0, ended_utc_ms=0, duration_ms=0, encoder=0, lot="",
+            )  # fmt: skip
+            await line.publish(told)
+            assert (await line.outcome(begun.sequence)).reasons[0] is Reason.STATION_LOST
+            await line.ready()
+            assert judged == []
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("fault", "alarm"),
+    [
+        ("CAN: the reject gate, node 16, has fallen silent", AlarmId.CAN_NODE_LOST),
+        ("CAN: shot 7 was not confirmed", AlarmId.GATE_NOT_FIRED),
+    ],
+)
+def test_what_the_line_tells_of_its_can_raises_its_own_alarm(bench, fault, alarm):
+    async def scenario():
+        async with bench() as cell:
+
+            async def raised():
+                word = (await cell.line.state(fault)).alarms
+                known = (AlarmId.CAN_NODE_LOST, AlarmId.GATE_NOT_FIRED)
+                return [one for one in known if word >> (ALARMS[one].number - 1) & 1]
+
+            async with asyncio.timeout(30):
+                while await raised() != [alarm]:
+                    await asyncio.sleep(0.05)
 
     asyncio.run(scenario())
 
