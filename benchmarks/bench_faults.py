@@ -21,7 +21,7 @@ from reliability.report import markdown
 from reliability.rig import CannotDoError, running
 from reliability.scenario import DiskFault, Phase, Scenario, load_scenarios
 
-from station.errors import StationError
+from station.errors import BadInputError, StationError
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENARIOS = ROOT / "tests" / "reliability" / "scenarios"
@@ -103,7 +103,11 @@ def main() -> None:
     parser.add_argument("--dry", action="store_true", help="leave the page as it is")
     parser.add_argument("--list", action="store_true", help="name the scenarios")
     asked = parser.parse_args()
-    scenarios = load_scenarios(asked.scenarios)
+    try:
+        scenarios = load_scenarios(asked.scenarios)
+    except BadInputError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
     unknown = set(asked.names) - {scenario.name for scenario in scenarios}
     if unknown or asked.list:
         print("scenarios: " + ", ".join(scenario.name for scenario in scenarios))

@@ -14,7 +14,7 @@ from .rig import CannotDoError, Rig
 from .scenario import Phase, Scenario
 from .wire import Shown
 
-_PATIENCE_S = 90.0
+_PATIENCE_S = 120.0
 _STAYS_S = 3.0
 _LOOK_S = 0.01
 _WHY_EVERY_S = 0.3
@@ -53,14 +53,14 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
     accepted_before, passages_before = len(wire.accepted), len(wire.passages)
     asking = asyncio.create_task(_ask_why(rig, row), name="asking why")
     try:
-        if not await _until(_now(lambda: wire.ready)):
-            raise _Stuck("not ready before the fault")
+        await _sure(lambda: wire.ready, lambda: f"not ready before the fault ({wire.standing})")
         wire.forget_alarms()
+        if phase is Phase.APPROACH:
+            await rig.watch_arm()
         await rig.lay_and_trigger()
         await _disturb(rig, scenario, phase, accepted_before, passages_before)
         cleared_s = time.monotonic()
-        if not await _until(_now(lambda: len(wire.passages) > passages_before)):
-            raise _Stuck("the line waits for an outcome for ever")
+        await _sure(lambda: len(wire.passages) > passages_before, lambda: f"the line gets no outcome ({wire.standing})")
         await _recover(rig, scenario, row, cleared_s, wrong)
         first = wire.passages[passages_before]
         row.outcome, row.reasons = first.decision.value, first.reasons
@@ -76,7 +76,7 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
     except CannotDoError as error:
         row.skipped = str(error)
     finally:
-        rig.unwatch_arm()
+        await rig.unwatch_arm()
         asking.cancel()
         await asyncio.gather(asking, return_exceptions=True)
         if scenario.fault is not None:
@@ -94,14 +94,12 @@ class _Stuck(Exception):  # noqa: N818 (no error of the program's)
 async def _disturb(rig: Rig, scenario: Scenario, phase: Phase, accepted_before: int, passages_before: int) -> None:
     if scenario.fault is None:
         return
-    if phase is Phase.APPROACH:
-        await rig.watch_arm()
     began_s = time.monotonic()
     while not await rig.reached(phase, accepted_before):
         if len(rig.wire.passages) > passages_before or time.monotonic() > began_s + _PATIENCE_S:
             raise _Stuck("the phase was not seen before the outcome")
         await asyncio.sleep(_LOOK_S)
-    rig.unwatch_arm()
+    await rig.unwatch_arm()
     await rig.begin(scenario.fault)
     await asyncio.sleep(scenario.lasts_s)
     await rig.end(scenario.fault)
@@ -118,7 +116,7 @@ async def _recover(rig: Rig, scenario: Scenario, row: Row, since_s: float, wrong
                 wrong.append(f"`{remedy}` was not carried out")
             since_s = time.monotonic()
     if not await _until(_now(lambda: rig.wire.ready)):
-        raise _Stuck("not ready again" + ("" if row.why else ", and nothing says why"))
+        raise _Stuck(f"not ready again ({rig.wire.standing})" + ("" if row.why else ", and nothing says why"))
     row.recovered_s = round(max(0.0, time.monotonic() - since_s), 1)
 
 
@@ -192,6 +190,11 @@ async def _ask_why(rig: Rig, row: Row) -> None:
         if why and not any(words in why for words in _PASSING):
             row.why = why
         await asyncio.sleep(_WHY_EVERY_S)
+
+
+async def _sure(holds: Callable[[], bool], otherwise: Callable[[], str]) -> None:
+    if not await _until(_now(holds)):
+        raise _Stuck(otherwise())
 
 
 def _now(holds: Callable[[], bool]) -> Callable[[], Awaitable[bool]]:

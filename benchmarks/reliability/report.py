@@ -9,9 +9,9 @@ _HEAD = """# What becomes of the fruit when something fails
 
 <!-- made by ./run bench faults -->
 
-Written by `./run bench faults`: the simulated cell, the station's process and the PLC interface as real processes under
-the supervisor, the line's PLC program on Modbus TCP. Each row begins a fault at a phase of one fruit's inspection, as it
-can be seen from outside, takes it back, and then has a good fruit inspected. A row holds where
+Written by `./run bench faults`: the simulated cell, the station's process and the PLC interface as real processes
+under the supervisor, the line's PLC program on Modbus TCP. Each row begins a fault at a phase of one fruit's
+inspection, as it can be seen from outside, takes it back, and then has a good fruit inspected. A row holds where
 
 - the accepted trigger got exactly one result, with its own id, that never changed or came again,
 - SQLite's record says what the PLC read, and that it was acknowledged,
@@ -20,8 +20,8 @@ can be seen from outside, takes it back, and then has a good fruit inspected. A 
 - the station was ready again by itself, or stayed stopped with a sentence on why, and was ready after the verbs given,
 - the next fruit, a good one, got PASS.
 
-Phases: *trigger*: the PLC has seen its trigger accepted; *approach*: the arm moves; *stepping*: the fruit is deformed by
-0.5 mm; *releasing*: the PLC sees the result. Scenarios and what is expected of each: `tests/reliability/scenarios`.
+Phases: *trigger*: the PLC has seen its trigger accepted; *approach*: the arm moves; *stepping*: the fruit is deformed
+by 0.5 mm; *releasing*: the PLC sees the result. Scenarios and what is expected of each: `tests/reliability/scenarios`.
 The station works with a quick recipe of 6 steps and a patience of 5; times are from the fault's end, or the last verb,
 to ready for a trigger, on a machine with other work.
 
@@ -55,10 +55,8 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
         "",
         "## Not played",
         "",
-        "- Clock steps of an hour: they need the right to set the machine's clock, or a library that fakes it, and this",
-        "  bench has neither. What the station does is tested on a clock of its own in `tests/service`.",
-        "- The twin's faults `garbage`, `wrong`, `slow`, `delayed` and `intermittent` of each device: each is tested",
-        "  against its driver.",
+        "- Clock steps of an hour: they need a machine whose clock may be set, or a library that fakes it.",
+        "- The twin's faults `garbage`, `wrong`, `slow`, `delayed` and `intermittent`.",
         "",
     ]
     remarks = [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]

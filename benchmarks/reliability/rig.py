@@ -11,11 +11,11 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import psutil
-from rtde_receive import RTDEReceiveInterface
 
 from plc_interface.client import StationClient
 from plc_interface.client_errors import ClientError
@@ -40,9 +40,9 @@ _MARKS = {
     "plc": "-m station plc run",
     "arm": "-m station.devices.arm.process",
 }
-_MOVING_M_PER_S = 0.02
 _DEFORMED_MM = 0.5
 _JAWS_OPEN_MM = 50.0
+_START_S = 120.0
 
 
 class CannotDoError(StationError):
@@ -67,7 +67,8 @@ class Rig:
         modbus = configuration.modbus
         scanner = Scanner(modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order))
         self.wire = Wire(scanner, lambda: self.twin(do="remove"))
-        self._rtde: RTDEReceiveInterface | None = None
+        self._watching: asyncio.subprocess.Process | None = None
+        self._moving: asyncio.Task[bytes] | None = None
 
     async def twin(self, **request: Any) -> Any:
         """Ask the twin's console."""
@@ -83,15 +84,25 @@ class Rig:
         return (await self.twin(do="state"))["width_mm"] > _JAWS_OPEN_MM
 
     async def watch_arm(self) -> None:
-        """Listen to the arm's controller, as a client beside the station's."""
-        host = self.configuration.arm.host
-        self._rtde = await asyncio.to_thread(RTDEReceiveInterface, host, 125.0, ["actual_TCP_speed"])
+        """Look out for the arm's motion, as a client of its controller beside the station."""
+        script = Path(__file__).with_name("arm_motion.py")
+        self._watching = await asyncio.create_subprocess_exec(
+            sys.executable, str(script), self.configuration.arm.host, stdout=asyncio.subprocess.PIPE
+        )
+        output = self._watching.stdout
+        if output is None or await output.readline() != b"watching\n":
+            raise CannotDoError("the arm's controller takes no second client")
+        self._moving = asyncio.create_task(output.readline(), name="arm's motion")
 
-    def unwatch_arm(self) -> None:
+    async def unwatch_arm(self) -> None:
         """End that. Idempotent."""
-        if self._rtde is not None:
-            self._rtde.disconnect()
-            self._rtde = None
+        if self._watching is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._watching.kill()
+            await self._watching.wait()
+        if self._moving is not None:
+            await self._moving
+        self._watching = self._moving = None
 
     async def reached(self, phase: Phase, accepted_before: int) -> bool:
         """Whether the cycle has got to a phase.
@@ -102,8 +113,8 @@ class Rig:
         """
         if len(self.wire.accepted) <= accepted_before:
             return False
-        if phase is Phase.APPROACH and self._rtde is not None:
-            return sum(speed**2 for speed in self._rtde.getActualTCPSpeed()[:3]) > _MOVING_M_PER_S**2
+        if phase is Phase.APPROACH:
+            return self._moving is not None and self._moving.done()
         if phase is Phase.STEPPING:
             return (await self.twin(do="state"))["closing_mm"] > _DEFORMED_MM
         return phase is not Phase.RELEASING or self.wire.result_valid
@@ -270,7 +281,7 @@ async def running(folder: Path, number: int, *, own_disk: bool = False) -> Async
     rig = Rig(configuration, file, console)
     environment = {**os.environ, "STATION_HOME": str(folder / "home"), "OMP_NUM_THREADS": "1"}
     programs = [twin_program(file, console, 1, logs), *station_programs(file, logs)]
-    supervisor = Supervisor(programs, environment)
+    supervisor = Supervisor([replace(each, start_limit_s=_START_S) for each in programs], environment)
     ended, ready = asyncio.Event(), asyncio.Event()
     if own_disk:
         await rig.mount_records()
@@ -286,7 +297,7 @@ async def running(folder: Path, number: int, *, own_disk: bool = False) -> Async
         scanning = asyncio.create_task(rig.wire.run(), name="scanning")
         yield rig
     finally:
-        rig.unwatch_arm()
+        await rig.unwatch_arm()
         waiting.cancel()
         if scanning is not None:
             rig.wire.stop()

@@ -65,6 +65,14 @@ class Wire:
         """Whether a result can be read now."""
         return self._now("result_valid")
 
+    @property
+    def standing(self) -> str:
+        """Where the PLC's program is and what the station's status bits are, in words."""
+        if self._inputs is None:
+            return f"PLC {self._program.stage}, the interface does not answer"
+        bits = BY_NAME["status"].names(int(self._inputs["status"]))
+        return f"PLC {self._program.stage}, status {', '.join(sorted(bits)) or 'none'}"
+
     def forget_alarms(self) -> None:
         """Begin to note alarms anew."""
         self.alarms.clear()
