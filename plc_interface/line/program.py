@@ -25,7 +25,7 @@ ANSWER_LIMIT_S = 10.0
 RESULT_MARGIN_S = 2.0
 """Added to the station's own deadline for a result."""
 LONGEST_SCAN_S = 0.9
-"""After a longer pause between two scans the station may have disarmed for want of a heartbeat: from the claim again."""
+"""After a longer pause between scans the station may have disarmed for want of a heartbeat: from the claim again."""
 _LONGEST_RESULT_S = 120.0
 _FAULT_S = 1.5
 _FROZEN_S = 3.0

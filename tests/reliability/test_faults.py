@@ -10,7 +10,6 @@ import pytest
     ("scenario", "phase", "outcome"),
     [
         ("service_killed", "stepping", "NO_RESULT"),
-        ("plc_interface_killed", "stepping", "PASS"),
         ("arm_protective_stop", "approach", "NO_RESULT"),
     ],
 )
@@ -31,7 +30,7 @@ def test_an_expectation_that_is_not_met_is_told(bench_faults, tmp_path):
     assert "outcome PASS (), expected FAIL; alarm camera_lost was not raised" in output
 
 
-@pytest.mark.parametrize("text", ["scenarios: 3", "scenarios: [{name: a}]", "a: [", "scenarios: []\nmore: 1"])
+@pytest.mark.parametrize("text", ["scenarios: [{name: a}]", "a: ["])
 def test_a_broken_scenario_file_is_named(bench_faults, tmp_path, text):
     (tmp_path / "broken.yaml").write_text(text)
     code, _, errors = bench_faults("--scenarios", tmp_path, "--list")
