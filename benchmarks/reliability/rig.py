@@ -268,7 +268,7 @@ async def running(folder: Path, number: int, *, own_disk: bool = False) -> Async
         "recipes_folder": str(_quick_recipes(folder / "recipes")),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
-        "arm": {"host": host, "stale_after_s": 1.0},
+        "arm": {"host": host, "stale_after_s": 1.0, "link_lost_after_s": 2.0, "watchdog_hz": 0.5},
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
         "records": {"free_reserve_mb": 1},
