@@ -1,10 +1,12 @@
 """The page that the measured rows make."""
 
+import re
 from collections.abc import Sequence
 
 from .play import Row
 from .scenario import DeviceFault, DiskFault, Phase, ProcessFault, Scenario
 
+_ELSEWHERE = re.compile(r"/tmp/[^/ ]+/")
 _HEAD = """# What becomes of the fruit when something fails
 
 <!-- made by ./run bench faults -->
@@ -56,6 +58,7 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
         "## Not played",
         "",
         "- Clock steps of an hour: they need a machine whose clock may be set, or a library that fakes it.",
+        *_unplayed(rows, scenarios),
         "- The twin's faults `garbage`, `wrong`, `slow`, `delayed` and `intermittent`.",
         "",
     ]
@@ -84,9 +87,15 @@ def _named(scenario: Scenario) -> str:
     return "none"
 
 
+def _unplayed(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> list[str]:
+    played = {(row.scenario, row.phase) for row in rows}
+    left = {each.name: [phase for phase in each.phases if (each.name, phase.value) not in played] for each in scenarios}
+    return [f"- `{name}`: {', '.join(phases)}; not run yet." for name, phases in left.items() if phases]
+
+
 def _sentences(rows: Sequence[Row]) -> list[str]:
     chosen: dict[str, str] = {}
     for row in rows:
         if row.why and (row.scenario not in chosen or row.phase == Phase.STEPPING):
             chosen[row.scenario] = row.why
-    return [f"| {name} | {why.replace('|', '/')} |" for name, why in chosen.items()]
+    return [f"| {name} | {_ELSEWHERE.sub('…/', why.replace('|', '/'))} |" for name, why in chosen.items()]
