@@ -24,6 +24,8 @@ ANSWER_LIMIT_S = 10.0
 """A trigger or command that is answered later is given up."""
 RESULT_MARGIN_S = 2.0
 """Added to the station's own deadline for a result."""
+LONGEST_SCAN_S = 0.9
+"""After a longer pause between scans the station may have disarmed for want of a heartbeat: from the claim again."""
 _LONGEST_RESULT_S = 120.0
 _FAULT_S = 1.5
 _FROZEN_S = 3.0
@@ -127,6 +129,7 @@ class LineProgram:
         self._heartbeat = 0
         self._station_heartbeat: int | float | str | None = None
         self._heard_s: float | None = None
+        self._scanned_s: float | None = None
         self._since_s = 0.0
         self._acknowledge = False
         self._playing_after: LineFault | None = None
@@ -160,7 +163,9 @@ class LineProgram:
             The control block to write.
         """
         self.cut_wanted = self._ready = self._jaws_open = False
-        if inputs is None or not self._alive(inputs, now_s):
+        stood_still = self._scanned_s is not None and now_s - self._scanned_s > LONGEST_SCAN_S
+        self._scanned_s = now_s
+        if inputs is None or stood_still or not self._alive(inputs, now_s):
             self._lose(now_s)
         else:
             self._step(inputs, now_s, recipe if fruit_in_nest else None)

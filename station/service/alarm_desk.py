@@ -46,6 +46,8 @@ _ARM = {
     ArmCause.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
     ArmCause.SAFETY_FAULT: AlarmId.SAFETY_FAULT,
     ArmCause.LOCAL_CONTROL: AlarmId.ARM_NOT_REMOTE,
+    ArmCause.PROGRAM_STOPPED: AlarmId.ARM_NOT_REMOTE,
+    ArmCause.REGISTERS_IN_USE: AlarmId.ARM_NOT_REMOTE,
 }
 _GRIPPER_LINK = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from plc_interface.line.faults import FaultPlan, LineFault
-from plc_interface.line.program import ANSWER_LIMIT_S, HEARTBEAT_LIMIT_S, Decision, LineProgram, Stage
+from plc_interface.line.program import ANSWER_LIMIT_S, HEARTBEAT_LIMIT_S, LONGEST_SCAN_S, Decision, LineProgram, Stage
 from plc_interface.register_map import BY_NAME, RESULT, STATUS
 
 SCAN_S = 0.1
@@ -240,3 +240,14 @@ def test_every_fault_is_played_and_every_fruit_is_still_decided_once(fault):
     if fault is LineFault.SKIPPED_ID:
         assert station.accepted == [3, 6, 9]
     assert line.cuts == (3 if fault is LineFault.RECONNECT else 0)
+
+
+def test_a_scan_that_stood_still_arms_anew_as_the_station_has_disarmed_meanwhile():
+    station = Station()
+    line = Line(station)
+    line.until(lambda: line.program.free)
+    line.now_s += LONGEST_SCAN_S + SCAN_S
+    line.scan()
+    assert "enable" not in station.up
+    line.until(lambda: line.program.free)
+    assert "enable" in station.up

@@ -1,0 +1,1 @@
+"""Faults played against the real processes of a station, and what became of the fruit."""

@@ -1,0 +1,213 @@
+"""One scenario in one phase of the cycle: what was done, what the wire and the records say, what did not hold."""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+
+from pydantic import BaseModel, ConfigDict
+
+from station.records.database import reading
+from station.records.errors import RecordsError
+from station.records.reading import read_inspection
+
+from .rig import CannotDoError, Rig
+from .scenario import Phase, Scenario
+from .wire import Shown
+
+_PATIENCE_S = 120.0
+_STAYS_S = 3.0
+_LOOK_S = 0.01
+_WHY_EVERY_S = 0.3
+_PASSING = ("wait a moment", "Wait until")
+
+
+class Row(BaseModel):
+    """What was measured."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    scenario: str
+    phase: str
+    outcome: str = ""
+    reasons: tuple[str, ...] = ()
+    alarms: tuple[str, ...] = ()
+    why: str = ""
+    """The station's last sentence on why it was not ready, apart from those that ask for a moment."""
+    recovered_s: float | None = None
+    """From the fault's end, or from a person's last verb, to ready again."""
+    wrong: tuple[str, ...] = ()
+    """What did not hold."""
+    skipped: str = ""
+
+
+async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
+    """Play it on a ready station.
+
+    Args:
+        rig: the station.
+        scenario: what.
+        phase: when.
+    """
+    row, wrong = Row(scenario=scenario.name, phase=phase.value), list[str]()
+    wire = rig.wire
+    accepted_before, passages_before = len(wire.accepted), len(wire.passages)
+    asking = asyncio.create_task(_ask_why(rig, row), name="asking why")
+    try:
+        await _sure(lambda: wire.ready, lambda: f"not ready before the fault ({wire.standing})")
+        wire.forget_alarms()
+        if phase is Phase.APPROACH:
+            await rig.watch_arm()
+        await rig.lay_and_trigger()
+        await _disturb(rig, scenario, phase, accepted_before, passages_before)
+        cleared_s = time.monotonic()
+        await _sure(lambda: len(wire.passages) > passages_before, lambda: f"the line gets no outcome ({wire.standing})")
+        await _recover(rig, scenario, row, cleared_s, wrong)
+        first = wire.passages[passages_before]
+        row.outcome, row.reasons = first.decision.value, first.reasons
+        _as_expected(row, scenario, phase, wrong)
+        if not await _until(rig.jaws_open):
+            wrong.append("the jaws do not stand open")
+        row.alarms = tuple(sorted(wire.alarms))
+        if scenario.alarm and phase is not Phase.RELEASING and scenario.alarm not in wire.alarms:
+            wrong.append(f"alarm {scenario.alarm} was not raised")
+        await _next_fruit(rig, wrong)
+    except _Stuck as stuck:
+        wrong.append(str(stuck))
+    except CannotDoError as error:
+        row.skipped = str(error)
+    finally:
+        await rig.unwatch_arm()
+        asking.cancel()
+        await asyncio.gather(asking, return_exceptions=True)
+        if scenario.fault is not None:
+            await rig.end(scenario.fault)
+    row.alarms = tuple(sorted(wire.alarms))
+    wrong += [] if row.skipped else _disagreements(rig, accepted_before)
+    row.wrong = tuple(wrong)
+    return row
+
+
+class _Stuck(Exception):  # noqa: N818 (no error of the program's)
+    """The row cannot go on."""
+
+
+async def _disturb(rig: Rig, scenario: Scenario, phase: Phase, accepted_before: int, passages_before: int) -> None:
+    if scenario.fault is None:
+        return
+    began_s = time.monotonic()
+    while not await rig.reached(phase, accepted_before):
+        if len(rig.wire.passages) > passages_before or time.monotonic() > began_s + _PATIENCE_S:
+            raise _Stuck("the phase was not seen before the outcome")
+        await asyncio.sleep(_LOOK_S)
+    await rig.unwatch_arm()
+    await rig.begin(scenario.fault)
+    await asyncio.sleep(scenario.lasts_s)
+    await rig.end(scenario.fault)
+
+
+async def _recover(rig: Rig, scenario: Scenario, row: Row, since_s: float, wrong: list[str]) -> None:
+    if scenario.remedy:
+        if await _until(_now(lambda: rig.wire.ready), _STAYS_S):
+            wrong.append("came back without the person that it needs")
+        if not row.why:
+            wrong.append("nothing says why it is not ready")
+        for remedy in scenario.remedy:
+            if not await rig.carry_out(remedy):
+                wrong.append(f"`{remedy}` was not carried out")
+            since_s = time.monotonic()
+    if not await _until(_now(lambda: rig.wire.ready)):
+        raise _Stuck(f"not ready again ({rig.wire.standing})" + ("" if row.why else ", and nothing says why"))
+    row.recovered_s = round(max(0.0, time.monotonic() - since_s), 1)
+
+
+def _as_expected(row: Row, scenario: Scenario, phase: Phase, wrong: list[str]) -> None:
+    expected = scenario.of(phase)
+    if row.outcome not in expected.outcomes:
+        wrong.append(f"outcome {row.outcome} ({', '.join(row.reasons)}), expected {' or '.join(expected.outcomes)}")
+    elif row.outcome != "PASS" and expected.reasons and not set(expected.reasons) & set(row.reasons):
+        wrong.append(f"reasons {', '.join(row.reasons)}, expected {' or '.join(expected.reasons)}")
+
+
+async def _next_fruit(rig: Rig, wrong: list[str]) -> None:
+    before = len(rig.wire.passages)
+    await rig.lay_and_trigger()
+    if not await _until(_now(lambda: len(rig.wire.passages) > before)):
+        raise _Stuck("the next fruit gets no outcome")
+    after = rig.wire.passages[-1]
+    if after.decision.value != "PASS":
+        wrong.append(f"the next fruit, a good one, is {after.decision} ({', '.join(after.reasons)})")
+    if not await _until(_now(lambda: rig.wire.ready)):
+        wrong.append("not ready after the next fruit")
+
+
+def _disagreements(rig: Rig, accepted_before: int) -> list[str]:
+    """Where wire and records do not tell one story, for each trigger accepted in this row."""
+    wrong, wire = list[str](), rig.wire
+    if wire.doubled:
+        wrong.append(f"{wire.doubled} results came again after their acknowledgement")
+    accepted = wire.accepted[accepted_before:]
+    for trigger_id in accepted:
+        told = {number: shown for number, shown in wire.shown.items() if any(s.trigger_id == trigger_id for s in shown)}
+        if len(told) != 1:
+            wrong.append(f"trigger {trigger_id} has {len(told)} results: {sorted(told)}")
+        for sequence, shown in told.items():
+            if len(shown) != 1:
+                wrong.append(f"result {sequence} changed while it was shown")
+            wrong += _unlike_record(rig, sequence, next(iter(shown)))
+    if unknown := {s.trigger_id for shown in wire.shown.values() for s in shown} - set(wire.accepted):
+        wrong.append(f"results of triggers never accepted: {sorted(unknown)}")
+    return wrong
+
+
+def _unlike_record(rig: Rig, sequence: int, shown: Shown) -> list[str]:
+    try:
+        with reading(rig.records) as connection:
+            record = read_inspection(connection, sequence, rig.records)
+    except RecordsError as error:
+        return [f"result {sequence} is not in the records: {error}"]
+    told = record.standing
+    if told is None:
+        return [f"result {sequence} has no outcome in the records"]
+    wrong = list[str]()
+    if (told.trigger_id, told.outcome, tuple(sorted(told.reasons))) != (
+        shown.trigger_id, shown.outcome, shown.reasons
+    ):  # fmt: skip
+        wrong.append(f"result {sequence}: the PLC read {shown.outcome}, the records say {told.outcome}")
+    if record.acknowledged_utc_ms is None:
+        wrong.append(f"result {sequence} is not acknowledged in the records")
+    if shown.outcome == "PASS":
+        judged = record.judged
+        areas = [] if judged is None else [point.area_mm2 for point in judged.curve]
+        whole = len(areas) >= rig.recipe.steps.number and None not in areas
+        if judged is None or judged.outcome != "PASS" or judged.partial or not whole:
+            wrong.append(f"result {sequence} is PASS without a whole curve that was judged so")
+    return wrong
+
+
+async def _ask_why(rig: Rig, row: Row) -> None:
+    while True:
+        why = await rig.why_not_ready()
+        if why and not any(words in why for words in _PASSING):
+            row.why = why
+        await asyncio.sleep(_WHY_EVERY_S)
+
+
+async def _sure(holds: Callable[[], bool], otherwise: Callable[[], str]) -> None:
+    if not await _until(_now(holds)):
+        raise _Stuck(otherwise())
+
+
+def _now(holds: Callable[[], bool]) -> Callable[[], Awaitable[bool]]:
+    async def asked() -> bool:
+        return holds()
+
+    return asked
+
+
+async def _until(holds: Callable[[], Awaitable[bool]], limit_s: float = _PATIENCE_S) -> bool:
+    ends_s = time.monotonic() + limit_s
+    while not await holds():
+        if time.monotonic() > ends_s:
+            return False
+        await asyncio.sleep(_LOOK_S)
+    return True

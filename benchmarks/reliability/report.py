@@ -1,0 +1,101 @@
+"""The page that the measured rows make."""
+
+import re
+from collections.abc import Sequence
+
+from .play import Row
+from .scenario import DeviceFault, DiskFault, Phase, ProcessFault, Scenario
+
+_ELSEWHERE = re.compile(r"/tmp/[^/ ]+/")
+_HEAD = """# What becomes of the fruit when something fails
+
+<!-- made by ./run bench faults -->
+
+Written by `./run bench faults`: the simulated cell, the station's process and the PLC interface as real processes
+under the supervisor, the line's PLC program on Modbus TCP. Each row begins a fault at a phase of one fruit's
+inspection, as it can be seen from outside, takes it back, and then has a good fruit inspected. A row holds where
+
+- the accepted trigger got exactly one result, with its own id, that never changed or came again,
+- SQLite's record says what the PLC read, and that it was acknowledged,
+- a PASS has a whole curve that the station judged so,
+- the jaws stand open in the end, by the twin's truth,
+- the station was ready again by itself, or stayed stopped with a sentence on why, and was ready after the verbs given,
+- the next fruit, a good one, got PASS.
+
+Phases: *trigger*: the PLC has seen its trigger accepted; *approach*: the arm moves; *stepping*: the fruit is deformed
+by 0.5 mm; *releasing*: the PLC sees the result. Scenarios and what is expected of each: `tests/reliability/scenarios`.
+The station works with a quick recipe of 6 steps and a patience of 5; times are from the fault's end, or the last verb,
+to ready for a trigger, on a machine with other work.
+
+"""
+
+
+def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
+    """The page.
+
+    Args:
+        rows: measured.
+        scenarios: of the rows, and what was not run.
+    """
+    known = {scenario.name: scenario for scenario in scenarios}
+    held = sum(not row.wrong and not row.skipped for row in rows)
+    skipped = sum(bool(row.skipped) for row in rows)
+    lines = [
+        f"{len(rows)} rows: {held} hold, {len(rows) - held - skipped} do not, {skipped} could not be played.",
+        "",
+        "| fault | phase | outcome | alarms | ready again | holds |",
+        "|---|---|---|---|---|---|",
+        *(_line(row, known[row.scenario]) for row in rows),
+        "",
+        "## What the station says",
+        "",
+        "The last sentence at `/readyz` while it was not ready, in the phase stepping or the first played.",
+        "",
+        "| fault | why not ready |",
+        "|---|---|",
+        *_sentences(rows),
+        "",
+        "## Not played",
+        "",
+        "- Clock steps of an hour: they need a machine whose clock may be set, or a library that fakes it.",
+        *_unplayed(rows, scenarios),
+        "- The twin's faults `garbage`, `wrong`, `slow`, `delayed` and `intermittent`.",
+        "",
+    ]
+    remarks = [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]
+    return _HEAD + "\n".join([*lines, *(["## Remarks", "", *remarks, ""] if remarks else [])])
+
+
+def _line(row: Row, scenario: Scenario) -> str:
+    outcome = f"{row.outcome}: {', '.join(row.reasons)}" if row.reasons else row.outcome
+    verbs = ", ".join(f"`{remedy}`" for remedy in scenario.remedy)
+    back = "" if row.recovered_s is None else f"{row.recovered_s:.1f} s {'after ' + verbs if verbs else 'by itself'}"
+    holds = f"skipped: {row.skipped}" if row.skipped else f"**no**: {'; '.join(row.wrong)}" if row.wrong else "yes"
+    cells = (_named(scenario), row.phase, outcome, ", ".join(f"`{alarm}`" for alarm in row.alarms), back, holds)
+    return f"| {' | '.join(cells)} |"
+
+
+def _named(scenario: Scenario) -> str:
+    fault = scenario.fault
+    if isinstance(fault, DeviceFault):
+        return f"{fault.device} `{fault.fault}`, {scenario.lasts_s:g} s"
+    if isinstance(fault, ProcessFault):
+        stood = f", {scenario.lasts_s:g} s" if fault.signal == "SIGSTOP" else ""
+        return f"{fault.signal} to {fault.process}{stood}"
+    if isinstance(fault, DiskFault):
+        return f"records' disk {fault.disk.replace('_', '-')}, {scenario.lasts_s:g} s"
+    return "none"
+
+
+def _unplayed(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> list[str]:
+    played = {(row.scenario, row.phase) for row in rows}
+    left = {each.name: [phase for phase in each.phases if (each.name, phase.value) not in played] for each in scenarios}
+    return [f"- `{name}`: {', '.join(phases)}; not run yet." for name, phases in left.items() if phases]
+
+
+def _sentences(rows: Sequence[Row]) -> list[str]:
+    chosen: dict[str, str] = {}
+    for row in rows:
+        if row.why and (row.scenario not in chosen or row.phase == Phase.STEPPING):
+            chosen[row.scenario] = row.why
+    return [f"| {name} | {_ELSEWHERE.sub('…/', why.replace('|', '/'))} |" for name, why in chosen.items()]

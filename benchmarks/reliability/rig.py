@@ -1,0 +1,307 @@
+"""A whole station against the twin, its processes supervised, with faults to be switched on in it."""
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from plc_interface.client import StationClient
+from plc_interface.client_errors import ClientError
+from plc_interface.codec import WordOrder
+from plc_interface.line.scan import Scanner
+from station.errors import StationError
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.recipe import load_recipes
+from station.supervision.programs import station_programs, twin_program
+from station.supervision.supervisor import Supervisor
+from station.twin.console import ask
+
+from .scenario import DeviceFault, DiskFault, Phase, ProcessFault
+from .wire import Wire
+
+LOOPBACK = "127.0.0.1"
+FRUIT = "blueberry"
+_SEED = 1
+_DISK_MB = 24
+_MARKS = {
+    "service": "-m station service",
+    "plc": "-m station plc run",
+    "arm": "-m station.devices.arm.process",
+}
+_DEFORMED_MM = 0.5
+_JAWS_OPEN_MM = 50.0
+_START_S = 120.0
+
+
+class CannotDoError(StationError):
+    """What a scenario asks cannot be done on this machine."""
+
+
+class Rig:
+    """One running station.
+
+    Args:
+        configuration: its own.
+        file: of the configuration.
+        console_port: of the twin.
+    """
+
+    def __init__(self, configuration: Configuration, file: Path, console_port: int) -> None:
+        self.configuration, self.records = configuration, configuration.home / "records"
+        self._file, self._console = file, console_port
+        self._ballast = self.records / "ballast"
+        self._stopped: list[psutil.Process] = []
+        self.recipe = load_recipes(configuration.recipes_folder)[FRUIT]
+        modbus = configuration.modbus
+        scanner = Scanner(modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order))
+        self.wire = Wire(scanner, lambda: self.twin(do="remove"))
+        self._watching: asyncio.subprocess.Process | None = None
+        self._moving: asyncio.Task[bytes] | None = None
+
+    async def twin(self, **request: Any) -> Any:
+        """Ask the twin's console."""
+        return await asyncio.to_thread(ask, LOOPBACK, self._console, request)
+
+    async def lay_and_trigger(self) -> None:
+        """Bring a good fruit and trigger; the line has to be ready."""
+        await self.twin(do="fruit", kind=FRUIT, seed=_SEED)
+        self.wire.trigger()
+
+    async def jaws_open(self) -> bool:
+        """Whether the jaws stand open, by the twin's truth."""
+        return (await self.twin(do="state"))["width_mm"] > _JAWS_OPEN_MM
+
+    async def watch_arm(self) -> None:
+        """Look out for the arm's motion, as a client of its controller beside the station."""
+        script = Path(__file__).with_name("arm_motion.py")
+        self._watching = await asyncio.create_subprocess_exec(
+            sys.executable, str(script), self.configuration.arm.host, stdout=asyncio.subprocess.PIPE
+        )
+        output = self._watching.stdout
+        if output is None or await output.readline() != b"watching\n":
+            raise CannotDoError("the arm's controller takes no second client")
+        self._moving = asyncio.create_task(output.readline(), name="arm's motion")
+
+    async def unwatch_arm(self) -> None:
+        """End that. Idempotent."""
+        if self._watching is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._watching.kill()
+            await self._watching.wait()
+        if self._moving is not None:
+            await self._moving
+        self._watching = self._moving = None
+
+    async def reached(self, phase: Phase, accepted_before: int) -> bool:
+        """Whether the cycle has got to a phase.
+
+        Args:
+            phase: which one.
+            accepted_before: how many triggers had been accepted before this fruit.
+        """
+        if len(self.wire.accepted) <= accepted_before:
+            return False
+        if phase is Phase.APPROACH:
+            return self._moving is not None and self._moving.done()
+        if phase is Phase.STEPPING:
+            return (await self.twin(do="state"))["closing_mm"] > _DEFORMED_MM
+        return phase is not Phase.RELEASING or self.wire.result_valid
+
+    async def begin(self, fault: DeviceFault | ProcessFault | DiskFault) -> None:
+        """Switch a fault on.
+
+        Raises:
+            CannotDoError: not on this machine.
+        """
+        if isinstance(fault, DeviceFault):
+            await self.twin(do="set", device=fault.device, fault=fault.fault, amount=fault.amount)
+        elif isinstance(fault, ProcessFault):
+            process = self._process(fault.process)
+            process.send_signal(signal.Signals[fault.signal])
+            if fault.signal == "SIGSTOP":
+                self._stopped.append(process)
+        elif fault.disk == "full":
+            with contextlib.suppress(OSError), self._ballast.open("wb", buffering=0) as ballast:
+                while True:
+                    ballast.write(bytes(4096))
+        else:
+            self._process("service").kill()
+            await self._mount("-o", "remount,ro", str(self.records))
+
+    async def end(self, fault: DeviceFault | ProcessFault | DiskFault) -> None:
+        """Take a fault back. Idempotent."""
+        if isinstance(fault, DeviceFault):
+            await self.twin(do="clear", device=fault.device, fault=fault.fault)
+        elif isinstance(fault, ProcessFault):
+            for process in self._stopped:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    process.resume()
+            self._stopped.clear()
+        elif fault.disk == "full":
+            self._ballast.unlink(missing_ok=True)
+        else:
+            await self._mount("-o", "remount,rw", str(self.records))
+
+    async def mount_records(self) -> None:
+        """Give the records a small disk of their own.
+
+        Raises:
+            CannotDoError: mounting is not permitted.
+        """
+        self.records.mkdir(parents=True, exist_ok=True)
+        await self._mount("-t", "tmpfs", "-o", f"size={_DISK_MB}m", "tmpfs", str(self.records))
+
+    async def unmount_records(self) -> None:
+        """Take it away. Idempotent."""
+        if self.records.is_mount():
+            await asyncio.to_thread(subprocess.run, ["umount", "--lazy", str(self.records)], check=False)
+
+    async def why_not_ready(self) -> str:
+        """The station's own sentence; empty where it is ready or does not answer."""
+        address = f"http://{LOOPBACK}:{self.configuration.metrics.port}/readyz"
+        return await asyncio.to_thread(_why, address)
+
+    async def carry_out(self, remedy: str) -> bool:
+        """Do what a person does. Whether it worked."""
+        if remedy == "reset":
+            return await self.wire.reset()
+        command = [sys.executable, "-m", "station", "devices", *remedy.split(), "--yes", "--config", str(self._file)]
+        done = await asyncio.to_thread(subprocess.run, command, capture_output=True, timeout=90, check=False)
+        return done.returncode == 0
+
+    async def choose_recipe(self) -> None:
+        """Make the fruit's recipe the active one, then give the right to write away."""
+        modbus = self.configuration.modbus
+        async with StationClient(modbus.host, modbus.port, unit=modbus.unit) as client:
+            await client.arm()
+            async with asyncio.timeout(60):
+                while True:
+                    try:
+                        await client.change_recipe(self.recipe.plc_number)
+                        break
+                    except ClientError:
+                        await asyncio.sleep(0.2)
+            await client.disarm()
+
+    def _process(self, name: str) -> psutil.Process:
+        mark = _MARKS[name]
+        for process in psutil.Process().children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                line = " ".join(process.cmdline())
+                if process.environ().get("STATION_HOME") == str(self.configuration.home) and mark in line:
+                    return process
+        raise CannotDoError(f"there is no process {name} now")
+
+    async def _mount(self, *arguments: str) -> None:
+        done = await asyncio.to_thread(
+            subprocess.run, ["mount", *arguments], capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            raise CannotDoError(f"mounting is not permitted here: {done.stderr.strip()}")
+
+
+def _why(address: str) -> str:
+    try:
+        with urllib.request.urlopen(address, timeout=2) as answer:
+            body = answer.read()
+    except urllib.error.HTTPError as error:
+        body = error.read()
+    except OSError:
+        return ""
+    try:
+        return str(json.loads(body).get("why", ""))
+    except ValueError:
+        return ""
+
+
+def _free_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as stack:
+        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for probe in probes:
+            probe.bind((LOOPBACK, 0))
+        return [probe.getsockname()[1] for probe in probes]
+
+
+def _quick_recipes(folder: Path) -> Path:
+    """The shipped recipe with few steps: the matrix is about faults, not about fruit."""
+    folder.mkdir()
+    values = load_recipes()[FRUIT].model_dump(mode="json")
+    values["steps"] |= {"number": 6, "result_closings_mm": [3], "closing_limit_mm": 6.0}
+    values["imaging"] |= {"settle_s": 0.05, "frames_per_step": 2}
+    values["damage"]["growth_mm2_per_mm"] = 60
+    values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
+    values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
+    (folder / f"{FRUIT}.yaml").write_text(json.dumps(values), encoding="utf-8")
+    return folder
+
+
+@contextlib.asynccontextmanager
+async def running(folder: Path, number: int, *, own_disk: bool = False) -> AsyncIterator[Rig]:
+    """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
+
+    Args:
+        folder: an empty one.
+        number: another one for each station that this process starts.
+        own_disk: the records get a small disk.
+
+    Raises:
+        CannotDoError: the disk cannot be had.
+        StationError: a process does not start.
+    """
+    modbus, metrics, camera, console = _free_ports(4)
+    host = f"127.79.{os.getpid() % 250 + 1}.{number % 250 + 1}"
+    file = folder / "station.yaml"
+    values = {
+        "home": str(folder / "home"),
+        "recipes_folder": str(_quick_recipes(folder / "recipes")),
+        "modbus": {"port": modbus},
+        "metrics": {"port": metrics},
+        "arm": {"host": host, "stale_after_s": 1.0, "link_lost_after_s": 2.0, "watchdog_hz": 0.5},
+        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
+        "records": {"free_reserve_mb": 1},
+        "service": {"patience": 5.0, "retry_longest_s": 1.0},
+    }
+    file.write_text(json.dumps(values), encoding="utf-8")
+    configuration = load_configuration(file, {})
+    logs = folder / "logs"
+    logs.mkdir()
+    rig = Rig(configuration, file, console)
+    environment = {**os.environ, "STATION_HOME": str(folder / "home"), "OMP_NUM_THREADS": "1"}
+    programs = [twin_program(file, console, 1, logs), *station_programs(file, logs)]
+    supervisor = Supervisor([replace(each, start_limit_s=_START_S) for each in programs], environment)
+    ended, ready = asyncio.Event(), asyncio.Event()
+    if own_disk:
+        await rig.mount_records()
+    supervising = asyncio.create_task(supervisor.run(ready.set, ended), name="supervisor")
+    waiting = asyncio.create_task(ready.wait())
+    scanning: asyncio.Task[None] | None = None
+    try:
+        await asyncio.wait([supervising, waiting], return_when=asyncio.FIRST_COMPLETED)
+        if supervising.done():
+            await supervising
+        await rig.twin(do="remove")
+        await rig.choose_recipe()
+        scanning = asyncio.create_task(rig.wire.run(), name="scanning")
+        yield rig
+    finally:
+        await rig.unwatch_arm()
+        waiting.cancel()
+        if scanning is not None:
+            rig.wire.stop()
+            await asyncio.gather(scanning, return_exceptions=True)
+        ended.set()
+        await asyncio.gather(supervising, return_exceptions=True)
+        await rig.unmount_records()
