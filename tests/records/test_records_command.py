@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from station.channel.line import Reason
 from station.cli import cli
 from station.records.wording import SENTENCES, sparkline
+from station.settings.recipe import find_recipe
 
 
 @pytest.fixture
@@ -49,7 +50,8 @@ def test_a_rejected_fruit_is_explained(history, folder):
     assert "inspection 1: strawberry, FAIL" in said
     assert "170.0 mm² at 4 mm of closing, the limit is 165.0 mm²" in said
     assert f"area_over_limit: {SENTENCES[Reason.AREA_OVER_LIMIT]}" in said
-    assert "fails above 165 mm² at 4 mm of closing" in said
+    limit = find_recipe("strawberry").damage.area[0]
+    assert f"fails above {limit.area_mm2:g} mm² at {limit.closing_mm:g} mm of closing" in said
     assert "▁▃▅▇█" in said
     assert "trigger:      7, encoder 1234, lot A-17" in said
     assert "2023-11-14 22:13:20.000 UTC, took 3.210 s" in said
