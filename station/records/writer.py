@@ -71,6 +71,8 @@ class Writer:
     def submit(self, work: Work[T]) -> Future[T]:
         """Ask for a piece of work; cancelling the future withdraws it while it is not begun.
 
+        What the answer to one piece asks for in turn, in the thread, is still done after `close`.
+
         Args:
             work: runs in the thread.
 
@@ -79,7 +81,7 @@ class Writer:
         """
         future: Future[T] = Future()
         with self._gate:
-            if self._closed:
+            if self._closed and threading.current_thread() is not self._thread:
                 future.set_exception(RecordsClosedError("they are closed", "ask before closing"))
             else:
                 self._queue.put((work, future))
@@ -101,11 +103,11 @@ class Writer:
             return
         opened.set_result(None)
         last = False
-        while not last:
+        while not last or not self._queue.empty():
             batch = [self._queue.get()]
             while len(batch) < LARGEST_BATCH and not self._queue.empty():
                 batch.append(self._queue.get())
-            last = None in batch
+            last = last or None in batch
             taken = [entry for entry in batch if entry is not None and entry[1].set_running_or_notify_cancel()]
             if taken:
                 self._carry_out(taken)

@@ -194,6 +194,33 @@ def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
     scenario(steps)
 
 
+def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario, trigger, monkeypatch):
+    """Its answer comes when the writer takes nothing more from outside."""
+    gate = threading.Event()
+    save = SequenceMark.save
+
+    def slowly(self: SequenceMark) -> None:
+        gate.wait(30)
+        save(self)
+
+    async def steps():
+        async with opened(deadline_s=0.2) as records:
+            with monkeypatch.context() as patch:
+                patch.setattr(SequenceMark, "save", slowly)
+                with pytest.raises(RecordsDeadlineError, match="it within"):
+                    await records.begin(trigger)
+                closing = asyncio.create_task(records.close())
+                while records._opened is not None and not records._opened.writer._closed:
+                    await asyncio.sleep(0.005)
+                gate.set()
+                await closing
+        async with opened() as records:
+            assert records.lost == ()
+            assert (await records.open_inspections()).running == ()
+
+    scenario(steps)
+
+
 def test_a_begin_whose_caller_has_gone_is_withdrawn_even_when_it_is_durable(opened, scenario, trigger, monkeypatch):
     inserted, gate = threading.Event(), threading.Event()
     save = SequenceMark.save
