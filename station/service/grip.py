@@ -179,8 +179,12 @@ class Grip:
         step = await self._glance(width_mm)
         while width_mm >= expected.smallest_mm - self._recipe.steps.step_mm:
             judging = asyncio.ensure_future(touches(step))
+            ahead = None
             try:
-                ahead = await self._glance(width_mm - stride_mm) if one_ahead else None
+                if one_ahead:
+                    move = await self.close_to(width_mm - stride_mm)
+                    if not judging.done() or not judging.result():  # else no picture of it is needed
+                        ahead = GripStep(-1, move, await self.sound_frames(1))
             finally:
                 touched = await judging
             held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
