@@ -19,7 +19,7 @@ def active(cell):
 
 
 @pytest.mark.timeout(240)
-def test_the_arm_places_fruit_by_its_outcome_and_one_that_it_keeps_is_a_persons(bench):
+def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_for_its_own_stop(bench):
     async def scenario():
         async with bench(bench=False, placing="arm") as cell:
             [arm] = [server for server in cell.twin._servers if isinstance(server, UrController)]
@@ -66,6 +66,16 @@ def test_the_arm_places_fruit_by_its_outcome_and_one_that_it_keeps_is_a_persons(
             await line.ready()
             assert AlarmId.FRUIT_HELD not in active(cell)
             assert stands_at() == ["home"]
+
+            crew = cell.station.service._crew
+            renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
+            async with asyncio.timeout(60):
+                while not crew.program_to_play_again:
+                    await asyncio.sleep(0.05)
+            assert AlarmId.ARM_LINK_LOST in active(cell)
+            assert not (await line.state()).ready
+            crew.renew_health = renew
+            await line.ready()
 
     asyncio.run(scenario())
 
