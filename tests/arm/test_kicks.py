@@ -47,7 +47,7 @@ class Controller:
 def test_a_watchdog_left_without_a_kick_is_told_until_the_program_begins_again():
     async def run():
         process, controller = UrRtdeProcess("nowhere", 125.0), Controller()
-        process._control = process._receive = controller  # type: ignore[assignment]
+        process._control = process._receive = controller
         process._set_up = Command(
             tool_centre_mm=(0, 0, 0), payload_kg=1, payload_centre_mm=(0, 0, 0), watchdog_hz=WATCHDOG_HZ
         )

@@ -24,7 +24,7 @@ from station.service.grip import FramesError
         (ArmFault(ArmCause.LINK_LOST, "x"), Event.ARM_FAULT),
         (GripperFaultError(0xC), Event.GRIPPER_FAULT),
         (NoFrameError("x"), Event.CAMERA_FAULT),
-        (FramesError("x"), Event.CAMERA_FAULT),
+        (FramesError("x", ()), Event.CAMERA_FAULT),
         (DiskFullError("x", "y"), Event.RECORDS_FAULT),
         (StationError("x"), Event.INTERNAL_FAULT),
         (ValueError("x"), Event.INTERNAL_FAULT),
