@@ -183,7 +183,13 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
         values = {
             "home": str(tmp_path / "home"),
             "recipes_folder": str(quick_recipes(tmp_path / "recipes")),
-            "arm": {"host": host, "stale_after_s": 0.5, "link_lost_after_s": 2.0, "watchdog_hz": 0.5, "constructor_limit_s": 60.0},
+            "arm": {
+                "host": host,
+                "stale_after_s": 0.5,
+                "link_lost_after_s": 2.0,
+                "watchdog_hz": 0.5,
+                "constructor_limit_s": 60.0,
+            },
             "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
             "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
             "metrics": {"port": free_port()},
