@@ -9,8 +9,15 @@ import sys
 import psutil
 import pytest
 
+from station.supervision import restarts
 from station.supervision.notify import notify
+from station.supervision.restarts import RESTARTS_VARIABLE
 from station.supervision.supervisor import RESTARTS, SupervisionError
+
+
+def environment(pid):
+    """What a process was started with."""
+    return psutil.Process(pid).environ()
 
 
 async def end(_supervisor, ended):
@@ -23,11 +30,15 @@ def test_programs_start_in_order_and_end_in_reverse(bench):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
-def test_what_dies_is_started_again_and_the_others_go_on(bench, until, number):
+def test_what_dies_is_started_again_and_the_others_go_on(bench, until, number, monkeypatch):
     async def kill(supervisor, ended):
         os.kill(bench.pids("second")[0], number)
         await until(lambda: len(bench.pids("second")) == 2)
         assert supervisor.restarts == {"first": 0, "second": 1}
+        monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
+        assert [(name, told.total, told.within(60)) for name, told in restarts.told().items()] == [
+            ("first", 0, 0), ("second", 1, 1)
+        ]  # fmt: skip
         await until(lambda: supervisor.ready("second"))
         ended.set()
 
@@ -52,12 +63,14 @@ def test_what_makes_no_progress_is_killed_and_started_again(bench, until):
     assert not psutil.pid_exists(bench.pids("only")[0])
 
 
-def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until):
+def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until, monkeypatch):
     async def let_it_die(supervisor, ended):
         for restart in range(RESTARTS + 1):
             await until(lambda count=restart + 1: len(bench.pids("second")) == count and supervisor.ready("second"))
             os.kill(bench.pids("second")[-1], signal.SIGKILL)
         await until(lambda: "given up" in bench.caplog.text)
+        monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
+        assert {name: told.given_up for name, told in restarts.told().items()} == {"first": False, "second": True}
         assert psutil.pid_exists(bench.pids("first")[0])
         ended.set()
 
