@@ -138,8 +138,9 @@ class UrRtdeProcess:
             control, playing = self._control, self._playing()
             if control is None:
                 continue
-            if self._played:  # until now: what stopped since may have been stopped for want of a kick
-                self._kicks_late |= time.monotonic() - self._kicked_s > KICKS_PER_LIMIT * period_s
+            if self._played:  # a program that was not kicked in time and plays on was not stopped by that
+                late = time.monotonic() - self._kicked_s > KICKS_PER_LIMIT * period_s
+                self._kicks_late = late or (self._kicks_late and not playing)
             self._played = playing
             if playing and time.monotonic() < self._healthy_until_s:
                 await self._on_arm(control.kickWatchdog)
