@@ -185,8 +185,8 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
             "recipes_folder": str(quick_recipes(tmp_path / "recipes")),
             "arm": {
                 "host": host,
-                "stale_after_s": 0.5,
-                "link_lost_after_s": 2.0,
+                "stale_after_s": 1.0,
+                "link_lost_after_s": 4.0,
                 "watchdog_hz": 0.5,
                 "constructor_limit_s": 60.0,
             },
