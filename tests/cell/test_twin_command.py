@@ -51,10 +51,10 @@ def test_a_drawn_press_is_the_same_each_time_and_grows(fruit, tmp_path):
 
 
 def test_a_press_is_never_drawn_over_another(tmp_path):
-    (tmp_path / "steps").mkdir()
+    (tmp_path / "frames").mkdir()
     refused = station("twin", "press", "--out", tmp_path)
     assert refused.returncode == 2
-    assert list(tmp_path.iterdir()) == [tmp_path / "steps"]
+    assert "name a new folder" in refused.stderr
 
 
 def test_a_full_disk_ends_a_drawn_press_with_a_remedy(tmp_path):
