@@ -371,3 +371,20 @@ def test_the_station_is_told_of_the_line(bench):
     assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
     assert told.counters["count_bad_requests"] == 3
     assert told.faults == ("the gate is lost",)
+
+
+def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.WriterWent)
+    assert made.state.asked is not None
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=2.0))
+    assert made.state.trigger is Trigger.HELD
+    made.feed(ev.WriterCame)
+    made.write("trigger", trigger_id=7)
+    assert (made.state.trigger, made.state.unlisted) == (Trigger.ANSWERED, 0)
+    made.now_s += made.settings.handshake_timeout_s
+    made.feed(ev.Tick)
+    assert made.state.trigger is Trigger.STUCK
+    assert Fault.TRIGGER_FORGOTTEN in made.state.faults
