@@ -316,6 +316,19 @@ def test_a_lost_station_gives_one_outcome_and_what_it_says_later_does_not_replac
     assert made.state.queue == ()
 
 
+def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while_it_still_runs(bench):
+    made = bench()
+    made.run()
+    made.now_s += made.settings.station_lost_after_s
+    made.feed(ev.Tick)
+    made.write("enable", acknowledged_sequence=41)
+    made.actions.clear()
+    made.link(Open(running=(41, 7), outcomes=()))
+    told = [action for action in made.actions if isinstance(action, do.TellPublished | do.TellAcknowledged)]
+    assert [type(action) for action in told] == [do.TellPublished, do.TellAcknowledged]
+    assert told[-1] == do.TellAcknowledged(41)
+
+
 def status(made):
     word = view(made.state)["status"]
     assert isinstance(word, int)

@@ -147,7 +147,7 @@ class Laws:
         silent = self.heard_s is not None and now_s >= self.heard_s + self.settings.station_lost_after_s
         self.heard_s = None if silent else self.heard_s
         self._link(event, before, after, actions, silent=silent)
-        self._commands(event, before, after, silent=silent)
+        self._commands(event, before, after, actions, silent=silent)
         self._enable(event, before, after, actions)
         self._bits_fall_in_time(event, before, after, actions)
         self._acknowledgement(event, before, after, due=due)
@@ -182,7 +182,10 @@ class Laws:
         assert seen["station_boots"] == self.boots
         assert seen["active_recipe"] == (0 if self.heard_s is None else RECIPE), "a lost station's words are used"
 
-    def _commands(self, event: ev.Event, before: State, after: State, *, silent: bool) -> None:
+    def _commands(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
+        asks = any(isinstance(action, do.AskCommand) for action in actions)
+        assert asks == (after.command_asked not in {before.command_asked, None}), "a command is not carried out"
+        assert asks or after.order is before.order or after.order is not Order.EXECUTING
         result = after.journal.command_result
         mine = before.command_asked is not None
         if before.order is Order.EXECUTING and (

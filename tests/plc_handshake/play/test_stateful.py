@@ -43,6 +43,14 @@ class Request:
     expires_s: float
 
 
+@dataclass(frozen=True)
+class AcknowledgementNoted:
+    """The station's answer to `TellAcknowledged`, of which the core is not told."""
+
+    at: ev.Moment
+    sequence: int
+
+
 class Handshake(RuleBasedStateMachine):
     """The world around `step`."""
 
@@ -74,7 +82,7 @@ class Handshake(RuleBasedStateMachine):
     def boot(self) -> None:
         self.runs += 1
         self.to_station: list[Request] = []
-        self.answers: list[ev.Event] = []
+        self.answers: list[ev.Event | AcknowledgementNoted] = []
         self.pending: list[Request] = []
         self.tells: list[Any] = []
         self.state: State = restarted(self.disk, self.at(), SETTINGS.station_lost_after_s)
@@ -147,8 +155,12 @@ class Handshake(RuleBasedStateMachine):
             case _:
                 self.feed(ev.RequestFailed(self.at(), "a question"))
 
-    def deliver(self, event: ev.Event) -> None:
+    def deliver(self, event: ev.Event | AcknowledgementNoted) -> None:
         """An answer reaches the core, with the time at which it does; also one that nobody waits for any more."""
+        if isinstance(event, AcknowledgementNoted):
+            sequence = event.sequence
+            self.settle(lambda a: isinstance(a, do.TellAcknowledged) and a.sequence == sequence)
+            event = ev.Tick(self.at())
         event = replace(event, at=self.at())
         match event:
             case ev.BeginAnswered(number=number):
@@ -161,8 +173,6 @@ class Handshake(RuleBasedStateMachine):
                 self.settle(lambda a: isinstance(a, do.AskCommand) and a.number == number)
             case ev.OutcomeNoted(sequence=sequence):
                 self.settle(lambda a: isinstance(a, do.TellPublished) and a.outcome.sequence == sequence)
-            case ev.Tick():
-                self.settle(lambda a: isinstance(a, do.TellAcknowledged))
         self.feed(event)
         self.next_tell()
 
@@ -191,7 +201,7 @@ class Handshake(RuleBasedStateMachine):
             case do.TellAcknowledged(sequence=sequence):
                 for number, record in station.records.items():
                     record.acknowledged |= number <= sequence
-                self.answers.append(ev.Tick(at))
+                self.answers.append(AcknowledgementNoted(at, sequence))
 
     def tell_outcomes(self) -> None:
         for sequence in sorted(self.station.waiting):
@@ -336,11 +346,34 @@ class Handshake(RuleBasedStateMachine):
     def beat_of_the_plc(self) -> None:
         self.write(plc_heartbeat=(self.inputs.plc_heartbeat + 1) % 2**16)
 
-    @rule(code=st.integers(0, 5), repeated=st.booleans())
-    def command(self, code: int, repeated: bool) -> None:
+    @rule(code=st.integers(0, 5), argument=st.integers(0, 1), repeated=st.booleans())
+    def command(self, code: int, argument: int, repeated: bool) -> None:
         self.write(control=self.control - {"execute_command"})
         sequence = (self.inputs.command_sequence + (not repeated)) % 2**16
-        self.write(control=self.control | {"execute_command"}, command_code=code, command_sequence=sequence)
+        self.write(
+            control=self.control | {"execute_command"},
+            command_code=code,
+            command_argument=argument,
+            command_sequence=sequence,
+        )
+
+    @rule(what=st.sampled_from(["command", "lot", "acknowledgement", "trigger"]), argument=st.integers(0, 1))
+    def left_high(self, what: str, argument: int) -> None:
+        """A bit that the PLC forgets, until the interface has given it up."""
+        match what:
+            case "command":
+                self.command(code=1, argument=argument, repeated=False)
+            case "lot":
+                self.short_order("latch_lot", "a")
+            case "acknowledgement":
+                self.whole_cycle()
+                self.station_judges("FAIL")
+                self.everything_arrives()
+                self.acknowledge(by_bit=True)
+            case "trigger":
+                self.whole_cycle()
+        self.everything_arrives()
+        self.time_passes(5.5, beats=True)
 
     @rule(
         name=st.sampled_from(["clear_error", "reset_counters", "offline", "latch_lot"]),
