@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import gc
 import os
 import shutil
 import socket
@@ -10,15 +9,37 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import psutil
 import pytest
+from hypothesis import HealthCheck, settings
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 GRACE_S = 3.0
+
+settings.register_profile("busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy machine")
+
+_TASKS: set[weakref.ref[asyncio.Task[Any]]] = set()
+
+
+def _remember_tasks() -> None:
+    """Have every event loop note its tasks: to search the heap for them costs more than most tests."""
+    plain = asyncio.BaseEventLoop.create_task
+
+    def create_task(loop: asyncio.BaseEventLoop, *arguments: Any, **options: Any) -> asyncio.Task[Any]:
+        task = plain(loop, *arguments, **options)
+        _TASKS.add(weakref.ref(task, _TASKS.discard))
+        return task
+
+    asyncio.BaseEventLoop.create_task = create_task  # type: ignore[method-assign]
+
+
+_remember_tasks()
 
 
 class Living(NamedTuple):
@@ -38,12 +59,12 @@ class Living(NamedTuple):
             for connection in me.net_connections(kind="inet")
             if connection.status == psutil.CONN_LISTEN
         }
-        tasks = {thing for thing in gc.get_objects() if issubclass(type(thing), asyncio.Task) and not thing.done()}
+        tasks = [reference() for reference in list(_TASKS)]
         return cls(
             frozenset(threading.enumerate()),
             frozenset(child.pid for child in children),
             frozenset(listening),
-            frozenset(tasks),
+            frozenset(task for task in tasks if task is not None and not task.done()),
         )
 
     def beyond(self, before: "Living") -> list[str]:

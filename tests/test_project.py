@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 LOCKS = ("requirements-build.lock", "requirements.lock", "requirements-dev.lock")
@@ -44,8 +45,7 @@ def test_the_locks_satisfy_the_project():
         locked = pins(lock)
         for text in requirements:
             requirement = Requirement(text)
-            name = requirement.name.lower().replace("_", "-")
-            assert requirement.specifier.contains(locked[name]), f"{text} in {lock}"
+            assert requirement.specifier.contains(locked[canonicalize_name(requirement.name)]), f"{text} in {lock}"
 
 
 @pytest.mark.parametrize("lock", LOCKS)

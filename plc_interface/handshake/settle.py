@@ -71,6 +71,8 @@ def _settle_running(work: Work, sequence: int, trigger_id: int, *, known: bool) 
     asked = Asked(0, trigger_id, 0, journal.lot)
     if state.running is not None and sequence == state.running.sequence:
         work.actions.append(AskOutcome(sequence, state.running.within_s))
+    elif sequence <= journal.acknowledged:
+        acknowledge(work, journal.acknowledged)
     elif known or _may_be_asked_for(work, sequence):
         return
     elif _is_the_plcs(work, sequence, trigger_id) and state.running is None:

@@ -93,6 +93,7 @@ ROWS = (
     row(Trigger.ANSWERED, Signal.TRIGGER_TIMEOUT, forgotten, to=Trigger.STUCK),
     row(Trigger.HELD, Signal.TRIGGER_ON, end_watch, begin, to=Trigger.ASKED, when=may_be_asked),
     row(Trigger.HELD, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
+    row(Trigger.HELD, Signal.TRIGGER_HELD, watch, to=Trigger.ANSWERED),
     row(Trigger.HELD, Signal.TRIGGER_OFF),
     row(Trigger.HELD, Signal.TRIGGER_TIMEOUT, to=Trigger.LOW),
     row(Trigger.HELD, Signal.WRITER_LOST, end_watch, to=Trigger.LOW),

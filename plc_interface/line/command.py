@@ -14,7 +14,7 @@ from plc_interface.line.nest import Nest, RealNest, TwinNest
 from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
-from station.errors import BadInputError
+from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes
 
@@ -83,7 +83,8 @@ def line(
 ) -> None:  # fmt: skip
     """Play the line's PLC: trigger, read and acknowledge inspections, and show what became of each fruit.
 
-    Takes the right to write, so no other PLC may hold it. Exits 0 when all fruits were decided.
+    Takes the right to write, so no other PLC may hold it. Exits 0 when all fruits were decided, or when there was no
+    number of them; 1 when it was ended before.
     """
     site = load_configuration(config)
     if not (lot.isascii() and len(lot) <= 32 and (lot.isprintable() or not lot)):
@@ -126,3 +127,6 @@ async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, c
         console.print(summary_line(simulator.summary))
         if not running.cancelled():
             running.result()
+        elif count is not None and simulator.summary.fruits < count:
+            decided = simulator.summary.fruits
+            raise StationError(f"the line was ended after {decided} of {count} fruits; start it anew for the others")

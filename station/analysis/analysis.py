@@ -11,7 +11,6 @@ from station.analysis.decoding import Decoded
 from station.analysis.measurement import Measured, Refused, measure_all
 from station.analysis.output import OutputFolder, flag_names
 from station.analysis.pictures import outlined, sheet, stacked, thumbnail
-from station.analysis.plots import curve_svg
 from station.analysis.report import Report, ReportRow, data_uri, render
 from station.analysis.sources import Source
 from station.errors import BadInputError
@@ -183,6 +182,8 @@ def _write_summaries(
 
 def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) -> tuple[str | None, list[ReportRow]]:
     """Write the curve where there are widths, and put the closings into the report's rows."""
+    from station.analysis.plots import curve_svg  # noqa: PLC0415 (matplotlib takes a second to load; few runs draw)
+
     curve = area_curve(reading for _, reading in gathered.readings)
     if not curve.points:
         return None, gathered.rows

@@ -347,13 +347,13 @@ def test_a_controller_that_was_switched_off_comes_back_without_power(healthy_arm
 
 def test_a_silent_controller_is_given_up_within_the_limit(bench, healthy):
     async def run():
-        async with bench() as made, UrArm(made.settings(constructor_limit_s=1.0)) as arm, healthy(arm):
+        async with bench() as made, UrArm(made.settings(constructor_limit_s=5.0)) as arm, healthy(arm):
             made.faults.set("silent")
             begun = time.monotonic()
             assert await cause_of(arm.ready(3.0)) is ArmCause.LINK_LOST
-            assert time.monotonic() - begun < 4.0
+            assert time.monotonic() - begun < 20.0
             made.faults.clear("silent")
-            await arm.ready(15.0)
+            await arm.ready(30.0)
 
     asyncio.run(run())
 

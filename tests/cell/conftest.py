@@ -1,8 +1,10 @@
 """A whole simulated cell in a process of its own, and the station's command line against it."""
 
+import contextlib
 import itertools
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -47,9 +49,9 @@ def own_host_fixture() -> Callable[[], str]:
     return own_host
 
 
-@pytest.fixture
-def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]:
-    """Start a twin with the arguments given; it is ended after the test.
+@contextlib.contextmanager
+def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
+    """Starts a twin with the arguments given; all are ended at the end.
 
     The station's patience is that of a machine that runs other tests too.
     """
@@ -57,11 +59,11 @@ def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]
 
     def make(*arguments: object) -> Cell:
         host = own_host()
-        configuration = tmp_path / f"station_{len(cells)}.yaml"
+        configuration = folder / f"station_{len(cells)}.yaml"
         configuration.write_text(
             f"arm: {{host: {host}}}\n"
             f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
-            f"camera: {{oldest_s: 1.0, twin: {{port: {unused_port}}}}}\n"
+            f"camera: {{oldest_s: 1.0, twin: {{port: {free_port()}}}}}\n"
         )
         command = [sys.executable, "-m", "station", "twin", "--console", "0", "--config", str(configuration)]
         process = subprocess.Popen([*command, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
@@ -80,3 +82,23 @@ def make_cell(tmp_path: Path, unused_port: int) -> Iterator[Callable[..., Cell]]
         cell.process.send_signal(signal.SIGINT)
         cell.process.communicate(timeout=20)
         assert cell.process.returncode == 0
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def make_cell(tmp_path: Path) -> Iterator[Callable[..., Cell]]:
+    """Start a twin with the arguments given; it is ended after the test."""
+    with begun_cells(tmp_path) as make:
+        yield make
+
+
+@pytest.fixture(scope="module")
+def shared_cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
+    """A twin for all tests of a module: each leaves it as it was."""
+    with begun_cells(tmp_path_factory.mktemp("cell")) as make:
+        yield make()

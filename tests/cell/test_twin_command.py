@@ -48,7 +48,13 @@ def test_a_drawn_press_is_the_same_each_time_and_grows(fruit, tmp_path):
     files = sorted(path.relative_to(folders[0]) for path in folders[0].rglob("*") if path.is_file())
     assert len(files) == 5 + 5 + 5 + 1
     assert all((folders[0] / file).read_bytes() == (folders[1] / file).read_bytes() for file in files)
-    assert station("twin", "press", "--out", folders[0]).returncode == 2
+
+
+def test_a_press_is_never_drawn_over_another(tmp_path):
+    (tmp_path / "frames").mkdir()
+    refused = station("twin", "press", "--out", tmp_path)
+    assert refused.returncode == 2
+    assert "name a new folder" in refused.stderr
 
 
 def test_a_full_disk_ends_a_drawn_press_with_a_remedy(tmp_path):

@@ -4,13 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import pytest
-from hypothesis import settings
 
 from station.inspection.cycle import LATCHES, START, TABLE, Act, Action, Event, Raise
 from station.inspection.states import State
-
-settings.register_profile("busy machine", deadline=None)
-settings.load_profile("busy machine")
 
 JAWS_CLOSE = {Action.CLOSE_TO_ONSET, Action.CLOSE_STEP}
 ARM_LEAVES = {Action.APPROACH, Action.GO_HOME}

@@ -316,6 +316,19 @@ def test_a_lost_station_gives_one_outcome_and_what_it_says_later_does_not_replac
     assert made.state.queue == ()
 
 
+def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while_it_still_runs(bench):
+    made = bench()
+    made.run()
+    made.now_s += made.settings.station_lost_after_s
+    made.feed(ev.Tick)
+    made.write("enable", acknowledged_sequence=41)
+    made.actions.clear()
+    made.link(Open(running=(41, 7), outcomes=()))
+    told = [action for action in made.actions if isinstance(action, do.TellPublished | do.TellAcknowledged)]
+    assert [type(action) for action in told] == [do.TellPublished, do.TellAcknowledged]
+    assert told[-1] == do.TellAcknowledged(41)
+
+
 def status(made):
     word = view(made.state)["status"]
     assert isinstance(word, int)
@@ -371,3 +384,20 @@ def test_the_station_is_told_of_the_line(bench):
     assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
     assert told.counters["count_bad_requests"] == 3
     assert told.faults == ("the gate is lost",)
+
+
+def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.WriterWent)
+    assert made.state.asked is not None
+    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=2.0))
+    assert made.state.trigger is Trigger.HELD
+    made.feed(ev.WriterCame)
+    made.write("trigger", trigger_id=7)
+    assert (made.state.trigger, made.state.unlisted) == (Trigger.ANSWERED, 0)
+    made.now_s += made.settings.handshake_timeout_s
+    made.feed(ev.Tick)
+    assert made.state.trigger is Trigger.STUCK
+    assert Fault.TRIGGER_FORGOTTEN in made.state.faults

@@ -15,7 +15,7 @@ from plc_interface.modbus.lease import WriterChange
 
 CLIENTS = Path(__file__).parent / "clients"
 FETCHED = Path(tempfile.gettempdir()) / f"fruit-station-clients-{os.getuid()}"
-"""Packages from npm and Go's proxy, kept from one run to the next."""
+"""Packages from npm, Go's proxy and Maven, kept from one run to the next."""
 FETCH_S, RUN_S = 60, 60
 
 
@@ -136,3 +136,17 @@ def test_simonvetter_modbus(serve):
     done = run(folder / "client", f"127.0.0.1:{serving.settings.port}")
     assert not done.returncode, done.stderr
     saw(serving, 80)
+
+
+def test_j2mod(serve):
+    if shutil.which("java") is None or shutil.which("mvn") is None:
+        lacks("java with mvn", declared=False)
+    folder = FETCHED / "java"
+    folder.mkdir(parents=True, exist_ok=True)
+    if not list(folder.glob("j2mod-*.jar")):
+        quiet = ("-q", "-B", f"-DoutputDirectory={folder}")
+        fetched("j2mod", "mvn", *quiet, "-f", CLIENTS / "pom.xml", "dependency:copy-dependencies", cwd=folder)
+    serving = serve()
+    done = run("java", "-cp", f"{folder}/*", CLIENTS / "Client.java", "127.0.0.1", serving.settings.port)
+    assert not done.returncode, done.stderr
+    saw(serving, 81)
