@@ -11,7 +11,6 @@ import numpy as np
 
 from station.vision.contact import FloatImage
 from station.vision.drift import weighted_median
-from station.vision.working import resized
 
 _SIGMA_PX = 5.0
 _WINDOW_SIGMA_PX = 7.5
@@ -20,19 +19,17 @@ _NOISE_CAP = 0.35
 _LEAST_BACKGROUND = 0.02
 
 
-def bending(change: FloatImage, step: int = 2) -> FloatImage:
-    """The bending at a fraction of the change's size.
+def bending(change: FloatImage, step: int) -> FloatImage:
+    """How much the gel bends.
 
     Args:
-        change: signed, shape (height, width, 3), grey levels.
-        step: by how much the result is smaller, 2 or 4.
+        change: signed, averaged down by `step`, shape (height, width, 3), grey levels.
+        step: by how much it is smaller than the working image.
 
     Returns:
-        Shape (height / step, width / step), rounded up, grey levels per pixel of `change`.
+        Shape (height, width), grey levels per pixel of the working image.
     """
-    height, width = change.shape[:2]
-    less = resized(change, (-(-width // step), -(-height // step)))
-    smooth = cv2.GaussianBlur(less, (0, 0), _SIGMA_PX / step)
+    smooth = cv2.GaussianBlur(change, (0, 0), _SIGMA_PX / step)
     slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / (8 * step))
     slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / (8 * step))
     ones = np.ones((1, 3), np.float32)

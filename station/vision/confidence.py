@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from station.vision.contact import FloatImage
-from station.vision.drift import weighted_median
+from station.vision.drift import thinned, weighted_median
 from station.vision.edge import Edge
 
 _RELIABLE_RATIO = 4.0
@@ -21,6 +21,7 @@ def background_spread(signal: FloatImage, background: FloatImage) -> float:
         signal: shape (height, width), grey levels.
         background: shape of `signal`, 0 to 1.
     """
+    signal, background = thinned(signal), thinned(background)
     middle = weighted_median(signal, background)
     return _NORMAL_OF_MEDIAN * weighted_median(np.abs(signal - middle), background)
 

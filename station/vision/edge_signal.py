@@ -4,23 +4,30 @@ import cv2
 import numpy as np
 
 from station.vision.contact import FloatImage, Mask
-from station.vision.working import resized
+from station.vision.working import length_squared, resized
 
 _BLUR_SHARE = 0.045
 _BLUR_PX = (1.0, 3.5)
+_HALF_FROM_PX = 2.0
 _TEXTURED_SHARE = 0.15
 _WINDOW_SHARE = 0.7
 
 
-def denoised(change: FloatImage, radius_px: float) -> FloatImage:
+def denoised(change: FloatImage, half: FloatImage, radius_px: float) -> FloatImage:
     """The change smoothed as far as a contact of that size allows.
 
     Args:
         change: shape (height, width, 3), grey levels.
+        half: the same averaged down to half the size.
         radius_px: of a circle of the candidate region's area.
+
+    Returns:
+        Of the change's size, or of half that where so much is smoothed that nothing is lost by it.
     """
     sigma = float(np.clip(_BLUR_SHARE * radius_px, *_BLUR_PX))
-    return np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+    if sigma < _HALF_FROM_PX:
+        return np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+    return np.asarray(cv2.GaussianBlur(half, (0, 0), sigma / 2), np.float32)
 
 
 def length_of(change: FloatImage) -> FloatImage:
@@ -32,8 +39,7 @@ def length_of(change: FloatImage) -> FloatImage:
     Returns:
         Shape (height, width), grey levels.
     """
-    ones = np.ones((1, 3), np.float32)
-    return np.asarray(cv2.sqrt(cv2.transform(cv2.multiply(change, change), ones)), np.float32)
+    return np.asarray(cv2.sqrt(length_squared(change)), np.float32)
 
 
 def element_px(length: FloatImage, bend: FloatImage, region: Mask) -> float:
