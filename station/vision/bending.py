@@ -53,10 +53,12 @@ def quiet(bend: FloatImage, least_bend: float) -> FloatImage:
     Returns:
         Shape of `bend`, 0 to 1.
     """
-    limit = min(_CALM_RATIO * float(np.quantile(bend, 0.05)), 1.5 * least_bend) + 0.15 * least_bend
+    calmest = float(np.partition(bend, bend.size // 20, axis=None)[bend.size // 20])
+    limit = min(_CALM_RATIO * calmest, 1.5 * least_bend) + 0.15 * least_bend
     outlines, _ = cv2.findContours((bend > limit).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     enclosed = cv2.drawContours(np.zeros(bend.shape, np.uint8), outlines, -1, 1, cv2.FILLED)
-    return np.asarray(np.maximum(0, 1 - (bend / limit) ** 4) ** 2 * (enclosed == 0), np.float32)
+    fourth = np.square(np.square(bend * np.float32(1 / limit)))
+    return np.square(np.maximum(0, 1 - fourth)) * (enclosed == 0)
 
 
 def noise_of(bend: FloatImage, background: FloatImage) -> float:

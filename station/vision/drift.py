@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from station.vision.contact import FloatImage, Image
-from station.vision.working import SATURATED_LEVEL, length_squared, resized
+from station.vision.working import capped, length_squared, resized
 
 SPREAD_CAP_LEVELS = 8.0
 """A residual beyond this is no sensor's noise: either a contact or a frame that does not belong to the reference."""
@@ -33,9 +33,9 @@ _LATER_SHARE = 0.02
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
-_STRIPS = 32
+_STRIP_PX = 10
 _NO_PRIOR = 1e-3
-_MEDIAN_SIDE_PX = 60
+_MEDIAN_SIDE = 40
 
 _Floats = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class DriftModel:
         self._size = (width, height)
         self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
         self._half = ((width + 1) // 2, (height + 1) // 2)
-        self._light = np.minimum(reference, SATURATED_LEVEL).astype(np.float32)
+        self._light = capped(reference)
         pattern = cv2.GaussianBlur(self._light, (0, 0), _PATTERN_SIGMA_PX)
         x = (np.arange(width, dtype=np.float32) + 0.5) / width
         y = (np.arange(height, dtype=np.float32)[:, None] + 0.5) / height
@@ -150,7 +150,7 @@ def without_bands(difference: FloatImage) -> FloatImage:
     Args:
         difference: shape (height, width, 3), grey levels.
     """
-    return difference - np.median(difference[:: max(1, len(difference) // _STRIPS)], axis=0)
+    return difference - np.median(difference[:: max(1, len(difference) // _MEDIAN_SIDE)], axis=0)
 
 
 def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
@@ -167,9 +167,10 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
         The change.
     """
     height, width = change.shape[:2]
-    columns = _offsets(resized(change, (width, _STRIPS)), resized(background, (width, _STRIPS)), 0)
-    strips = resized(change, (_STRIPS, height)) - resized(columns, (_STRIPS, 1))
-    rows = _offsets(strips, resized(background, (_STRIPS, height)), 1)
+    across, down = max(1, width // _STRIP_PX), max(1, height // _STRIP_PX)
+    columns = _offsets(resized(change, (width, down)), resized(background, (width, down)), 0)
+    strips = resized(change, (across, height)) - resized(columns, (across, 1))
+    rows = _offsets(strips, resized(background, (across, height)), 1)
     lines = _rows(change)
     lines -= columns.reshape(1, -1)
     change -= cv2.resize(rows, (width, height), interpolation=cv2.INTER_NEAREST)
@@ -193,13 +194,13 @@ def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: float)
 
 
 def thinned(field: FloatImage) -> FloatImage:
-    """Every few pixels of a field, about 60 along each side: enough for a median.
+    """Every few pixels of a field, about 40 along each side: enough for a median.
 
     Args:
         field: shape (height, width).
     """
     height, width = field.shape
-    return field[:: max(1, height // _MEDIAN_SIDE_PX), :: max(1, width // _MEDIAN_SIDE_PX)]
+    return field[:: max(1, height // _MEDIAN_SIDE), :: max(1, width // _MEDIAN_SIDE)]
 
 
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:

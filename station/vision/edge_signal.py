@@ -75,5 +75,10 @@ def envelope(length: FloatImage, inside: Mask, quantile: float, element: float) 
         quantile: of the length there, the cap.
         element: from `element_px`.
     """
-    capped = np.minimum(length, np.quantile(length[inside > 0], quantile).astype(np.float32))
-    return np.asarray(cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element)), np.float32)
+    size = ((length.shape[1] + 1) // 2, (length.shape[0] + 1) // 2)
+    half = resized(length, size)
+    values = half[cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST) > 0]
+    place = int(quantile * (values.size - 1))
+    capped = np.minimum(half, np.partition(values, place)[place])
+    smooth = cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element) / 2)
+    return resized(np.asarray(smooth, np.float32), (length.shape[1], length.shape[0]))

@@ -27,7 +27,7 @@ from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, Stage
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge_signal import denoised, length_of
 from station.vision.outline import Outline, Place, find_outline, radius_px
-from station.vision.working import SATURATED_LEVEL, resized, working_image
+from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
@@ -67,8 +67,8 @@ class RobustMethod:
         self._parameters = parameters
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
-        self._capped = np.minimum(self._reference, SATURATED_LEVEL)
-        self._light_levels = float(np.sqrt(np.mean(self._capped.astype(np.float32) ** 2)))
+        self._light = capped(self._reference)
+        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
         blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
         self._sighted = np.repeat(~blind[..., None], 3, axis=2).astype(np.float32)
@@ -90,8 +90,8 @@ class RobustMethod:
             )
         work = working_image(image)
         height, width = work.shape[:2]
-        capped = np.minimum(work, SATURATED_LEVEL)
-        difference = np.asarray(cv2.subtract(capped, self._capped, dtype=cv2.CV_32F), np.float32)
+        difference = capped(work)
+        difference -= self._light
         quarter = resized(difference, (-(-width // _COARSE_STEP), -(-height // _COARSE_STEP)))
         drift = self._drift.fit(quarter, quiet(bending(quarter, _COARSE_STEP), self._least_bend))
         change = difference - drift.levels

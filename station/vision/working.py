@@ -28,6 +28,15 @@ def working_image(image: Image) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def capped(image: Image) -> FloatImage:
+    """The image cut off where it saturates, as float32.
+
+    Args:
+        image: any shape, dtype uint8.
+    """
+    return cv2.threshold(image, SATURATED_LEVEL, 0, cv2.THRESH_TRUNC)[1].astype(np.float32)
+
+
 def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
     """A field at another size: averaged when it shrinks, linear when it grows.
 
