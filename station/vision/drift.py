@@ -85,7 +85,7 @@ class DriftModel:
             grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
         self._coarse: _Floats = np.stack(grids)
         self._transposed: _Floats = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
-        self._slopes = [_rows(resized(slope, self._half)) for slope in slopes]
+        self._slopes = [_rows(resized(np.asarray(slope, np.float32), self._half)) for slope in slopes]
         self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
         self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
         prior = [

@@ -150,7 +150,8 @@ def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArra
     meeting = int((join.min(axis=0) + inner[1]).argmin())
     ends = (meeting + int(join[:, meeting].argmin()) - _LONGEST_JUMP, meeting)
     path = np.empty(len(turns), np.intp)
-    for side, place in enumerate(ends):
+    for side, end in enumerate(ends):
+        place = end
         for index in range(half - 1, -1, -1):
             path[index if side == 0 else len(turns) - 1 - index] = place
             place += int(jumps[index, side, place]) - _LONGEST_JUMP

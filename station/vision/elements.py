@@ -11,7 +11,7 @@ _STRONG_QUANTILE = 0.8
 _RADII = (5.5, 7.0, 8.0)
 _LEVEL_SHARES = (0.45, 0.25, 0.15)
 """A lone element ends where half of its change is gone; the more there are, the less the outermost are pressed."""
-_CLEAR_OF_NOISE = 6.0
+_CLEAR_OF_NOISE = 8.0
 _GROOVE_PX, _SPECK_PX = 9, 7
 
 

@@ -70,8 +70,8 @@ class RobustMethod:
         self._light = capped(self._reference)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
-        blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
-        self._sighted = np.repeat(~blind[..., None], 3, axis=2).astype(np.float32)
+        sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
+        self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
         self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
@@ -173,7 +173,10 @@ class RobustMethod:
     ) -> tuple[frozenset[Flag], float]:
         """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
-        if drift.strength_levels > _FOREIGN_DRIFT_SHARE * self._light_levels or drift.spread_levels >= SPREAD_CAP_LEVELS:
+        if (
+            drift.strength_levels > _FOREIGN_DRIFT_SHARE * self._light_levels
+            or drift.spread_levels >= SPREAD_CAP_LEVELS
+        ):
             flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
