@@ -118,17 +118,24 @@ def _steepest(
     steepest = steepest[steepest > 0]
     strong = steepest[int(_STRONG_QUANTILE * (steepest.size - 1))] if steepest.size else 1.0
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
-    path = _closed_path(-reward, stiffness)
+    path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
     rays = np.arange(RAYS)
     drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, _STEPS - 1)]
     return radius * shares[path], drop.astype(np.float64)
 
 
-def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
+def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
     """The cheapest path around: run over one and a half turns, of which the middle one is taken.
 
     It is followed from both ends at once until they meet, which is exact and halves the steps.
+
+    Args:
+        cost: of each step on each ray, shape (rays, steps); a path jumps two steps at most from ray to ray.
+        stiffness: price of a jump of one step; of two steps it is four times that.
+
+    Returns:
+        Shape (rays,): the step on each ray.
     """
     rays, steps = cost.shape
     turns = np.concatenate([cost, cost[: rays // 2]])
