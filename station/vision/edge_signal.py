@@ -77,7 +77,7 @@ def envelope(length: FloatImage, inside: Mask, quantile: float, element: float) 
     """
     size = ((length.shape[1] + 1) // 2, (length.shape[0] + 1) // 2)
     half = resized(length, size)
-    values = half[cv2.resize(inside, size, interpolation=cv2.INTER_NEAREST) > 0]
+    values = half[resized((inside > 0).astype(np.float32), size) > 0]
     place = int(quantile * (values.size - 1))
     capped = np.minimum(half, np.partition(values, place)[place])
     smooth = cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element) / 2)

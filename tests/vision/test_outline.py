@@ -7,6 +7,7 @@ from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
 from station.vision.drift import without_bands, without_streaks
 from station.vision.edge import Edge
+from station.vision.edge_signal import envelope
 from station.vision.elements import level, show_apart, union
 from station.vision.robust import RobustMethod
 from station.vision.skirt import unexplained
@@ -78,6 +79,12 @@ def test_the_more_elements_there_are_the_less_the_outermost_are_pressed():
     length = np.full(SHAPE, 20.0, np.float32)
     assert level(length, disc(20), 8.0) == pytest.approx(9.0)
     assert level(length, disc(75), 8.0) == pytest.approx(3.0)
+
+
+def test_the_envelope_of_a_place_of_one_pixel_is_capped_at_its_level():
+    inside = np.zeros(SHAPE, np.uint8)
+    inside[101, 101] = 1
+    assert envelope(hertz(20, 30), inside, 0.25, 8.0).max() <= hertz(20, 30)[100:102, 100:102].mean() + 1e-3
 
 
 def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():
