@@ -12,33 +12,22 @@ import statistics
 import time
 import tracemalloc
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from measurement.light_touch import detection_table
+from measurement.on_the_twin import FRAMES_PER_STEP, twin_table
 
 from station.settings.segmentation import PaperParameters, RobustParameters
-from station.twin.contact import FruitOnGel, Pose
-from station.twin.digit.press import PressOptions, PressSequence, render_press
-from station.twin.digit.sensor import Condition
-from station.twin.fruit import draw_fruit
-from station.twin.gel import Gel
-from station.twin.squeeze import Squeeze
-from station.vision.contact import Flag, Image, Mask
+from station.vision.contact import Image, Mask
 from station.vision.paper import PaperMethod
 from station.vision.robust import RobustMethod
 
 ROOT = Path(__file__).resolve().parents[1]
-CLOSINGS_MM = (0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.8, 2.5, 3.5, 5.0, 7.0)
-FRUITS = ("strawberry", "raspberry", "blueberry", "rubber_ball")
-TWIN_SEEDS = (0, 700)
-"""Of the first press of each fruit; nothing was chosen on the second."""
-DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
-DETECTION_UNITS = (None, 7)
-LIGHT_AREAS_MM2 = (1, 2, 3, 5)
 SIGMA_PIXEL, SIGMA_COLUMN, SIGMA_ROW, SIGMA_OFFSET = (3.1, 1.8, 2.5), (1.8, 1.3, 2.6), 1.0, 1.5
 """Noise measured on real presses, grey levels, B, G, R."""
 DRIFT_LEVELS = 4.0
@@ -233,120 +222,6 @@ def validation_table(folder: Path) -> list[str]:
     return lines
 
 
-def conditions() -> dict[str, PressOptions]:
-    """What the twin's presses are seen under."""
-    return {
-        "plain": PressOptions(),
-        "another unit": PressOptions(unit=7),
-        "at the border": PressOptions(pose=Pose(x_px=70.0)),
-        "tilted": PressOptions(pose=Pose(tilt_deg=10.0, turn_deg=40.0)),
-        "drift doubled": PressOptions(drift=2.0, unit=11),
-        "dead LED": PressOptions(condition=Condition(dead_led="red")),
-        "dirt on the gel": PressOptions(condition=Condition(dirt=3)),
-    }
-
-
-def twin_presses(seed: int) -> Iterator[tuple[str, str, PressSequence]]:
-    """Four bodies in seven conditions, from the first touch to a firm grip."""
-    for kind in FRUITS:
-        for number, (name, options) in enumerate(conditions().items()):
-            yield kind, name, render_press(kind, seed + number, CLOSINGS_MM, options)
-
-
-class Measured(NamedTuple):
-    """One frame of the twin: its keys in the table, and what was found against the truth."""
-
-    keys: tuple[str, str]
-    press: int
-    true_mm2: float
-    error: float
-    area_px: int
-    judged: bool
-    """Whether the station would judge it: sure enough, and decided."""
-    undecided: bool
-
-
-def measured_presses(seeds: Sequence[int]) -> list[Measured]:
-    """Every frame of the twin's presses with those seeds."""
-    found: list[Measured] = []
-    for seed in seeds:
-        for number, (kind, name, press) in enumerate(twin_presses(seed)):
-            method = RobustMethod(press.references, RobustParameters())
-            for frame, mask, true_mm2 in zip(press.frames, press.true_masks, press.true_areas_mm2, strict=True):
-                contact = method.measure(frame)
-                error = abs(contact.area_px / max(1, np.count_nonzero(mask)) - 1)
-                undecided = Flag.UNDECIDED in contact.flags
-                judged = not undecided and Flag.LOW_CONFIDENCE not in contact.flags
-                press_number = 1000 * seed + number
-                found.append(Measured((kind, name), press_number, true_mm2, error, contact.area_px, judged, undecided))
-    return found
-
-
-def twin_table() -> list[str]:
-    """The robust method on the twin, where the truth is exact."""
-    found = measured_presses(TWIN_SEEDS)
-    large = [one for one in found if one.true_mm2 > 2]
-    header = (
-        "| contacts over 2 mm² | frames | error of the area: median | p95 | judged | their median | their p95 "
-        "| Spearman with closing: median | 0.99 or more |"
-    )
-    lines = [header, "|---|---|---|---|---|---|---|---|---|"]
-    for key in ("all", *FRUITS, *conditions()):
-        rows = [one for one in large if key == "all" or key in one.keys]
-        errors, judged = [one.error for one in rows], [one.error for one in rows if one.judged]
-        ranks = [spearman([one.area_px for one in rows if one.press == press]) for press in {one.press for one in rows}]
-        lines.append(
-            f"| {key} | {len(rows)} | {np.median(errors):.3f} | {np.quantile(errors, 0.95):.3f} "
-            f"| {len(judged) / len(rows):.0%} | {np.median(judged):.3f} | {np.quantile(judged, 0.95):.3f} "
-            f"| {np.median(ranks):.3f} | {np.mean(np.array(ranks) >= 0.99):.0%} |"
-        )
-    before = [one for one in found if one.true_mm2 == 0]
-    missed = [one for one in large if one.area_px == 0]
-    return [
-        *lines,
-        "",
-        f"False contacts before the first touch: {sum(one.area_px > 0 for one in before)} of {len(before)}.",
-        f"Contacts over 2 mm² without an area: {len(missed)}, of which {sum(one.undecided for one in missed)} are",
-        "flagged `undecided`.",
-    ]
-
-
-def detection_table() -> list[str]:
-    """The share of light contacts that are found, by their area, at several places and on several units."""
-    header = "| found of contacts of | " + " | ".join(f"{area:g} mm²" for area in LIGHT_AREAS_MM2) + " |"
-    lines = [header, "|---" * (len(LIGHT_AREAS_MM2) + 1) + "|"]
-    for kind in FRUITS:
-        found = np.zeros(len(LIGHT_AREAS_MM2), int)
-        shown = np.zeros(len(LIGHT_AREAS_MM2), int)
-        for seed, ((x_px, y_px), unit) in enumerate(itertools.product(DETECTION_PLACES, DETECTION_UNITS), 500):
-            options = PressOptions(pose=Pose(x_px=x_px, y_px=y_px), unit=unit)
-            press = render_press(kind, seed, light_closings(kind, seed, options), options)
-            method = RobustMethod(press.references, RobustParameters())
-            for number, (frame, true_mm2) in enumerate(zip(press.frames, press.true_areas_mm2, strict=True)):
-                if abs(true_mm2 / LIGHT_AREAS_MM2[number] - 1) < 0.3:
-                    shown[number] += 1
-                    found[number] += method.measure(frame).found
-        lines.append(f"| {kind} | " + " | ".join(f"{f} of {n}" for f, n in zip(found, shown, strict=True)) + " |")
-    return lines
-
-
-def light_closings(kind: str, seed: int, options: PressOptions) -> list[float]:
-    """The closings at which a fruit's contact is nearest to each of the light areas, by its own truth."""
-    closings = np.geomspace(0.002, 0.5, 14)
-    fruit = draw_fruit(kind, seed)
-    on_gel, squeeze = FruitOnGel(fruit, options.pose, Gel()), Squeeze(fruit, Gel())
-    areas = np.array([on_gel.pressed(squeeze.at(float(closing))).true_area_mm2 for closing in closings])
-    return [float(closings[np.argmin(np.abs(areas - area))]) for area in LIGHT_AREAS_MM2]
-
-
-def spearman(values: list[int]) -> float:
-    """Rank correlation of a sequence with its order; 1 where it never falls."""
-    if len(values) < 2:
-        return 1.0
-    ranks = np.argsort(np.argsort(values, kind="stable"), kind="stable")
-    return float(np.corrcoef(ranks, np.arange(len(values)))[0, 1])
-
-
 def peak_memory_mb() -> float:
     """Python's and numpy's peak while a press of 20 frames is measured, method and all, without the frames."""
     frame = np.full((640, 480, 3), 100, np.uint8)
@@ -396,7 +271,8 @@ def main() -> None:
         "# How well the contact is measured",
         "",
         "Written by `./run bench measurement`. The robust method has its default parameters and one reference frame",
-        "on real images, five on the twin. Times are the processor's on one thread, per frame of 640x480, taken with a",
+        f"on real images; on the twin it has five, and {FRAMES_PER_STEP} frames a step, of which it measures the mean,",
+        "as in the recipes. Times are the processor's on one thread, per frame of 640x480, taken with a",
         f"load of {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores shared with other work.",
         "",
         "## Thirty real presses of a ball, against circles annotated by hand",

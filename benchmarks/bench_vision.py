@@ -3,6 +3,7 @@
 Run with `./run bench vision`. Writes `docs/speed.md`.
 """
 
+import functools
 import statistics
 import time
 from collections.abc import Callable
@@ -23,6 +24,8 @@ from station.vision.robust import RobustMethod
 ROOT = Path(__file__).resolve().parents[1]
 RUNS = 15
 PEER_RUNS = 3
+CLOSING_MM = 3.0
+OTHER_FRUITS = ("strawberry", "blueberry", "rubber_ball")
 
 
 def median_ms(step: Callable[[], object], runs: int) -> float:
@@ -101,18 +104,31 @@ def whole_rows(image: np.ndarray, reference: np.ndarray) -> list[tuple[str, floa
     ]
 
 
+def other_rows() -> list[tuple[str, float, str, float | None]]:
+    """The robust method on other simulated frames."""
+    rows: list[tuple[str, float, str, float | None]] = []
+    for kind in OTHER_FRUITS:
+        press = render_press(kind, 1, [0.0, CLOSING_MM])
+        method = RobustMethod(press.references, RobustParameters())
+        names = ("nothing touching", kind.replace("_", " "))
+        for name, frame in list(zip(names, press.frames, strict=True))[0 if not rows else 1 :]:
+            rows.append((f"`robust`, {name}", median_ms(functools.partial(method.measure, frame), RUNS), "", None))
+    return rows
+
+
 def main() -> None:
     """Measure on one thread, print and write the table."""
     cv2.setNumThreads(1)
-    press = render_press("raspberry", 1, [3.0])
+    press = render_press("raspberry", 1, [CLOSING_MM])
     image, reference = press.frames[0], press.references[0]
     with threadpool_limits(1):
-        rows = paper_rows(image, reference) + whole_rows(image, reference)
+        rows = paper_rows(image, reference) + whole_rows(image, reference) + other_rows()
     lines = [
         "# How long a measurement takes",
         "",
         f"Written by `./run bench vision`: medians of {RUNS} runs ({PEER_RUNS} of the other libraries), one thread, a",
-        f"640x480 image of a simulated raspberry at 3 mm of closing; OpenCV {cv2.__version__}, numpy {np.__version__}.",
+        f"640x480 image of a simulated raspberry, or what a row names, at {CLOSING_MM:g} mm of closing;",
+        f"OpenCV {cv2.__version__}, numpy {np.__version__}.",
         "",
         "| stage | ms | the same step elsewhere | ms |",
         "|---|---|---|---|",

@@ -11,7 +11,6 @@ import numpy as np
 
 from station.vision.contact import FloatImage
 from station.vision.drift import weighted_median
-from station.vision.working import resized
 
 _SIGMA_PX = 5.0
 _WINDOW_SIGMA_PX = 7.5
@@ -20,19 +19,17 @@ _NOISE_CAP = 0.35
 _LEAST_BACKGROUND = 0.02
 
 
-def bending(change: FloatImage, step: int = 2) -> FloatImage:
-    """The bending at a fraction of the change's size.
+def bending(change: FloatImage, step: int) -> FloatImage:
+    """How much the gel bends.
 
     Args:
-        change: signed, shape (height, width, 3), grey levels.
-        step: by how much the result is smaller, 2 or 4.
+        change: signed, averaged down by `step`, shape (height, width, 3), grey levels.
+        step: by how much it is smaller than the working image.
 
     Returns:
-        Shape (height / step, width / step), rounded up, grey levels per pixel of `change`.
+        Shape (height, width), grey levels per pixel of the working image.
     """
-    height, width = change.shape[:2]
-    less = resized(change, (-(-width // step), -(-height // step)))
-    smooth = cv2.GaussianBlur(less, (0, 0), _SIGMA_PX / step)
+    smooth = cv2.GaussianBlur(change, (0, 0), _SIGMA_PX / step)
     slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / (8 * step))
     slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / (8 * step))
     ones = np.ones((1, 3), np.float32)
@@ -56,10 +53,12 @@ def quiet(bend: FloatImage, least_bend: float) -> FloatImage:
     Returns:
         Shape of `bend`, 0 to 1.
     """
-    limit = min(_CALM_RATIO * float(np.quantile(bend, 0.05)), 1.5 * least_bend) + 0.15 * least_bend
+    calmest = float(np.partition(bend, bend.size // 20, axis=None)[bend.size // 20])
+    limit = min(_CALM_RATIO * calmest, 1.5 * least_bend) + 0.15 * least_bend
     outlines, _ = cv2.findContours((bend > limit).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     enclosed = cv2.drawContours(np.zeros(bend.shape, np.uint8), outlines, -1, 1, cv2.FILLED)
-    return np.asarray(np.maximum(0, 1 - (bend / limit) ** 4) ** 2 * (enclosed == 0), np.float32)
+    fourth = np.square(np.square(bend * np.float32(1 / limit)))
+    return np.square(np.maximum(0, 1 - fourth)) * (enclosed == 0)
 
 
 def noise_of(bend: FloatImage, background: FloatImage) -> float:

@@ -10,7 +10,6 @@ from station.vision.confidence import background_spread
 from station.vision.contact import FloatImage, Mask
 from station.vision.drift import weighted_median
 from station.vision.edge_signal import length_of
-from station.vision.working import resized
 
 _FOOT_SHARE = 0.5
 _BODY_SHARE = 0.12
@@ -41,7 +40,7 @@ def cluster_levels(bend: FloatImage) -> list[float]:
     Args:
         bend: shape (height, width), grey levels per pixel.
     """
-    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend, _LEAST_BEND)))]
+    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend[::2, ::2], _LEAST_BEND)))]
 
 
 def changed_places(change: FloatImage, background: FloatImage) -> Mask:
@@ -50,17 +49,16 @@ def changed_places(change: FloatImage, background: FloatImage) -> Mask:
     A column's lower quartile is what its streak reaches; a place has to stand out of that as well.
 
     Args:
-        change: without drift, shape (height, width, 3), grey levels.
+        change: without drift, at half the working size, shape (height, width, 3), grey levels.
         background: shape (height, width), 0 to 1.
 
     Returns:
-        At half the change's size, 0 or 1; small specks are left out.
+        Shape (height, width), 0 or 1; small specks are left out.
     """
-    size = ((change.shape[1] + 1) // 2, (change.shape[0] + 1) // 2)
-    length = length_of(np.asarray(cv2.GaussianBlur(resized(change, size), (0, 0), _CHANGE_SIGMA_PX), np.float32))
-    calm = resized(background, size)
-    noise = weighted_median(length, calm) + _CHANGE_OVER_NOISE * background_spread(length, calm)
-    streak = _CHANGE_OVER_STREAK * np.quantile(length, _STREAK_QUANTILE, axis=0)
+    length = length_of(np.asarray(cv2.GaussianBlur(change, (0, 0), _CHANGE_SIGMA_PX), np.float32))
+    noise = weighted_median(length, background) + _CHANGE_OVER_NOISE * background_spread(length, background)
+    quartile = int(_STREAK_QUANTILE * len(length))
+    streak = _CHANGE_OVER_STREAK * np.partition(length, quartile, axis=0)[quartile]
     changed = (length > np.maximum(noise, streak)).astype(np.uint8)
     speck = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SPECK_PX, _SPECK_PX))
     return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, speck), np.uint8)

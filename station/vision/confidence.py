@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from station.vision.contact import FloatImage
-from station.vision.drift import weighted_median
+from station.vision.drift import thinned, weighted_median
 from station.vision.edge import Edge
 
 _RELIABLE_RATIO = 4.0
 _VISIBLE_RATIO = 2.0
-_LEAST_NOISE_LEVELS = 0.1
+LEAST_NOISE_LEVELS = 0.1
 _NORMAL_OF_MEDIAN = 1.4826
 
 
@@ -21,6 +21,7 @@ def background_spread(signal: FloatImage, background: FloatImage) -> float:
         signal: shape (height, width), grey levels.
         background: shape of `signal`, 0 to 1.
     """
+    signal, background = thinned(signal), thinned(background)
     middle = weighted_median(signal, background)
     return _NORMAL_OF_MEDIAN * weighted_median(np.abs(signal - middle), background)
 
@@ -37,7 +38,7 @@ def edge_confidence(edge: Edge, noise_levels: float) -> float:
     """
     if not edge.seen.any():
         return 0.0
-    ratio = edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)
+    ratio = edge.drop_levels[edge.seen] / max(noise_levels, LEAST_NOISE_LEVELS)
     signal = max(0.0, float(np.median(ratio)))
     support = float(np.mean(ratio >= _VISIBLE_RATIO))
     return support * signal**2 / (signal**2 + _RELIABLE_RATIO**2)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -97,16 +98,13 @@ def contact_from_mask(
         drift_levels: as in `Contact`.
     """
     known = {"confidence": confidence, "gate": gate, "drift_levels": drift_levels}
-    inside = mask > 0
-    area_px = int(np.count_nonzero(inside))
+    area_px = cv2.countNonZero(mask)
     if area_px == 0:
         nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
         return Contact(mask, 0, None, flags | nothing, **known)
-    rows, columns = inside.sum(axis=1), inside.sum(axis=0)
-    centroid_px = (
-        float(np.arange(columns.size) @ columns) / area_px,
-        float(np.arange(rows.size) @ rows) / area_px,
-    )
-    if rows[0] or rows[-1] or columns[0] or columns[-1]:
+    left, top, width, height = cv2.boundingRect(mask)
+    moments = cv2.moments(mask[top : top + height, left : left + width], binaryImage=True)
+    centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)
+    if left == 0 or top == 0 or left + width == mask.shape[1] or top + height == mask.shape[0]:
         flags |= {Flag.CUT_BY_BORDER}
     return Contact(mask, area_px, centroid_px, flags, **known)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from station.vision.contact import FloatImage, Image
-from station.vision.working import SATURATED_LEVEL, resized
+from station.vision.working import capped, length_squared, resized
 
 SPREAD_CAP_LEVELS = 8.0
 """A residual beyond this is no sensor's noise: either a contact or a frame that does not belong to the reference."""
@@ -33,9 +33,9 @@ _LATER_SHARE = 0.02
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
-_STRIPS = 32
-_NO_PRIOR = np.float32(1e-3)
-_MEDIAN_SIDE_PX = 60
+_STRIP_PX = 10
+_NO_PRIOR = 1e-3
+_MEDIAN_SIDE = 40
 
 _Floats = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class DriftModel:
         self._size = (width, height)
         self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
         self._half = ((width + 1) // 2, (height + 1) // 2)
-        self._light = np.minimum(reference, SATURATED_LEVEL).astype(np.float32)
+        self._light = capped(reference)
         pattern = cv2.GaussianBlur(self._light, (0, 0), _PATTERN_SIGMA_PX)
         x = (np.arange(width, dtype=np.float32) + 0.5) / width
         y = (np.arange(height, dtype=np.float32)[:, None] + 0.5) / height
@@ -73,19 +73,21 @@ class DriftModel:
             for j in range(_HIGHEST_COSINE + 1)
             if i * i + j * j <= _HIGHEST_COSINE**2
         ]
+        self._orders = len(orders)
         cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
         stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
         slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
         grids: list[_Floats] = []
-        self._fine: list[FloatImage] = []
         for channel in range(3):
             shapes = cosines + [slope[..., channel] * stretch for slope in slopes for stretch in stretches]
             gained = resized(self._light[..., channel], self._grid)
             coarse = [resized(shape, self._grid) for shape in shapes]
             grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
-            self._fine.append(np.stack([resized(shape, self._half).ravel() for shape in shapes]))
         self._coarse: _Floats = np.stack(grids)
         self._transposed: _Floats = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
+        self._slopes = [_rows(resized(np.asarray(slope, np.float32), self._half)) for slope in slopes]
+        self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
+        self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
         prior = [
             _PRIOR_GAIN,
             *(_PRIOR_COSINE_LEVELS / (1 + i * i + j * j) for i, j in orders),
@@ -116,12 +118,30 @@ class DriftModel:
             if weight.sum() >= _LEAST_BACKGROUND * weight.size:
                 spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
             weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2 * trust
-        smooth = [c[1:, 0].astype(np.float32) @ f for c, f in zip(coefficients, self._fine, strict=True)]
-        levels = resized(np.stack(smooth, axis=-1).reshape(self._half[1], self._half[0], 3), self._size)
-        levels += self._light * coefficients[:, 0, 0].astype(np.float32)
+        levels = self._levels(coefficients[..., 0])
         strength = float(np.sqrt(np.mean(fitted**2)))
         certain = weight.reshape(self._grid[1], self._grid[0]).astype(np.float32)
         return Drift(levels, resized(certain, self._size), spread, strength)
+
+    def _levels(self, coefficients: _Floats) -> FloatImage:
+        """The drift at the reference's size: its smooth parts drawn smaller and enlarged, its gain exactly."""
+        end = 1 + self._orders
+        waves = (self._coarse[0, :, 1:end] @ coefficients[:, 1:end].T).astype(np.float32)
+        waves = waves.reshape(self._grid[1], self._grid[0], 3)
+        half = np.asarray(cv2.resize(waves, self._half, interpolation=cv2.INTER_CUBIC), np.float32)
+        lines = _rows(half)
+        for number, slope in enumerate(self._slopes):
+            displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
+            still, along, up = np.tile(displaced, self._half[0]).astype(np.float32)
+            lines += slope * ((still + along * self._across) + up * self._down)
+        levels = resized(half, self._size)
+        _rows(levels)[:] += _rows(self._light) * np.tile(coefficients[:, 0], self._size[0]).astype(np.float32)
+        return levels
+
+
+def _rows(image: FloatImage) -> FloatImage:
+    """The image with a row's colours side by side, which numpy goes through much faster; a view."""
+    return image.reshape(len(image), -1)
 
 
 def without_bands(difference: FloatImage) -> FloatImage:
@@ -130,12 +150,11 @@ def without_bands(difference: FloatImage) -> FloatImage:
     Args:
         difference: shape (height, width, 3), grey levels.
     """
-    strips = resized(difference, (difference.shape[1], _STRIPS))
-    return difference - np.median(strips, axis=0)
+    return difference - np.median(difference[:: max(1, len(difference) // _MEDIAN_SIDE)], axis=0)
 
 
 def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
-    """The change with each column's and then each row's offset over its background taken off.
+    """Take each column's and then each row's offset over its background off the change, in place.
 
     An offset is a mean that weights down what departs from it (Tukey's biweight), so that a contact's skirt does not
     pull it; a line of which little is background is corrected by less.
@@ -143,27 +162,45 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
     Args:
         change: shape (height, width, 3), grey levels.
         background: any size, 0 to 1.
+
+    Returns:
+        The change.
     """
     height, width = change.shape[:2]
-    even = change - _offsets(resized(change, (width, _STRIPS)), resized(background, (width, _STRIPS)), 0)
-    across = _offsets(resized(even, (_STRIPS, height)), resized(background, (_STRIPS, height)), 1)
-    even -= across
-    return np.asarray(even, np.float32)
+    across, down = max(1, width // _STRIP_PX), max(1, height // _STRIP_PX)
+    columns = _offsets(resized(change, (width, down)), resized(background, (width, down)), 0)
+    strips = resized(change, (across, height)) - resized(columns, (across, 1))
+    rows = _offsets(strips, resized(background, (across, height)), 1)
+    lines = _rows(change)
+    lines -= columns.reshape(1, -1)
+    change -= cv2.resize(rows, (width, height), interpolation=cv2.INTER_NEAREST)
+    return change
 
 
 def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
-    prior = np.float32(_STREAK_PRIOR_SHARE * strips.shape[axis])
-    first = _line_means(strips, background, axis, _NO_PRIOR)
-    away = np.square(strips - first).sum(axis=2)
+    prior = _STREAK_PRIOR_SHARE * strips.shape[axis]
+    away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)
 
 
-def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: np.float32) -> FloatImage:
-    support = weight.sum(axis=axis, keepdims=True)[..., None] + prior
-    return np.asarray((strips * weight[..., None]).sum(axis=axis, keepdims=True) / support, np.float32)
+def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: float) -> FloatImage:
+    weighted = cv2.multiply(strips, cv2.merge([weight] * 3))
+    sums = cv2.reduce(weighted, axis, cv2.REDUCE_SUM)
+    support = cv2.reduce(weight, axis, cv2.REDUCE_SUM) + np.float32(prior)
+    return np.asarray(sums / support[..., None], np.float32)
+
+
+def thinned(field: FloatImage) -> FloatImage:
+    """Every few pixels of a field, about 40 along each side: enough for a median.
+
+    Args:
+        field: shape (height, width).
+    """
+    height, width = field.shape
+    return field[:: max(1, height // _MEDIAN_SIDE), :: max(1, width // _MEDIAN_SIDE)]
 
 
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:
@@ -174,8 +211,7 @@ def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.flo
         weight: as many as `values`, not negative.
     """
     if values.ndim == 2:
-        thin = tuple(slice(None, None, max(1, side // _MEDIAN_SIDE_PX)) for side in values.shape)
-        values, weight = values[thin], weight[thin]
+        values, weight = thinned(values), thinned(weight)
     order = np.argsort(values, axis=None)
     cumulated = np.cumsum(weight.ravel()[order])
     if cumulated[-1] <= 0:

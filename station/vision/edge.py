@@ -23,6 +23,7 @@ _LONGEST_JUMP = 2
 _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
 _SIDE_SHARE = 0.15
+_REACH_STEP_PX = 2
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -79,7 +80,7 @@ def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
 def _reach(region: Mask, middle: tuple[float, float]) -> _Floats:
     """How far the region reaches on each ray; beyond the border as far as it does elsewhere."""
     height, width = region.shape
-    steps = np.arange(1.0, np.hypot(height, width))
+    steps = np.arange(1.0, np.hypot(height, width), _REACH_STEP_PX)
     x, y = middle[0] + _COSINES[:, None] * steps, middle[1] + _SINES[:, None] * steps
     inside = (x >= -0.5) & (y >= -0.5) & (x <= width - 0.5) & (y <= height - 0.5)
     values = cv2.remap(
@@ -110,39 +111,56 @@ def _steepest(
         length, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
     )
     profile = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
-    fall = -np.gradient(profile, axis=1)
+    fall = np.zeros_like(profile)
+    np.subtract(profile[:, :-2], profile[:, 2:], out=fall[:, 1:-1])
     fall[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
-    steepest = fall.max(axis=1)
-    strong = np.quantile(steepest[steepest > 0], _STRONG_QUANTILE) if (steepest > 0).any() else 1.0
-    reward = np.maximum(np.clip(fall / strong, 0, 1) - _LEAST_STEEPNESS, 0) / (1 - _LEAST_STEEPNESS)
-    path = _closed_path(-reward, stiffness)
+    steepest = np.sort(fall.max(axis=1))
+    steepest = steepest[steepest > 0]
+    strong = steepest[int(_STRONG_QUANTILE * (steepest.size - 1))] if steepest.size else 1.0
+    reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
+    path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
     rays = np.arange(RAYS)
     drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, _STEPS - 1)]
     return radius * shares[path], drop.astype(np.float64)
 
 
-def _closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
-    """The cheapest path around: run over one and a half turns, of which the middle one is taken."""
+def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:
+    """The cheapest path around: run over one and a half turns, of which the middle one is taken.
+
+    It is followed from both ends at once until they meet, which is exact and halves the steps.
+
+    Args:
+        cost: of each step on each ray, shape (rays, steps); a path jumps two steps at most from ray to ray.
+        stiffness: price of a jump of one step; of two steps it is four times that.
+
+    Returns:
+        Shape (rays,): the step on each ray.
+    """
     rays, steps = cost.shape
     turns = np.concatenate([cost, cost[: rays // 2]])
-    jumps = np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1)
-    price = (stiffness * jumps**2)[:, None]
-    padded = np.full(steps + 2 * _LONGEST_JUMP, np.inf)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, steps)
-    inner = padded[_LONGEST_JUMP:-_LONGEST_JUMP]
-    inner[:] = turns[0]
-    steps_taken = np.empty(turns.shape, np.intp)
-    candidates = np.empty((jumps.size, steps))
-    for index in range(1, len(turns)):
+    half = len(turns) // 2
+    both = np.stack([turns[:half], turns[: half - 1 : -1]], axis=1)
+    price = (stiffness * np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1) ** 2)[:, None]
+    padded = np.full((2, steps + 2 * _LONGEST_JUMP), np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, steps, axis=1)
+    inner = padded[:, _LONGEST_JUMP:-_LONGEST_JUMP]
+    inner[:] = both[0]
+    jumps = np.full((half, 2, steps), _LONGEST_JUMP)
+    candidates = np.empty((2, len(price), steps))
+    for index in range(1, half):
         np.add(windows, price, out=candidates)
-        candidates.argmin(axis=0, out=steps_taken[index])
-        np.minimum.reduce(candidates, axis=0, out=inner)
-        inner += turns[index]
-    came_from = steps_taken + (np.arange(steps) - _LONGEST_JUMP)
+        candidates.argmin(axis=1, out=jumps[index])
+        np.minimum.reduce(candidates, axis=1, out=inner)
+        inner += both[index]
+    join = windows[0] + price
+    meeting = int((join.min(axis=0) + inner[1]).argmin())
+    ends = (meeting + int(join[:, meeting].argmin()) - _LONGEST_JUMP, meeting)
     path = np.empty(len(turns), np.intp)
-    path[-1] = inner.argmin()
-    for index in range(len(turns) - 1, 0, -1):
-        path[index - 1] = came_from[index, path[index]]
+    for side, end in enumerate(ends):
+        place = end
+        for index in range(half - 1, -1, -1):
+            path[index if side == 0 else len(turns) - 1 - index] = place
+            place += int(jumps[index, side, place]) - _LONGEST_JUMP
     start = rays // 4
     return np.roll(path[start : start + rays], start)

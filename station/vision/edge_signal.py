@@ -4,23 +4,30 @@ import cv2
 import numpy as np
 
 from station.vision.contact import FloatImage, Mask
-from station.vision.working import resized
+from station.vision.working import length_squared, resized
 
 _BLUR_SHARE = 0.045
 _BLUR_PX = (1.0, 3.5)
+_HALF_FROM_PX = 2.0
 _TEXTURED_SHARE = 0.15
 _WINDOW_SHARE = 0.7
 
 
-def denoised(change: FloatImage, radius_px: float) -> FloatImage:
+def denoised(change: FloatImage, half: FloatImage, radius_px: float) -> FloatImage:
     """The change smoothed as far as a contact of that size allows.
 
     Args:
         change: shape (height, width, 3), grey levels.
+        half: the same averaged down to half the size.
         radius_px: of a circle of the candidate region's area.
+
+    Returns:
+        Of the change's size, or of half that where so much is smoothed that nothing is lost by it.
     """
     sigma = float(np.clip(_BLUR_SHARE * radius_px, *_BLUR_PX))
-    return np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+    if sigma < _HALF_FROM_PX:
+        return np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+    return np.asarray(cv2.GaussianBlur(half, (0, 0), sigma / 2), np.float32)
 
 
 def length_of(change: FloatImage) -> FloatImage:
@@ -32,8 +39,7 @@ def length_of(change: FloatImage) -> FloatImage:
     Returns:
         Shape (height, width), grey levels.
     """
-    ones = np.ones((1, 3), np.float32)
-    return np.asarray(cv2.sqrt(cv2.transform(cv2.multiply(change, change), ones)), np.float32)
+    return np.asarray(cv2.sqrt(length_squared(change)), np.float32)
 
 
 def element_px(length: FloatImage, bend: FloatImage, region: Mask) -> float:
@@ -69,5 +75,10 @@ def envelope(length: FloatImage, inside: Mask, quantile: float, element: float) 
         quantile: of the length there, the cap.
         element: from `element_px`.
     """
-    capped = np.minimum(length, np.quantile(length[inside > 0], quantile).astype(np.float32))
-    return np.asarray(cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element)), np.float32)
+    size = ((length.shape[1] + 1) // 2, (length.shape[0] + 1) // 2)
+    half = resized(length, size)
+    values = half[resized((inside > 0).astype(np.float32), size) > 0]
+    place = int(quantile * (values.size - 1))
+    capped = np.minimum(half, np.partition(values, place)[place])
+    smooth = cv2.GaussianBlur(capped, (0, 0), max(_BLUR_PX[0], _WINDOW_SHARE * element) / 2)
+    return resized(np.asarray(smooth, np.float32), (length.shape[1], length.shape[0]))

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from station.vision import elements
-from station.vision.confidence import background_spread, edge_confidence
+from station.vision.confidence import LEAST_NOISE_LEVELS, background_spread, edge_confidence
 from station.vision.contact import FloatImage, Mask
 from station.vision.drift import weighted_median
 from station.vision.edge import Edge, find_edge
@@ -19,7 +19,7 @@ _UNEXPLAINED = 0.8
 _LARGEST_ELEMENT_SHARE = 0.03
 """Of the frame: 7 mm² of a DIGIT's field, more than a seed's or a drupelet's outline ever has."""
 _FIRST_CAP, _SECOND_CAP = 0.4, 0.25
-_CORE_SHARE = 0.85
+_CORE_SHARE, _AROUND_SHARE = 0.85, 1.25
 _SUBPIXEL_BITS = 4
 
 
@@ -82,14 +82,19 @@ def find_outline(length: FloatImage, bend: FloatImage, place: Place, stiffness: 
     if edge is None:
         signal = envelope(length, region, _FIRST_CAP, element)
         edge = find_edge(signal, region, place.middle, stiffness)
-        core = filled(_shrunk(edge, _CORE_SHARE), shape)
+        core = filled(_scaled(edge, _CORE_SHARE), shape)
         if core.any():
             signal = envelope(length, core, _SECOND_CAP, element)
             edge = find_edge(signal, filled(edge, shape), _centre(edge, shape), stiffness)
     inside = filled(edge, shape)
     confidence = edge_confidence(edge, background_spread(signal, place.background)) / max(1.0, doubt)
-    apart = textured and inside.any() and elements.are_few(inside, element)
-    return Outline(edge, elements.union(length, inside) if apart else inside, bool(apart), confidence)
+    if textured and inside.any():
+        level = elements.level(length, inside, element)
+        noise = weighted_median(length, place.background), background_spread(length, place.background)
+        if elements.show_apart(inside, element, (level - noise[0]) / max(noise[1], LEAST_NOISE_LEVELS)):
+            around = filled(_scaled(edge, _AROUND_SHARE), shape)
+            return Outline(edge, elements.union(length, around, level), apart=True, confidence=confidence)
+    return Outline(edge, inside, apart=False, confidence=confidence)
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
@@ -125,7 +130,7 @@ def _centre(edge: Edge, shape: tuple[int, int]) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _shrunk(edge: Edge, share: float) -> Edge:
-    """The edge drawn towards its middle."""
+def _scaled(edge: Edge, share: float) -> Edge:
+    """The edge drawn towards its middle, or away from it."""
     middle = edge.points.mean(axis=0)
     return replace(edge, points=middle + (edge.points - middle) * share)

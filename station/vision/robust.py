@@ -5,7 +5,9 @@ as many as the data ask for; for each region the edge where the change falls off
 explains each with its reasons.
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -23,10 +25,9 @@ from station.vision.candidates import (
 )
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
-from station.vision.edge import Edge
 from station.vision.edge_signal import denoised, length_of
 from station.vision.outline import Outline, Place, find_outline, radius_px
-from station.vision.working import SATURATED_LEVEL, resized, working_image
+from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
@@ -36,7 +37,7 @@ _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
 _LEAST_SUPPORT = 0.03
-_COARSE_STEP = 4
+_COARSE_STEP, _FINE_STEP = 4, 2
 _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
@@ -66,10 +67,11 @@ class RobustMethod:
         self._parameters = parameters
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
-        self._light = np.minimum(self._reference, SATURATED_LEVEL).astype(np.float32)
+        self._light = capped(self._reference)
+        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
-        blind = (self._reference >= SATURATED_LEVEL).any(axis=2)
-        self._blind = blind if blind.any() else None
+        sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
+        self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
         self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
@@ -87,26 +89,31 @@ class RobustMethod:
                 f"image {image.shape} {image.dtype} must be uint8 and of the reference's shape {self._shape}"
             )
         work = working_image(image)
-        difference = np.minimum(work, SATURATED_LEVEL) - self._light
-        drift = self._drift.fit(difference, self._quiet(difference))
+        height, width = work.shape[:2]
+        difference = capped(work)
+        difference -= self._light
+        quarter = resized(difference, (-(-width // _COARSE_STEP), -(-height // _COARSE_STEP)))
+        drift = self._drift.fit(quarter, quiet(bending(quarter, _COARSE_STEP), self._least_bend))
         change = difference - drift.levels
-        if self._blind is not None:
-            change[self._blind] = 0
-        calm = self._quiet(without_bands(difference))
+        change *= self._sighted
+        calm = quiet(bending(without_bands(quarter), _COARSE_STEP), self._least_bend)
         fits = resized(drift.background, (calm.shape[1], calm.shape[0]))
         change = without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits))
-        bend = bending(change)
-        noise = noise_of(bend, resized(drift.background, (bend.shape[1], bend.shape[0])))
+        half = resized(change, (-(-width // _FINE_STEP), -(-height // _FINE_STEP)))
+        background = resized(drift.background, (half.shape[1], half.shape[0]))
+        bend = bending(half, _FINE_STEP)
+        noise = noise_of(bend, background)
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
+        changed = functools.cache(lambda: changed_places(half, background))
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, levels, threshold)
         else:
-            changed = None if sure else changed_places(change, drift.background)
-            candidates = body_candidates(bend, levels, threshold, changed)
-        found = self._outlines(change, bend, candidates, drift.background, sure=sure)
+            candidates = body_candidates(bend, levels, threshold, None if sure else changed())
+        seen = _Seen(change, half, bend, drift.background, changed)
+        found = self._outlines(seen, candidates, sure=sure)
         mask = self._mask(found)
         if on_stage:
             pictures.emit(
@@ -129,23 +136,11 @@ class RobustMethod:
             drift_levels=drift.strength_levels,
         )
 
-    def _quiet(self, difference: FloatImage) -> FloatImage:
-        """Where the difference hardly bends; it need not be known finely."""
-        return quiet(bending(difference, _COARSE_STEP), self._least_bend)
-
-    def _outlines(
-        self,
-        change: FloatImage,
-        bend: FloatImage,
-        candidates: list[Candidate],
-        background: FloatImage,
-        *,
-        sure: bool,
-    ) -> list[Outline]:
+    def _outlines(self, seen: "_Seen", candidates: list[Candidate], *, sure: bool) -> list[Outline]:
         """The outlines that the image supports, or any where contact is sure."""
         found: list[Outline] = []
         one = self._parameters.contacts == "one"
-        height, width = change.shape[:2]
+        height, width = seen.change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
         for small, _ in candidates:
             if found and one:
@@ -153,13 +148,14 @@ class RobustMethod:
             region = _grown(small, (width, height))
 
             def widened(small: Mask = small) -> Mask:
-                return _grown(extended(small, changed_places(change, background)), (width, height))
+                return _grown(extended(small, seen.changed()), (width, height))
 
-            smooth = denoised(change, radius_px(region))
-            place = Place(region, widened if one else None, _middle(bend, small, (width, height)), background)
-            outline = find_outline(length_of(smooth), bend, place, self._parameters.edge_stiffness)
-            inside = outline.inside > 0
-            if np.count_nonzero(inside) < smallest_px or _one_sided(smooth[inside], outline.edge):
+            smooth = denoised(seen.change, seen.half, radius_px(region))
+            length = resized(length_of(smooth), (width, height))
+            middle = _middle(seen.bend, small, (width, height))
+            place = Place(region, widened if one else None, middle, seen.background)
+            outline = find_outline(length, seen.bend, place, self._parameters.edge_stiffness)
+            if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline):
                 continue
             if sure or outline.confidence >= _LEAST_SUPPORT:
                 found.append(outline)
@@ -177,12 +173,14 @@ class RobustMethod:
     ) -> tuple[frozenset[Flag], float]:
         """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
-        light = float(np.sqrt(np.mean(self._light**2)))
-        if drift.strength_levels > _FOREIGN_DRIFT_SHARE * light or drift.spread_levels >= SPREAD_CAP_LEVELS:
+        if (
+            drift.strength_levels > _FOREIGN_DRIFT_SHARE * self._light_levels
+            or drift.spread_levels >= SPREAD_CAP_LEVELS
+        ):
             flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
-        saturated = np.maximum(np.maximum(blue, green), red) >= SATURATED_LEVEL
+        saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
         if not found and gate > 1:
@@ -194,6 +192,19 @@ class RobustMethod:
         if confidence < self._parameters.least_confidence:
             flags.add(Flag.LOW_CONFIDENCE)
         return frozenset(flags), confidence
+
+
+class _Seen(NamedTuple):
+    """One frame without drift, as the search for outlines needs it."""
+
+    change: FloatImage
+    half: FloatImage
+    """The change averaged down to the bending's size."""
+    bend: FloatImage
+    background: FloatImage
+    """Of the change's size."""
+    changed: Callable[[], Mask]
+    """Gives the changed places, of the bending's size."""
 
 
 def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[float, float]:
@@ -212,12 +223,15 @@ def _grown(small: Mask, size: tuple[int, int]) -> Mask:
     return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
-def _one_sided(change: FloatImage, edge: Edge) -> bool:
+def _one_sided(change: FloatImage, outline: Outline) -> bool:
     """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
 
     Not asked of a contact that the border cuts: its other slopes may lie outside.
     """
-    if not edge.seen.all():
+    if not outline.edge.seen.all():
         return False
-    mean = change.mean(axis=0)
-    return float(mean @ mean) > _ONE_SIDED * float(np.mean((change**2).sum(axis=1)))
+    size = (change.shape[1], change.shape[0])
+    inside = cv2.resize(outline.inside, size, interpolation=cv2.INTER_NEAREST)
+    mean, deviation = cv2.meanStdDev(change, mask=inside)
+    of_the_mean = float((mean**2).sum())
+    return of_the_mean > _ONE_SIDED * (of_the_mean + float((deviation**2).sum()))

@@ -11,6 +11,8 @@ LONG_SIDE_PX = 320
 SATURATED_LEVEL = 248
 """Grey level from which a channel is taken as saturated: the sensor's own processing stops short of 255."""
 
+_SUM = np.ones((1, 3), np.float32)
+
 
 def working_image(image: Image) -> Image:
     """The image averaged down to the working size.
@@ -26,6 +28,15 @@ def working_image(image: Image) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def capped(image: Image) -> FloatImage:
+    """The image cut off where it saturates, as float32.
+
+    Args:
+        image: any shape, dtype uint8.
+    """
+    return cv2.threshold(image, SATURATED_LEVEL, 0, cv2.THRESH_TRUNC)[1].astype(np.float32)
+
+
 def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
     """A field at another size: averaged when it shrinks, linear when it grows.
 
@@ -38,3 +49,15 @@ def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
     shrinking = size[0] < field.shape[1]
     method = cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(np.ascontiguousarray(field, np.float32), size, interpolation=method), np.float32)
+
+
+def length_squared(change: FloatImage) -> FloatImage:
+    """The squared length over the channels.
+
+    Args:
+        change: shape (height, width, 3).
+
+    Returns:
+        Shape (height, width).
+    """
+    return np.asarray(cv2.transform(cv2.multiply(change, change), _SUM), np.float32)

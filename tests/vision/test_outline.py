@@ -7,7 +7,8 @@ from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
 from station.vision.drift import without_bands, without_streaks
 from station.vision.edge import Edge
-from station.vision.elements import are_few, union
+from station.vision.edge_signal import envelope
+from station.vision.elements import level, show_apart, union
 from station.vision.robust import RobustMethod
 from station.vision.skirt import unexplained
 
@@ -62,12 +63,28 @@ def test_few_drupelets_are_their_union_and_not_their_hull():
     length = np.max([hertz(16, 30, x, y) * (disc(16, x, y) > 0) for x, y in drupelets], axis=0).astype(np.float32)
     apart = np.max([disc(16, x, y) for x, y in drupelets], axis=0)
     hull = disc(55, 120.0, 152.0)
-    found = union(length, hull)
+    found = union(length, hull, level(length, hull, 8.0))
     assert np.count_nonzero(found) == pytest.approx(np.count_nonzero(apart), rel=0.3)
     assert np.count_nonzero(found) < 0.4 * np.count_nonzero(hull)
     assert np.count_nonzero(found & apart) > 0.85 * np.count_nonzero(apart)
-    assert are_few(hull, 8.0)
-    assert not are_few(hull, 7.0)
+
+
+def test_elements_show_apart_where_they_are_few_or_stand_clear_of_the_noise():
+    assert show_apart(disc(55), 8.0, level_over_noise=0.0)
+    assert not show_apart(disc(55), 7.0, level_over_noise=5.0)
+    assert show_apart(disc(55), 7.0, level_over_noise=12.0)
+
+
+def test_the_more_elements_there_are_the_less_the_outermost_are_pressed():
+    length = np.full(SHAPE, 20.0, np.float32)
+    assert level(length, disc(20), 8.0) == pytest.approx(9.0)
+    assert level(length, disc(75), 8.0) == pytest.approx(3.0)
+
+
+def test_the_envelope_of_a_place_of_one_pixel_is_capped_at_its_level():
+    inside = np.zeros(SHAPE, np.uint8)
+    inside[101, 101] = 1
+    assert envelope(hertz(20, 30), inside, 0.25, 8.0).max() <= hertz(20, 30)[100:102, 100:102].mean() + 1e-3
 
 
 def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():
@@ -76,7 +93,7 @@ def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():
     banded = contact + generator.normal(size=(*SHAPE, 3)).astype(np.float32)
     banded[:, 100:116] += 12
     calm = (disc(76) == 0).astype(np.float32)
-    clean = without_streaks(banded, calm)
+    clean = without_streaks(banded.copy(), calm)
     assert abs(clean[:60, 100:116].mean()) < 3
     assert abs(without_bands(banded)[:60, 100:116].mean()) < 1
 

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -25,6 +25,7 @@ def disc(shape: tuple[int, int], centre: tuple[int, int], radius_px: int) -> np.
     return np.asarray(cv2.circle(np.zeros(shape, np.uint8), centre, radius_px, 255, -1), np.uint8)
 
 
+@settings(deadline=None)
 @given(image=SMALL_IMAGES, reference=SMALL_IMAGES, amplification=st.floats(1, 50))
 def test_difference_is_symmetric_and_clipped(image, reference, amplification):
     difference = amplified_difference(image, reference, amplification)
@@ -74,6 +75,7 @@ def test_cleaning_fills_pinholes_removes_specks_and_drops_what_is_small():
     assert np.count_nonzero(clean(whole, PARAMETERS)) == pytest.approx(np.count_nonzero(whole), rel=0.001)
 
 
+@settings(deadline=None)
 @given(scale=st.sampled_from([0.25, 0.5, 1.0, 1.5]))
 def test_the_smallest_component_scales_with_the_image(scale):
     shape = round(640 * scale), round(480 * scale)
@@ -114,6 +116,7 @@ def test_equal_images_give_the_whole_image_as_the_printed_pipeline_does():
     assert PaperMethod(reference, PARAMETERS).measure(reference).area_px == reference.shape[0] * reference.shape[1]
 
 
+@settings(deadline=None)
 @given(mask=arrays(np.bool_, (11, 13)))
 def test_area_and_centroid_are_those_of_the_mask(mask):
     contact = contact_from_mask(np.where(mask, 255, 0).astype(np.uint8))

@@ -1,0 +1,180 @@
+"""The robust method on presses of the twin, where the truth is exact."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from station.settings.segmentation import RobustParameters
+from station.twin.contact import FruitOnGel, Pose
+from station.twin.digit.press import PressOptions
+from station.twin.digit.sensor import Condition, DigitSensor
+from station.twin.fruit import draw_fruit
+from station.twin.gel import Gel
+from station.twin.squeeze import Squeeze
+from station.vision.contact import Flag, Image
+from station.vision.robust import RobustMethod
+from station.vision.step import measure_step
+
+CLOSINGS_MM = (0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.8, 2.5, 3.5, 5.0, 7.0)
+FRUITS = ("strawberry", "raspberry", "blueberry", "rubber_ball")
+FRAMES_PER_STEP = 3
+"""As in the recipes; the station measures their mean."""
+FRAMES_PER_S = 30.0
+TWIN_SEEDS = (0, 1400)
+"""Of the first press of each fruit; nothing was chosen on the second."""
+FIRM_MM2 = 20
+LARGE_ERROR = 0.25
+
+Floats = npt.NDArray[np.float64]
+
+
+def conditions() -> dict[str, PressOptions]:
+    """What the twin's presses are seen under."""
+    return {
+        "plain": PressOptions(),
+        "another unit": PressOptions(unit=7),
+        "at the border": PressOptions(pose=Pose(x_px=70.0)),
+        "tilted": PressOptions(pose=Pose(tilt_deg=10.0, turn_deg=40.0)),
+        "drift doubled": PressOptions(drift=2.0, unit=11),
+        "dead LED": PressOptions(condition=Condition(dead_led="red")),
+        "dirt on the gel": PressOptions(condition=Condition(dirt=3)),
+    }
+
+
+class Step(NamedTuple):
+    """One width step of a simulated press."""
+
+    frames: list[Image]
+    true_px: int
+    true_mm2: float
+
+
+class Press(NamedTuple):
+    """A simulated press as the station sees it."""
+
+    references: list[Image]
+    steps: list[Step]
+
+
+def squeezed(kind: str, seed: int, closings_mm: Sequence[float], options: PressOptions) -> Press:
+    """A press as `render_press` draws it, with as many frames a step as a recipe takes."""
+    fruit, gel = draw_fruit(kind, seed), Gel()
+    sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
+    on_gel = FruitOnGel(fruit, options.pose, gel)
+    press = Press([sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)], [])
+    for number, closing_mm in enumerate(closings_mm):
+        seen = on_gel.pressed(Squeeze(fruit, gel, held_s=number * options.step_s).at(closing_mm))
+        began_s = options.references / FRAMES_PER_S + (number + 1) * options.step_s
+        times_s = [began_s + k / FRAMES_PER_S for k in range(FRAMES_PER_STEP)]
+        frames = [sensor.frame(seen.dent, now_s, options.condition) for now_s in times_s]
+        press.steps.append(Step(frames, seen.true_area_px, seen.true_area_mm2))
+    return press
+
+
+def twin_presses(seed: int) -> Iterator[tuple[str, str, Press]]:
+    """Four bodies in seven conditions, from the first touch to a firm grip."""
+    for kind in FRUITS:
+        for number, (name, options) in enumerate(conditions().items()):
+            yield kind, name, squeezed(kind, seed + number, CLOSINGS_MM, options)
+
+
+class Measured(NamedTuple):
+    """One step of the twin: its keys in the table, and what was found against the truth."""
+
+    keys: tuple[str, str]
+    press: int
+    true_mm2: float
+    error: float
+    single_error: float
+    """Of the step's first frame alone."""
+    area_px: int
+    judged: bool
+    """Whether the station would judge it: sure enough, and decided."""
+    undecided: bool
+
+
+def measured_presses(seeds: Sequence[int]) -> list[Measured]:
+    """Every step of the twin's presses with those seeds."""
+    found: list[Measured] = []
+    parameters = RobustParameters()
+    for seed in seeds:
+        for number, (kind, name, press) in enumerate(twin_presses(seed)):
+            method = RobustMethod(press.references, parameters)
+            for step in press.steps:
+                contact = measure_step(method, step.frames, parameters.least_confidence)
+                area_px, single_px = contact.area_px, method.measure(step.frames[0]).area_px
+                error, single_error = (abs(px / max(1, step.true_px) - 1) for px in (area_px, single_px))
+                undecided = Flag.UNDECIDED in contact.flags
+                judged = not undecided and Flag.LOW_CONFIDENCE not in contact.flags
+                found.append(
+                    Measured(
+                        (kind, name),
+                        1000 * seed + number,
+                        step.true_mm2,
+                        error,
+                        single_error,
+                        area_px,
+                        judged,
+                        undecided,
+                    )
+                )
+    return found
+
+
+def twin_table() -> list[str]:
+    """The robust method on the twin, where the truth is exact."""
+    found = measured_presses(TWIN_SEEDS)
+    large = [one for one in found if one.true_mm2 > 2]
+    header = (
+        "| contacts over 2 mm² | steps | error of the area: median | p95 | judged | their median | their p95 "
+        "| Spearman with closing: median | 0.99 or more | of the judged |"
+    )
+    lines = [header, "|---|---|---|---|---|---|---|---|---|---|"]
+    for key in ("all", *FRUITS, *conditions()):
+        rows = [one for one in large if key == "all" or key in one.keys]
+        judged = [one for one in rows if one.judged]
+        errors = [one.error for one in judged]
+        ranks, sure = (ranks_of(some, {one.press for one in rows}) for some in (rows, judged))
+        lines.append(
+            f"| {key} | {len(rows)} | {median_and_p95([one.error for one in rows])} "
+            f"| {len(judged) / len(rows):.0%} | {median_and_p95(errors)} "
+            f"| {np.median(ranks):.3f} | {np.mean(ranks >= 0.99):.0%} | {np.mean(sure >= 0.99):.0%} |"
+        )
+    light, firm = ([one.error for one in large if (one.true_mm2 > FIRM_MM2) == heavy] for heavy in (False, True))
+    single = [one.single_error for one in large]
+    before = [one for one in found if one.true_mm2 == 0]
+    missed = [one for one in large if one.area_px == 0]
+    wrong, right = ([one for one in large if (one.error > LARGE_ERROR) == much] for much in (True, False))
+    flagged = [np.mean([not one.judged for one in some]) for some in (wrong, right)]
+    return [
+        *lines,
+        "",
+        f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
+        f"over it: {median_and_p95(firm, ' and ')}.",
+        f"With one frame a step instead of {FRAMES_PER_STEP}: {median_and_p95(single, ' and ')}.",
+        f"Of the {len(wrong)} areas that are wrong by more than {LARGE_ERROR:.0%}, {flagged[0]:.0%} are flagged;",
+        f"of the {len(right)} others, {flagged[1]:.0%}.",
+        f"False contacts before the first touch: {sum(one.area_px > 0 for one in before)} of {len(before)}.",
+        f"Contacts over 2 mm² without an area: {len(missed)}, of which {sum(one.undecided for one in missed)} are",
+        "flagged `undecided`.",
+    ]
+
+
+def median_and_p95(errors: list[float], between: str = " | ") -> str:
+    """Both, for a table's row or a sentence."""
+    return f"{np.median(errors):.3f}{between}{np.quantile(errors, 0.95):.3f}"
+
+
+def ranks_of(rows: list[Measured], presses: set[int]) -> Floats:
+    """The rank correlation of each press's areas with the closing."""
+    return np.array([spearman([one.area_px for one in rows if one.press == press]) for press in sorted(presses)])
+
+
+def spearman(values: list[int]) -> float:
+    """Rank correlation of a sequence with its order; 1 where it never falls."""
+    if len(values) < 2:
+        return 1.0
+    ranks = np.argsort(np.argsort(values, kind="stable"), kind="stable")
+    return float(np.corrcoef(ranks, np.arange(len(values)))[0, 1])
