@@ -30,6 +30,7 @@ COMMANDS = {
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
+    "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 

@@ -1,0 +1,111 @@
+"""Where a study's samples are measured: on this machine's cores, or on a Dask cluster's.
+
+A sample's numbers depend on its task alone, so neither the place nor the number of workers changes them.
+"""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+
+from station.errors import BadInputError, StationError
+from station.studies.sample import SampleResult, Task, measure_sample
+
+Measured = Iterator[SampleResult]
+"""In the order in which they are ready."""
+
+_PR_SET_PDEATHSIG = 1
+_CLUSTER_TIMEOUT_S = 10
+
+
+def on_this_machine(tasks: Sequence[Task], jobs: int) -> Measured:
+    """Measure in processes of this machine; they end when the iteration does, however it ends.
+
+    Args:
+        tasks: which samples.
+        jobs: number of processes, at least 1.
+
+    Raises:
+        StationError: a process was killed from outside, as by a machine short of memory.
+    """
+    if jobs == 1 or len(tasks) < 2:
+        yield from map(measure_sample, tasks)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(
+        min(jobs, len(tasks)), mp_context=context, initializer=_tied_to, initargs=(os.getpid(),)
+    ) as pool:
+        try:
+            for future in as_completed([pool.submit(measure_sample, task) for task in tasks]):
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise StationError(
+                "a process that measured was killed; what was measured by then is kept: give the same command again, "
+                "with fewer --jobs if memory was short"
+            ) from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+
+
+def _tied_to(parent: int) -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+def on_cluster(tasks: Sequence[Task], address: str) -> Measured:
+    """Measure on a Dask cluster whose workers have this same program installed.
+
+    Args:
+        tasks: which samples.
+        address: of the scheduler, such as `tcp://10.0.0.5:8786`.
+
+    Raises:
+        BadInputError: Dask is not installed here, or nobody answers at the address.
+        StationError: the cluster failed while it measured.
+    """
+    try:
+        import distributed  # noqa: PLC0415 (an optional extra, and slow to import)
+    except ImportError as error:
+        raise BadInputError(
+            "--scheduler needs Dask, which is not installed: pip install 'fruit-station[cluster]'"
+        ) from error
+    try:
+        client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError, TimeoutError) as error:
+        raise BadInputError(
+            f"--scheduler {address}: no Dask scheduler answers there within {_CLUSTER_TIMEOUT_S} s; expected an "
+            "address such as tcp://10.0.0.5:8786: is `dask scheduler` running, and no firewall between?"
+        ) from error
+    with client:
+        if not client.scheduler_info(n_workers=-1)["workers"]:
+            raise BadInputError(f"--scheduler {address}: it has no worker; start some with: dask worker {address}")
+        yield from _gathered(client, distributed.as_completed, tasks)
+
+
+def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Measured:  # noqa: ANN001 (of an optional library)
+    futures = client.map(measure_sample, tasks, pure=False, retries=2)
+    try:
+        for future in as_they_come(futures):
+            yield future.result()
+    except (ImportError, AttributeError) as error:
+        raise StationError(
+            f"a worker of the cluster does not have this program ({error}); install the same version of fruit-station "
+            "there; what was measured by then is kept"
+        ) from error
+    except Exception as error:
+        raise StationError(
+            f"the cluster failed: {error}; what was measured by then is kept: give the same command again"
+        ) from error
+    finally:
+        client.cancel(futures, force=True)
