@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import pairwise
@@ -13,8 +13,8 @@ import numpy as np
 from station.studies.cohort import RESULT_CLOSINGS_MM
 from station.studies.failure import Cause, failures, image_at, interval
 from station.studies.folder import StudyFolder, identity_of
-from station.studies.sample import SampleResult, Task
-from station.studies.workers import Measured, on_cluster, on_this_machine
+from station.studies.sample import SampleResult, Task, measure_sample
+from station.studies.workers import on_cluster, on_this_machine
 from station.twin.fruit import Kind
 from station.twin.gel import MM_PER_PX
 
@@ -90,10 +90,10 @@ def run_study(request: Request, on_begin: Callable[[int], None], on_done: Callab
     return study
 
 
-def _measured(tasks: Sequence[Task], request: Request) -> Measured:
+def _measured(tasks: Sequence[Task], request: Request) -> Iterator[SampleResult]:
     if request.scheduler is not None:
         return on_cluster(tasks, request.scheduler)
-    return on_this_machine(tasks, request.jobs)
+    return on_this_machine(measure_sample, tasks, request.jobs)
 
 
 def judged(request: Request, samples: Sequence[SampleResult]) -> Study:

@@ -11,41 +11,45 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
 
 from station.errors import BadInputError, StationError
 from station.studies.sample import SampleResult, Task, measure_sample
 
-Measured = Iterator[SampleResult]
-"""In the order in which they are ready."""
+One = TypeVar("One")
+Answer = TypeVar("Answer")
 
 _PR_SET_PDEATHSIG = 1
 _CLUSTER_TIMEOUT_S = 10
 
 
-def on_this_machine(tasks: Sequence[Task], jobs: int) -> Measured:
-    """Measure in processes of this machine; they end when the iteration does, however it ends.
+def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: int) -> Iterator[Answer]:
+    """Work in processes of this machine; they end when the iteration does, however it ends.
 
     Args:
-        tasks: which samples.
+        work: what is done with a task; a function of a module.
+        tasks: what it is done with.
         jobs: number of processes, at least 1.
+
+    Yields:
+        The answers as they come.
 
     Raises:
         StationError: a process was killed from outside, as by a machine short of memory.
     """
     if jobs == 1 or len(tasks) < 2:
-        yield from map(measure_sample, tasks)
+        yield from map(work, tasks)
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(
         min(jobs, len(tasks)), mp_context=context, initializer=_tied_to, initargs=(os.getpid(),)
     ) as pool:
         try:
-            for future in as_completed([pool.submit(measure_sample, task) for task in tasks]):
+            for future in as_completed([pool.submit(work, task) for task in tasks]):
                 yield future.result()
         except BrokenProcessPool as error:
             raise StationError(
-                "a process that measured was killed; what was measured by then is kept: give the same command again, "
-                "with fewer --jobs if memory was short"
+                "a process that measured was killed; give the same command again, with fewer --jobs if memory was short"
             ) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -63,7 +67,7 @@ def _tied_to(parent: int) -> None:
             os._exit(1)
 
 
-def on_cluster(tasks: Sequence[Task], address: str) -> Measured:
+def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
     """Measure on a Dask cluster whose workers have this same program installed.
 
     Args:
@@ -93,7 +97,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Measured:
         yield from _gathered(client, distributed.as_completed, tasks)
 
 
-def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Measured:  # noqa: ANN001 (of an optional library)
+def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Iterator[SampleResult]:  # noqa: ANN001 (of an optional library)
     futures = client.map(measure_sample, tasks, pure=False, retries=2)
     try:
         for future in as_they_come(futures):
