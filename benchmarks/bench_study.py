@@ -22,6 +22,8 @@ from station.studies import figures
 from station.studies.cohort import PAPER_FAILURES, member
 from station.studies.failure import interval
 from station.studies.folder import Identity, identity_of
+from station.studies.gauge_figures import components_plot, measurements_plot
+from station.studies.grr import GaugeStudy, TwinDesign, analysed, measure_on_twin, twin_tolerance
 from station.studies.sample import Task
 from station.studies.study import Request, Study, judged, run_study, summary
 from station.twin.fruit import Kind
@@ -68,7 +70,7 @@ def first(study: Study, number: int) -> Study:
 def percent(count: int, of: int) -> str:
     """A share with its interval."""
     low, high = interval(count, of)
-    return f"{count / of:.1%} ({low:.1%} to {high:.1%})"
+    return f"{count} of {of}: {count / of:.1%} ({low:.1%} to {high:.1%})"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -87,12 +89,12 @@ def failure_table(studies: dict[tuple[Kind, str], Study]) -> str:
                 kind,
                 percent(PAPER_FAILURES[kind], PAPER_SIZE),
                 percent(paper.failed, len(paper.samples)),
-                percent(first(robust, PAPER_SIZE).failed, PAPER_SIZE),
+                percent(first(robust, len(paper.samples)).failed, len(paper.samples)),
                 percent(robust.failed, len(robust.samples)),
             ]
         )
     return table(
-        ["", "the paper, 30", "`paper` on the twin, 30", "`robust`, the same 30", "`robust`, whole cohort"],
+        ["", "the paper", "`paper` on the twin", "`robust`, the same samples", "`robust`, whole cohort"],
         rows,
     )
 
@@ -209,6 +211,50 @@ def denoising_table(images: Path) -> str:
     return table(["", "PSNR, dB", "MSE", "SSIM", "PSNR of single images"], rows)
 
 
+def gauge_study() -> GaugeStudy:
+    """The gauge study of strawberries on the twin."""
+    design = TwinDesign("strawberry", 10, 3, 3, SEED, os.cpu_count() or 1)
+    measured = measure_on_twin(design, lambda: print(".", end="", file=sys.stderr, flush=True))
+    tolerance, words = twin_tolerance(design)
+    return analysed("strawberry on the twin", [("Tolerance", words)], measured, tolerance)
+
+
+def gauge_table(study: GaugeStudy) -> str:
+    """The components of variation."""
+    gauge = study.gauge
+    rows = [
+        [one.name, f"{one.sigma:.2f}", f"{one.study_percent:.1f}", f"{one.tolerance_percent or 0:.1f}"]
+        for one in gauge.components
+    ]
+    shown = table(["", "standard deviation, mm²", "% of the total variation", "6 of them, % of the tolerance"], rows)
+    return (
+        f"{len(study.table.parts)} strawberries, {len(study.table.operators)} operators, "
+        f"{study.table.areas_mm2.shape[2]} repeats. Tolerance: {study.facts[0][1]}.\n\n{shown}\n\n"
+        f"{gauge.distinct_categories} distinct categories; the interaction is "
+        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}."
+    )
+
+
+def agreement_table(study: GaugeStudy) -> str:
+    """The agreement of the outcome."""
+    found = study.agreement
+    assert found is not None
+    rows = [
+        [
+            one.operator,
+            f"{one.repeated} of {one.parts}",
+            f"{one.right} of {one.parts}",
+            "not defined" if one.kappa is None else f"{one.kappa:.2f}",
+            " of ".join(map(str, one.misses or ())),
+            " of ".join(map(str, one.false_alarms or ())),
+        ]
+        for one in found.operators
+    ]
+    kappas = ", ".join(f"{a} and {b} {'not defined' if k is None else f'{k:.2f}'}" for a, b, k in found.between)
+    header = ["operator", "same decision every time", "right every time", "kappa", "damaged passed", "good diverted"]
+    return table(header, rows) + f"\n\nKappa between operators: {kappas}."
+
+
 def read(path: Path) -> Image:
     """A colour image."""
     image = cv2.imread(str(path))
@@ -267,6 +313,10 @@ def main() -> None:
         "denoising": lambda: denoising_table(arguments.images),
     }
     write_tables(DOCS / "paper.md", {name: make() for name, make in makers.items()})
+    gauge = gauge_study()
+    (DOCS / "paper" / "grr-components.png").write_bytes(components_plot(gauge.gauge))
+    (DOCS / "paper" / "grr-measurements.png").write_bytes(measurements_plot(gauge.table))
+    write_tables(DOCS / "grr.md", {"grr": gauge_table(gauge), "agreement": agreement_table(gauge)})
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.special import betaincinv
 
 LARGEST_FALL = 0.10
 LARGEST_ERROR = 0.50
@@ -78,5 +78,6 @@ def interval(count: int, of: int) -> tuple[float, float]:
         count: how many have it.
         of: how many were looked at, at least 1.
     """
-    found = binomtest(count, of).proportion_ci(confidence_level=0.95, method="exact")
-    return float(found.low), float(found.high)
+    low = float(betaincinv(count, of - count + 1, 0.025)) if count else 0.0
+    high = float(betaincinv(count + 1, of - count, 0.975)) if count < of else 1.0
+    return low, high

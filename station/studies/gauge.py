@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 POOLED_FROM = 0.25
 """An interaction whose significance is weaker is pooled with the equipment's."""
@@ -152,10 +152,5 @@ def _tested(source: Source, against: Source) -> Source:
     if against.mean_square <= 0:
         return source
     f = source.mean_square / against.mean_square
-    return Source(
-        source.name,
-        source.sum_of_squares,
-        source.degrees,
-        f,
-        float(f_distribution.sf(f, source.degrees, against.degrees)),
-    )
+    p = float(fdtrc(source.degrees, against.degrees, f))
+    return Source(source.name, source.sum_of_squares, source.degrees, f, p)

@@ -175,7 +175,7 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path):
 def test_a_bad_file_is_refused_by_its_line(tmp_path: Path, text: str, told: str):
     path = tmp_path / "m.csv"
     path.write_text(text)
-    with pytest.raises(BadInputError, match="m.csv") as refusal:
+    with pytest.raises(BadInputError, match=r"m\.csv") as refusal:
         crossed(read_measurements(path), str(path))
     assert told in str(refusal.value)
 
