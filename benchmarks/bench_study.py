@@ -23,7 +23,7 @@ from station.studies.cohort import PAPER_FAILURES, member
 from station.studies.failure import interval
 from station.studies.folder import Identity, identity_of
 from station.studies.gauge_figures import components_plot, measurements_plot
-from station.studies.grr import GaugeStudy, TwinDesign, analysed, measure_on_twin, twin_tolerance
+from station.studies.grr import GaugeStudy, TwinDesign, analysed, measure_on_twin, truth_words, twin_tolerance
 from station.studies.sample import Task
 from station.studies.study import Request, Study, judged, run_study, summary
 from station.twin.fruit import Kind
@@ -216,7 +216,8 @@ def gauge_study() -> GaugeStudy:
     design = TwinDesign("strawberry", 10, 3, 3, SEED, os.cpu_count() or 1)
     measured = measure_on_twin(design, lambda: print(".", end="", file=sys.stderr, flush=True))
     tolerance, words = twin_tolerance(design)
-    return analysed("strawberry on the twin", [("Tolerance", words)], measured, tolerance)
+    facts = [("Tolerance", words), ("The truth", truth_words(design, tolerance))]
+    return analysed("strawberry on the twin", facts, measured, tolerance)
 
 
 def gauge_table(study: GaugeStudy) -> str:
@@ -231,7 +232,7 @@ def gauge_table(study: GaugeStudy) -> str:
         f"{len(study.table.parts)} strawberries, {len(study.table.operators)} operators, "
         f"{study.table.areas_mm2.shape[2]} repeats. Tolerance: {study.facts[0][1]}.\n\n{shown}\n\n"
         f"{gauge.distinct_categories} distinct categories; the interaction is "
-        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}."
+        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}. The truth: {study.facts[1][1]}."
     )
 
 

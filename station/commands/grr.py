@@ -1,10 +1,8 @@
 """`station grr`: how far a measurement repeats, and whether others would get the same."""
 
 import os
-import signal
 import sys
 from pathlib import Path
-from typing import NoReturn
 
 import click
 
@@ -12,7 +10,17 @@ from station.settings.recipe import find_recipe
 from station.studies.gauge_report import render, verdict
 from station.studies.gauge_table import read_measurements
 from station.studies.gauge_twin import deciding_closing_mm
-from station.studies.grr import GaugeStudy, TwinDesign, analysed, check_folder, measure_on_twin, store, twin_tolerance
+from station.studies.grr import (
+    GaugeStudy,
+    TwinDesign,
+    analysed,
+    check_folder,
+    measure_on_twin,
+    store,
+    truth_words,
+    twin_tolerance,
+)
+from station.studies.workers import stop_on_sigterm
 
 _FRUITS = ("strawberry", "blueberry", "raspberry")
 
@@ -58,7 +66,7 @@ def grr(
     """
     if twin == (measurements is not None):
         raise click.UsageError("expected either a CSV file of measurements or --twin")
-    signal.signal(signal.SIGTERM, _interrupt)
+    stop_on_sigterm()
     check_folder(out)
     if measurements is not None:
         facts = [("Measurements", str(measurements))]
@@ -83,13 +91,13 @@ def _on_twin(design: TwinDesign, tolerance: float | None) -> GaugeStudy:
     closing_mm = deciding_closing_mm(find_recipe(design.fruit))
     facts = [
         ("Parts", f"{design.parts} fruit of the twin: {design.fruit}, every second one bruised, seed {design.seed}"),
-        ("Operators", f"{design.operators}: another sensor unit, gripper zero and habit of laying the fruit in each"),
-        ("Repeats", f"{design.repeats}: the fruit laid in anew, with the sensor's noise as measured on real ones"),
+        (
+            "Operators",
+            f"{design.operators}: another sensor unit, gripper zero and habit each; every fruit laid in anew",
+        ),
+        ("Repeats", f"{design.repeats}: gripped where it lies, with the sensor's noise as measured on real ones"),
         ("Measured", f"the area that the station judges, at {closing_mm:g} mm of closing, by the shipped recipe"),
         ("Tolerance", words),
+        ("The truth", truth_words(design, tolerance)),
     ]
     return analysed(f"{design.fruit} on the twin", facts, made, tolerance)
-
-
-def _interrupt(_number: int, _frame: object) -> NoReturn:
-    raise KeyboardInterrupt

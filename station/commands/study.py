@@ -1,16 +1,15 @@
 """`station study`: the paper's experiments, repeated on the twin."""
 
 import os
-import signal
 import sys
 from pathlib import Path
-from typing import NoReturn
 
 import click
 
 from station.studies.cohort import FRUITS
 from station.studies.report import write_report
 from station.studies.study import LARGEST_COHORT, Request, run_study
+from station.studies.workers import stop_on_sigterm
 
 
 @click.command("study")
@@ -36,11 +35,18 @@ def study(fruit: str, samples: int, seed: int, method: str, out: Path, jobs: int
     command is given again; with more --samples the cohort grows. The same seed gives the same numbers on any machine
     of the same kind, with any number of workers. No device is touched.
     """
-    signal.signal(signal.SIGTERM, _interrupt)
+    stop_on_sigterm()
     request = Request(fruit, samples, seed, method, out, jobs, scheduler)
     with click.progressbar(length=samples, label="pressing", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+
+        def begin(stored: int) -> None:
+            bar.update(stored)
+            click.echo(
+                f"station: {stored} of {samples} samples are stored, {samples - stored} to be measured", err=True
+            )
+
         try:
-            done = run_study(request, bar.update, lambda: bar.update(1))
+            done = run_study(request, begin, lambda: bar.update(1))
         except KeyboardInterrupt:
             click.echo(f"\nstation: {out} keeps what was measured; the same command goes on from there", err=True)
             raise
@@ -49,7 +55,3 @@ def study(fruit: str, samples: int, seed: int, method: str, out: Path, jobs: int
         f"{fruit}, {method}: {done.failed} of {samples} samples failed ({done.failed / samples:.1%}); "
         f"report: {out / 'report.html'}"
     )
-
-
-def _interrupt(_number: int, _frame: object) -> NoReturn:
-    raise KeyboardInterrupt

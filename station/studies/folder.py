@@ -72,7 +72,8 @@ class StudyFolder:
             elif folder.exists() and any(folder.iterdir()):
                 raise BadInputError(f"{folder}: is not empty and holds no study; name a new folder with --out")
             self._samples.mkdir(parents=True, exist_ok=True)
-            self._write(label, (identity.model_dump_json(indent=2) + "\n").encode())
+            if not label.exists():
+                self._write(label, (identity.model_dump_json(indent=2) + "\n").encode())
         except OSError as error:
             raise BadInputError(
                 f"{folder}: cannot be written: {error.strerror}; name another folder with --out"

@@ -1,7 +1,7 @@
 """A gauge study on the twin: the same fruit laid in, gripped and judged again and again, as the station does it.
 
 An operator is what differs when somebody else sets the cell up on another day: another sensor unit, another zero of the
-gripper, another habit of laying a fruit in. A repeat is the same fruit laid in anew.
+gripper, another habit of laying fruit in, and each fruit laid in anew. A repeat grips the same fruit where it lies.
 """
 
 from collections.abc import Sequence
@@ -82,6 +82,36 @@ def setup_of(task: GaugeTask) -> Setup:
     return Setup(unit, zero_mm, Pose(240.0 + x_px, 320.0 + y_px, turn_deg))
 
 
+def pose_of(task: GaugeTask) -> Pose:
+    """How the operator laid the part in.
+
+    Args:
+        task: whose part and operator.
+    """
+    habit = setup_of(task).habit
+    generator = np.random.default_rng([task.seed, 102, task.part, task.operator])
+    return Pose(
+        habit.x_px + generator.normal(0.0, _PLACE_PX),
+        habit.y_px + generator.normal(0.0, _PLACE_PX),
+        habit.turn_deg + generator.normal(0.0, _TURN_DEG),
+        generator.normal(0.0, _TILT_DEG),
+    )
+
+
+def true_area_mm2(task: GaugeTask) -> float:
+    """The true area of a part as the operator laid it in, at the deciding closing: what a perfect gauge would say.
+
+    Args:
+        task: which part and operator.
+    """
+    return _true_area_mm2(part_of(task), pose_of(task), deciding_closing_mm(find_recipe(task.fruit)))
+
+
+def _true_area_mm2(fruit: Fruit, pose: Pose, closing_mm: float) -> float:
+    gel = Gel()
+    return FruitOnGel(fruit, pose, gel).pressed(Squeeze(fruit, gel, _HELD_S).at(closing_mm)).true_area_mm2
+
+
 def measure_part(task: GaugeTask) -> Measurement:
     """Grip a part once, by its recipe, and judge it.
 
@@ -94,14 +124,8 @@ def measure_part(task: GaugeTask) -> Measurement:
     cv2.setNumThreads(1)
     recipe = find_recipe(task.fruit)
     fruit, setup = part_of(task), setup_of(task)
-    generator = np.random.default_rng([task.seed, 102, task.part, task.operator, task.repeat])
-    pose = Pose(
-        setup.habit.x_px + generator.normal(0.0, _PLACE_PX),
-        setup.habit.y_px + generator.normal(0.0, _PLACE_PX),
-        setup.habit.turn_deg + generator.normal(0.0, _TURN_DEG),
-        generator.normal(0.0, _TILT_DEG),
-    )
-    grip = _Grip(recipe, fruit, pose, setup, int(generator.integers(2**31)))
+    generator = np.random.default_rng([task.seed, 103, task.part, task.operator, task.repeat])
+    grip = _Grip(recipe, fruit, pose_of(task), setup, int(generator.integers(2**31)))
     verdict = judge(grip.press(float(generator.uniform(0.0, 1.0))), recipe)
     deciding_mm = deciding_closing_mm(recipe)
     area_mm2 = next(area.area_mm2 for area in verdict.areas if area.closing_mm == deciding_mm)
@@ -137,11 +161,8 @@ def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
 
     def mean(*, bruised: bool) -> float:
         members = [member(fruit, seed, number) for number in range(_TOLERANCE_FRUIT)]
-        fruits = [(replace(one.fruit, bruised=bruised), one.pose) for one in members]
-        gel = Gel()
-        squeezed = [Squeeze(one, gel, _HELD_S).at(closing_mm) for one, _ in fruits]
-        footprints = [FruitOnGel(one, at, gel).pressed(s) for (one, at), s in zip(fruits, squeezed, strict=True)]
-        return float(np.mean([footprint.true_area_mm2 for footprint in footprints]))
+        areas = [_true_area_mm2(replace(one.fruit, bruised=bruised), one.pose, closing_mm) for one in members]
+        return float(np.mean(areas))
 
     return mean(bruised=False), mean(bruised=True)
 

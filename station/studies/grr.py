@@ -10,11 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from station.errors import BadInputError, StationError
 from station.studies.agreement import Agreement, agreement
 from station.studies.gauge import Gauge, analyse
 from station.studies.gauge_table import Crossed, Measurement, crossed, written
-from station.studies.gauge_twin import GaugeTask, good_and_damaged_mm2, measure_part
+from station.studies.gauge_twin import GaugeTask, good_and_damaged_mm2, measure_part, true_area_mm2
 from station.studies.workers import on_this_machine
 
 
@@ -79,6 +81,22 @@ def twin_tolerance(design: TwinDesign) -> tuple[float, str]:
     good, damaged = good_and_damaged_mm2(design.fruit, design.seed)
     words = f"{damaged - good:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the deciding closing, the same ones "
     return damaged - good, f"{words}sound {good:.1f} mm² (true areas, mean of 30)"
+
+
+def truth_words(design: TwinDesign, tolerance: float) -> str:
+    """What a perfect gauge would find on the same fruit, laid in as they were.
+
+    Args:
+        design: which study.
+        tolerance: in mm².
+    """
+    areas = np.array([true_area_mm2(task) for task in design.tasks if not task.repeat])
+    table = areas.reshape(design.parts, design.operators, 1).repeat(2, axis=2)
+    sigma = analyse(table, tolerance).component("GRR")
+    return (
+        f"laying a fruit in anew changes its true area by {sigma.sigma:.2f} mm² (standard deviation): a perfect gauge "
+        f"has a GRR of {sigma.tolerance_percent:.0f} % of the tolerance"
+    )
 
 
 def analysed(

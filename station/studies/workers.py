@@ -11,9 +11,10 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from station.errors import BadInputError, StationError
+from station.studies.folder import identity_of
 from station.studies.sample import SampleResult, Task, measure_sample
 
 One = TypeVar("One")
@@ -58,6 +59,15 @@ def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: i
             raise
 
 
+def stop_on_sigterm() -> None:
+    """Let SIGTERM end this process as Ctrl-C does, so that its workers end with it."""
+
+    def interrupt(_number: int, _frame: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+
+
 def _tied_to(parent: int) -> None:
     """Leave Ctrl-C to the parent, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -92,9 +102,27 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
             "address such as tcp://10.0.0.5:8786: is `dask scheduler` running, and no firewall between?"
         ) from error
     with client:
-        if not client.scheduler_info(n_workers=-1)["workers"]:
-            raise BadInputError(f"--scheduler {address}: it has no worker; start some with: dask worker {address}")
+        _check_workers(client, address, tasks[0])
         yield from _gathered(client, distributed.as_completed, tasks)
+
+
+def _check_workers(client, address: str, task: Task) -> None:  # noqa: ANN001 (of an optional library)
+    """Refuse a cluster without workers, or whose workers would measure otherwise than this program."""
+    try:
+        identities = client.run(identity_of, task)
+    except Exception as error:
+        raise BadInputError(
+            f"--scheduler {address}: a worker does not have this program ({error}); install the same version of "
+            "fruit-station there"
+        ) from error
+    if not identities:
+        raise BadInputError(f"--scheduler {address}: it has no worker; start some with: dask worker {address}")
+    others = [worker for worker, identity in identities.items() if identity != identity_of(task)]
+    if others:
+        raise BadInputError(
+            f"--scheduler {address}: {others[0]} has another version of the program or the recipe; install the same "
+            "version of fruit-station there"
+        )
 
 
 def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Iterator[SampleResult]:  # noqa: ANN001 (of an optional library)
@@ -102,11 +130,6 @@ def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Iterator
     try:
         for future in as_they_come(futures):
             yield future.result()
-    except (ImportError, AttributeError) as error:
-        raise StationError(
-            f"a worker of the cluster does not have this program ({error}); install the same version of fruit-station "
-            "there; what was measured by then is kept"
-        ) from error
     except Exception as error:
         raise StationError(
             f"the cluster failed: {error}; what was measured by then is kept: give the same command again"

@@ -17,6 +17,7 @@ from station.studies.gauge_twin import (
     good_and_damaged_mm2,
     measure_part,
     part_of,
+    pose_of,
     setup_of,
 )
 
@@ -111,3 +112,4 @@ def test_operators_differ_and_every_second_fruit_is_bruised():
     assert setup_of(task) == setup_of(task._replace(part=4, repeat=2))
     assert [part_of(task._replace(part=part)).bruised for part in range(4)] == [False, True, False, True]
     assert part_of(task) == part_of(task._replace(operator=2, repeat=1))
+    assert pose_of(task) == pose_of(task._replace(repeat=1)) != pose_of(task._replace(operator=1))
