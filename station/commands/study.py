@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from station.studies.cohort import FRUITS
-from station.studies.report import write_report
 from station.studies.study import LARGEST_COHORT, Request, run_study
 from station.studies.workers import stop_on_sigterm
 
@@ -50,6 +49,8 @@ def study(fruit: str, samples: int, seed: int, method: str, out: Path, jobs: int
         except KeyboardInterrupt:
             click.echo(f"\nstation: {out} keeps what was measured; the same command goes on from there", err=True)
             raise
+    from station.studies.report import write_report  # noqa: PLC0415 (its plotting takes seconds to load)
+
     write_report(done)
     click.echo(
         f"{fruit}, {method}: {done.failed} of {samples} samples failed ({done.failed / samples:.1%}); "

@@ -18,9 +18,11 @@ from station.studies.folder import StudyFolder, identity_of
 from station.studies.sample import Task, measure_sample
 from station.studies.study import Request, run_study
 
-DEADLINE_S = 110
+DEADLINE_S = 280
 ARGUMENTS = ("--fruit", "blueberry", "--seed", "5", "--method", "robust")
 TASK = Task("blueberry", "robust", 5, 0)
+
+pytestmark = pytest.mark.timeout(600)
 
 
 def asked(*arguments: object) -> Result:
