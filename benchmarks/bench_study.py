@@ -264,10 +264,11 @@ def read(path: Path) -> Image:
     return np.asarray(image, np.uint8)
 
 
-def draw(studies: dict[tuple[Kind, str], Study]) -> None:
-    """The pictures of the document."""
+def draw(studies: dict[tuple[Kind, str], Study]) -> dict[str, str]:
+    """Write the pictures of the document; gives what shows them, by the names of its marks."""
     folder = DOCS / "paper"
     folder.mkdir(exist_ok=True)
+    stages: list[list[str]] = []
     for kind in (*FRUITS, Kind.RUBBER_BALL):
         pair = [first(studies[kind, method], PAPER_SIZE) for method in ("paper", "robust")]
         widths = [sample.width_mm for sample in pair[0].samples]
@@ -277,6 +278,32 @@ def draw(studies: dict[tuple[Kind, str], Study]) -> None:
         (folder / f"{kind}-sample.png").write_bytes(figures.one_curve(pair, number))
         for study in pair:
             (folder / f"{kind}-{study.request.method}.jpg").write_bytes(figures.press_sheet(study, number))
+        words = [f"Stages of a press, {kind}, {study.request.method}" for study in pair]
+        stages.append(
+            [kind, *(picture(word, f"{kind}-{m}.jpg") for word, m in zip(words, ("paper", "robust"), strict=True))]
+        )
+    curves = [
+        [words, *(picture(f"{kind}: {words}", f"{kind}-{name}.png") for kind in FRUITS)]
+        for name, words in (
+            ("curves", "area over closing, every sample"),
+            ("areas", "measured over true area"),
+            ("sample", "the fruit of median width"),
+        )
+    ]
+    ball = [
+        picture(words, f"rubber_ball-{name}.png")
+        for name, words in (("curves", "every press"), ("sample", "one press"))
+    ]
+    return {
+        "curves": table(["", *FRUITS], curves),
+        "stages": table(["", "`paper`", "`robust`"], stages),
+        "ball-curves": "\n\n".join(ball),
+    }
+
+
+def picture(words: str, name: str) -> str:
+    """A picture of the document."""
+    return f"![{words}](paper/{name})"
 
 
 def write_tables(path: Path, tables: dict[str, str]) -> None:
@@ -304,7 +331,6 @@ def main() -> None:
         studies[Kind.RUBBER_BALL, method] = cohort(Kind.RUBBER_BALL, method, BALL_REPEATS)
     if arguments.only:
         return
-    draw(studies)
     makers: dict[str, Callable[[], str]] = {
         "failures": lambda: failure_table(studies),
         "causes": lambda: cause_table(studies),
@@ -313,11 +339,16 @@ def main() -> None:
         "ball": lambda: ball_table(studies),
         "denoising": lambda: denoising_table(arguments.images),
     }
-    write_tables(DOCS / "paper.md", {name: make() for name, make in makers.items()})
+    write_tables(DOCS / "paper.md", {**{name: make() for name, make in makers.items()}, **draw(studies)})
     gauge = gauge_study()
     (DOCS / "paper" / "grr-components.png").write_bytes(components_plot(gauge.gauge))
     (DOCS / "paper" / "grr-measurements.png").write_bytes(measurements_plot(gauge.table))
-    write_tables(DOCS / "grr.md", {"grr": gauge_table(gauge), "agreement": agreement_table(gauge)})
+    plots = [
+        picture("Components of the variation", "grr-components.png"),
+        picture("Every measurement, the operators' means, and the ranges of the repeats", "grr-measurements.png"),
+    ]
+    tables = {"grr": gauge_table(gauge), "plots": "\n\n".join(plots), "agreement": agreement_table(gauge)}
+    write_tables(DOCS / "grr.md", tables)
 
 
 if __name__ == "__main__":
