@@ -95,7 +95,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
             "--scheduler needs Dask, which is not installed: pip install 'fruit-station[cluster]'"
         ) from error
     try:
-        client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S, set_as_default=False)
+        client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S)
     except (OSError, ValueError, TypeError, TimeoutError) as error:
         raise BadInputError(
             f"--scheduler {address}: no Dask scheduler answers there within {_CLUSTER_TIMEOUT_S} s; expected an "
