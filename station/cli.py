@@ -24,12 +24,14 @@ COMMANDS = {
     "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
+    "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
+    "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
 }
 

@@ -1,0 +1,95 @@
+"""Who is in a study: the paper's fruit, each with a flesh, a skin and a place of its own, and the images of its press.
+
+Source of all numbers of the paper: Computers and Electronics in Agriculture 235 (2025) 110397.
+"""
+
+import csv
+import importlib.resources
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from station.twin.contact import Pose
+from station.twin.digit.press import PressOptions, PressSequence, render_press
+from station.twin.fruit import Fruit, Kind, draw_fruit
+
+RESULT_CLOSINGS_MM: dict[Kind, tuple[float, ...]] = {
+    Kind.STRAWBERRY: (4.0, 8.0, 12.0),
+    Kind.BLUEBERRY: (8.0, 12.0, 16.0),
+    Kind.RASPBERRY: (8.0, 12.0, 16.0),
+    Kind.RUBBER_BALL: (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0),
+}
+"""Where the paper shows results; the ball's are its widths from 41 to 35 mm, with the first contact at 42."""
+PAPER_FAILURES: dict[Kind, int] = {Kind.STRAWBERRY: 6, Kind.BLUEBERRY: 8, Kind.RASPBERRY: 18}
+"""Of 30 each: 20.0, 26.7 and 60.0 %, called pronounced fluctuations of the area over closing."""
+FRUITS = tuple(str(kind) for kind in RESULT_CLOSINGS_MM)
+
+STEP_MM = 1.0
+_IMAGES, _BALL_IMAGES = 20, 14
+_BALL_FROM_MM = -4.0
+"""The ball's images run from 46 to 33 mm of width, and 42 mm is the first contact."""
+_STEP_S = 1.0
+_PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
+"""Standard deviations of how a fruit is laid in by hand: half a millimetre and a few degrees. Our estimate."""
+_KIND_CODES = {kind: number for number, kind in enumerate(RESULT_CLOSINGS_MM)}
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One sample of a cohort; the same seed and number give the same fruit and the same images."""
+
+    fruit: Fruit
+    pose: Pose
+    closings_mm: tuple[float, ...]
+    """Of the images: 1 mm apart, ending at the last closing with a result, off by up to half a step: the first
+    contact falls anywhere between two images."""
+    noise_seed: int
+
+    def press(self) -> PressSequence:
+        """Draw the images: five of the untouched gel, then one at each closing."""
+        return render_press(self.fruit, self.noise_seed, self.closings_mm, PressOptions(pose=self.pose, step_s=_STEP_S))
+
+
+def member(kind: Kind | str, seed: int, number: int) -> Member:
+    """Draw one sample.
+
+    Weight, length and width are those of the paper's sample `number` modulo 30; stiffness, creep, skin, place,
+    phase of the steps and the sensor's noise are drawn. The ball is always 24 mm and closed to the paper's widths.
+
+    Args:
+        kind: one of `FRUITS`.
+        seed: of the study.
+        number: of the sample, from 0.
+
+    Raises:
+        ValueError: there is no such kind in the studies.
+    """
+    kind = Kind(kind)
+    generator = np.random.default_rng([seed, _KIND_CODES[kind], number])
+    fruit_seed, noise_seed = (int(one) for one in generator.integers(2**31, size=2))
+    fruit = draw_fruit(kind, fruit_seed)
+    x_px, y_px = generator.normal(0.0, _PLACE_PX, 2)
+    turn_deg, tilt_deg = generator.normal(0.0, (_TURN_DEG, _TILT_DEG))
+    pose = Pose(240.0 + x_px, 320.0 + y_px, turn_deg, tilt_deg)
+    phase_mm = float(generator.uniform(-0.5, 0.5)) * STEP_MM
+    if kind == Kind.RUBBER_BALL:
+        closings = _BALL_FROM_MM + STEP_MM * np.arange(_BALL_IMAGES)
+    else:
+        sizes = paper_sizes()[kind]
+        weight_g, length_mm, width_mm = sizes[number % len(sizes)]
+        fruit = replace(fruit, weight_g=weight_g, length_mm=length_mm, width_mm=width_mm)
+        closings = RESULT_CLOSINGS_MM[kind][-1] + phase_mm + STEP_MM * np.arange(1 - _IMAGES, 1)
+    return Member(fruit, pose, tuple(float(closing) for closing in closings), noise_seed)
+
+
+@cache
+def paper_sizes() -> dict[Kind, tuple[tuple[float, float, float], ...]]:
+    """Weight g, length mm and width mm of the paper's fruit, in its order."""
+    text = importlib.resources.files("station.studies").joinpath("paper_samples.csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+    sizes: dict[Kind, list[tuple[float, float, float]]] = {}
+    for row in rows:
+        size = float(row["weight_g"]), float(row["length_mm"]), float(row["width_mm"])
+        sizes.setdefault(Kind(row["fruit"]), []).append(size)
+    return {kind: tuple(rows) for kind, rows in sizes.items()}

@@ -1,0 +1,156 @@
+"""The folder of one study: each sample is stored as soon as it is measured, whole or not at all."""
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+import station
+from station.errors import BadInputError, StationError
+from station.studies.sample import SampleResult, Task, segmentation_of
+
+_DRAWN_BY = (
+    "studies/cohort.py",
+    "studies/sample.py",
+    "studies/paper_samples.csv",
+    *(f"twin/{name}" for name in ("contact.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")),
+)
+_MEASURED_BY = {"paper": ("vision/paper.py", "vision/methods.py"), "robust": ("vision",)}
+"""Below the package: what decides a sample's numbers."""
+
+
+class Identity(BaseModel):
+    """What a study's samples have in common; two that differ in it are never mixed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    fruit: str
+    method: str
+    seed: int
+    measured_by: str
+    """A hash over the parameters and the code that draws and measures a sample."""
+
+
+def identity_of(task: Task) -> Identity:
+    """The study that a sample belongs to.
+
+    Args:
+        task: any of its samples.
+    """
+    root = Path(station.__file__).parent
+    digest = hashlib.sha256(segmentation_of(task.fruit, task.method).model_dump_json().encode())
+    for name in (*_DRAWN_BY, *_MEASURED_BY[task.method]):
+        place = root / name
+        for file in [place] if place.is_file() else sorted(place.glob("*.[pn][yp]*")):
+            digest.update(file.read_bytes())
+    return Identity(fruit=task.fruit, method=task.method, seed=task.seed, measured_by=digest.hexdigest()[:16])
+
+
+class StudyFolder:
+    """The folder `DIR` of `station study`."""
+
+    def __init__(self, folder: Path, identity: Identity) -> None:
+        """Open the folder of a study, or begin one.
+
+        Args:
+            folder: an empty or new one, or this study's own.
+            identity: the study's.
+
+        Raises:
+            BadInputError: it holds something else, is no folder, or cannot be written.
+        """
+        self.folder = folder
+        self._identity = identity
+        self._samples = folder / "samples"
+        label = folder / "study.json"
+        try:
+            if label.exists():
+                self._check(label)
+            elif folder.exists() and any(folder.iterdir()):
+                raise BadInputError(f"{folder}: is not empty and holds no study; name a new folder with --out")
+            self._samples.mkdir(parents=True, exist_ok=True)
+            if not label.exists():
+                self._write(label, (identity.model_dump_json(indent=2) + "\n").encode())
+        except OSError as error:
+            raise BadInputError(
+                f"{folder}: cannot be written: {error.strerror}; name another folder with --out"
+            ) from error
+
+    def _check(self, label: Path) -> None:
+        try:
+            there = Identity.model_validate_json(label.read_bytes())
+        except ValidationError as error:
+            raise BadInputError(f"{label}: is not a study's; name a new folder with --out") from error
+        theirs, ours = there.model_dump(), self._identity.model_dump()
+        differing = [name for name, value in ours.items() if theirs[name] != value]
+        if differing == ["measured_by"]:
+            raise BadInputError(
+                f"{self.folder}: holds the same study measured by another version of the program or the recipe; "
+                "its samples cannot be mixed with new ones: name a new folder with --out"
+            )
+        if differing:
+            words = ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in differing[:-1] or differing)
+            raise BadInputError(f"{self.folder}: holds another study ({words}); name a new folder with --out")
+
+    def stored(self, number: int) -> SampleResult | None:
+        """Read a sample; None where it is not there or cannot be understood, so that it is measured again.
+
+        Args:
+            number: of the sample, from 0.
+        """
+        try:
+            found = SampleResult.model_validate_json(self._place(number).read_bytes())
+        except (OSError, ValidationError):
+            return None
+        return found if found.number == number else None
+
+    def store(self, sample: SampleResult) -> None:
+        """Keep a sample.
+
+        Args:
+            sample: as measured.
+
+        Raises:
+            StationError: the disk is full or the folder has become unwritable; nothing half-written stays.
+        """
+        self.write(f"samples/{self._place(sample.number).name}", sample.model_dump_json().encode())
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a file in one stroke.
+
+        Args:
+            name: path below the folder.
+            data: the whole content.
+
+        Raises:
+            StationError: as for `store`.
+        """
+        path = self.folder / name
+        try:
+            self._write(path, data)
+        except OSError as error:
+            raise StationError(
+                f"{path}: cannot be written: {error.strerror}; what was measured by then is kept: free space or mend "
+                "the folder, then give the same command again"
+            ) from error
+
+    def _place(self, number: int) -> Path:
+        return self._samples / f"{number:05d}.json"
+
+    @staticmethod
+    def _write(path: Path, data: bytes) -> None:
+        descriptor, unfinished = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with open(descriptor, "wb") as file:  # noqa: PTH123 (a descriptor)
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            Path(unfinished).chmod(0o644)
+            Path(unfinished).replace(path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(unfinished).unlink()
+            raise

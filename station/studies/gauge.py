@@ -1,0 +1,156 @@
+"""Gauge repeatability and reproducibility: the crossed analysis of variance of AIAG's MSA.
+
+Source: Automotive Industry Action Group, Measurement Systems Analysis, 4th edition (2010), chapter III, section B,
+"Analysis of Variance (ANOVA) method", and its appendix A.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import fdtrc
+
+POOLED_FROM = 0.25
+"""An interaction whose significance is weaker is pooled with the equipment's."""
+SPREAD = 6.0
+"""Standard deviations that a variation spans against the tolerance; 99.73 % of a normal distribution."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One row of the analysis of variance."""
+
+    name: str
+    sum_of_squares: float
+    degrees: int
+    f: float | None = None
+    p: float | None = None
+
+    @property
+    def mean_square(self) -> float:
+        """Sum of squares over degrees of freedom."""
+        return self.sum_of_squares / self.degrees
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One kind of variation."""
+
+    name: str
+    sigma: float
+    """Standard deviation, in the measurement's unit."""
+    study_percent: float
+    """Of the total variation; the components' squares add up, not they themselves."""
+    contribution_percent: float
+    """Of the total variance."""
+    tolerance_percent: float | None
+    """Six of its standard deviations over the tolerance; None without one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gauge:
+    """What a gauge study says."""
+
+    sources: tuple[Source, ...]
+    pooled: bool
+    """The interaction was pooled with the equipment's variation."""
+    components: tuple[Component, ...]
+    """Named EV, AV, INT (not where pooled), GRR, PV and TV."""
+    distinct_categories: int
+    """ndc; at least 5 are asked for."""
+    tolerance: float | None
+
+    def component(self, name: str) -> Component:
+        """One component by its name.
+
+        Args:
+            name: EV, AV, INT, GRR, PV or TV.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return {component.name: component for component in self.components}[name]
+
+
+def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
+    """Split the variation of a balanced crossed study.
+
+    Args:
+        values: shape (parts, operators, repeats), each side at least 2, finite.
+        tolerance: width of the tolerance, in the values' unit.
+
+    Raises:
+        ValueError: the shape is not that, a value is not finite, or the tolerance is not positive.
+    """
+    table = np.asarray(values, float)
+    if table.ndim != 3 or min(table.shape) < 2 or not np.isfinite(table).all():
+        raise ValueError(f"expected finite values of at least 2 parts x 2 operators x 2 repeats, got {table.shape}")
+    if tolerance is not None and not tolerance > 0:
+        raise ValueError(f"expected a tolerance above 0, got {tolerance}")
+    parts, operators, repeats = table.shape
+    sources, pooled = _variance(table)
+    by_name = {source.name: source.mean_square for source in sources}
+    within = by_name["equipment"]
+    against = within if pooled else by_name["interaction"]
+    variances = {
+        "EV": within,
+        "AV": max(0.0, (by_name["operators"] - against) / (parts * repeats)),
+        "INT": 0.0 if pooled else max(0.0, (by_name["interaction"] - within) / repeats),
+        "PV": max(0.0, (by_name["parts"] - against) / (operators * repeats)),
+    }
+    variances["GRR"] = variances["EV"] + variances["AV"] + variances["INT"]
+    variances["TV"] = variances["GRR"] + variances["PV"]
+    total = sqrt(variances["TV"])
+    shown = ["EV", "AV", *([] if pooled else ["INT"]), "GRR", "PV", "TV"]
+    components = tuple(
+        Component(
+            name,
+            sqrt(variances[name]),
+            100 * sqrt(variances[name]) / total if total else 0.0,
+            100 * variances[name] / total**2 if total else 0.0,
+            None if tolerance is None else 100 * SPREAD * sqrt(variances[name]) / tolerance,
+        )
+        for name in shown
+    )
+    grr = sqrt(variances["GRR"])
+    categories = int(1.41 * sqrt(variances["PV"]) / grr) if grr else 0
+    return Gauge(sources, pooled, components, categories, tolerance)
+
+
+def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]:
+    """The analysis of variance, with the interaction pooled where it is not significant."""
+    parts, operators, repeats = table.shape
+    mean = table.mean()
+    of_parts, of_operators = table.mean(axis=(1, 2)), table.mean(axis=(0, 2))
+    cells = table.mean(axis=2)
+    between_parts = operators * repeats * float(np.square(of_parts - mean).sum())
+    between_operators = parts * repeats * float(np.square(of_operators - mean).sum())
+    crossed = cells - of_parts[:, None] - of_operators[None, :] + mean
+    interaction = repeats * float(np.square(crossed).sum())
+    within = float(np.square(table - cells[..., None]).sum())
+    crossed_degrees, within_degrees = (parts - 1) * (operators - 1), parts * operators * (repeats - 1)
+    tested = _tested(Source("interaction", interaction, crossed_degrees), Source("", within, within_degrees))
+    pooled = tested.p is None or tested.p > POOLED_FROM
+    equipment = (
+        Source("equipment", interaction + within, crossed_degrees + within_degrees)
+        if pooled
+        else Source("equipment", within, within_degrees)
+    )
+    against = equipment if pooled else tested
+    sources = [
+        _tested(Source("parts", between_parts, parts - 1), against),
+        _tested(Source("operators", between_operators, operators - 1), against),
+        tested,
+        equipment,
+    ]
+    return tuple(sources), pooled
+
+
+def _tested(source: Source, against: Source) -> Source:
+    """A source with its F and significance; without them where there is nothing to compare with."""
+    if against.mean_square <= 0:
+        return source
+    f = source.mean_square / against.mean_square
+    p = float(fdtrc(source.degrees, against.degrees, f))
+    return Source(source.name, source.sum_of_squares, source.degrees, f, p)

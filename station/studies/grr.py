@@ -1,0 +1,201 @@
+"""One run of `station grr`: measurements of a file or of the twin, analysed, and the folder of results."""
+
+import contextlib
+import errno
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from station.errors import BadInputError, StationError
+from station.studies.agreement import Agreement, agreement
+from station.studies.gauge import Gauge, analyse
+from station.studies.gauge_table import Crossed, Measurement, crossed, written
+from station.studies.gauge_twin import GaugeTask, good_and_damaged_mm2, measure_part, true_area_mm2
+from station.studies.workers import on_this_machine
+
+
+@dataclass(frozen=True, slots=True)
+class TwinDesign:
+    """A gauge study on the twin."""
+
+    fruit: str
+    parts: int
+    operators: int
+    repeats: int
+    seed: int
+    jobs: int
+
+    @property
+    def tasks(self) -> list[GaugeTask]:
+        """All measurements, in the order of the table."""
+        return [
+            GaugeTask(self.fruit, self.seed, part, operator, repeat)
+            for part in range(self.parts)
+            for operator in range(self.operators)
+            for repeat in range(self.repeats)
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeStudy:
+    """A gauge study as analysed."""
+
+    title: str
+    facts: Sequence[tuple[str, str]]
+    measurements: Sequence[Measurement]
+    table: Crossed
+    gauge: Gauge
+    agreement: Agreement | None
+    """None where outcomes were not recorded."""
+
+
+def measure_on_twin(design: TwinDesign, on_done: Callable[[], None]) -> list[Measurement]:
+    """Make all measurements; the same for any number of processes.
+
+    Args:
+        design: which.
+        on_done: called after each.
+
+    Raises:
+        StationError: a process was killed from outside.
+    """
+    found: dict[tuple[str, str, str], Measurement] = {}
+    for one in on_this_machine(measure_part, design.tasks, design.jobs):
+        found[one[:3]] = one
+        on_done()
+    return sorted(found.values(), key=lambda one: (int(one.part), one.operator, int(one.repeat)))
+
+
+def twin_tolerance(design: TwinDesign) -> tuple[float, str]:
+    """The difference of area between good and damaged fruit in mm², and in words where it comes from.
+
+    Args:
+        design: of which fruit.
+    """
+    good, damaged = good_and_damaged_mm2(design.fruit, design.seed)
+    words = f"{damaged - good:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the deciding closing, the same ones "
+    return damaged - good, f"{words}sound {good:.1f} mm² (true areas, mean of 30)"
+
+
+def truth_words(design: TwinDesign, tolerance: float) -> str:
+    """What a perfect gauge would find on the same fruit, laid in as they were.
+
+    Args:
+        design: which study.
+        tolerance: in mm².
+    """
+    areas = np.array([true_area_mm2(task) for task in design.tasks if not task.repeat])
+    table = areas.reshape(design.parts, design.operators, 1).repeat(2, axis=2)
+    sigma = analyse(table, tolerance).component("GRR")
+    return (
+        f"laying a fruit in anew changes its true area by {sigma.sigma:.2f} mm² (standard deviation): a perfect gauge "
+        f"has a GRR of {sigma.tolerance_percent:.0f} % of the tolerance"
+    )
+
+
+def analysed(
+    title: str, facts: Sequence[tuple[str, str]], measurements: Sequence[Measurement], tolerance: float | None
+) -> GaugeStudy:
+    """Analyse areas and outcomes.
+
+    Args:
+        title: what the report is called, and what a message names as the source.
+        facts: names and values for the report.
+        measurements: all of them.
+        tolerance: in mm²; None where none is given.
+
+    Raises:
+        BadInputError: the measurements do not make a full table.
+    """
+    table = crossed(measurements, title)
+    gauge = analyse(table.areas_mm2, tolerance)
+    agreed = None if table.passed is None else agreement(table.passed, table.operators, table.good)
+    return GaugeStudy(title, facts, measurements, table, gauge, agreed)
+
+
+def check_folder(out: Path) -> None:
+    """Say so before the work where the results could not be stored.
+
+    Args:
+        out: the folder for the results.
+
+    Raises:
+        BadInputError: there is something, or it cannot be made.
+    """
+    try:
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise BadInputError(f"{out}: is there already and not empty; name a new folder with --out")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent):
+            pass
+    except OSError as error:
+        raise BadInputError(f"{out}: cannot be written: {error.strerror}; name another folder with --out") from error
+
+
+def store(study: GaugeStudy, page: str, out: Path) -> None:
+    """Write `measurements.csv`, `grr.json` and `report.html`, all or nothing.
+
+    Args:
+        study: as analysed.
+        page: the report.
+        out: the folder; empty or not there.
+
+    Raises:
+        StationError: the disk is full or the folder cannot be written; nothing is left.
+    """
+    files = {
+        "measurements.csv": written(study.measurements),
+        "grr.json": (json.dumps(summary(study), indent=2) + "\n").encode(),
+        "report.html": page.encode(),
+    }
+    unfinished = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+    try:
+        for name, data in files.items():
+            with (unfinished / name).open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+        unfinished.chmod(0o755)
+        with contextlib.suppress(FileNotFoundError):
+            out.rmdir()
+        unfinished.rename(out)
+    except OSError as error:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        remedy = "free space" if error.errno in {errno.ENOSPC, errno.EDQUOT} else "name another folder with --out"
+        raise StationError(f"{out}: cannot be written: {error.strerror}; nothing is stored: {remedy}") from error
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+
+
+def summary(study: GaugeStudy) -> dict[str, object]:
+    """What `grr.json` holds.
+
+    Args:
+        study: as analysed.
+    """
+    gauge = study.gauge
+    return {
+        "parts": len(study.table.parts),
+        "operators": len(study.table.operators),
+        "repeats": study.table.areas_mm2.shape[2],
+        "tolerance_mm2": gauge.tolerance,
+        "distinct_categories": gauge.distinct_categories,
+        "interaction_pooled": gauge.pooled,
+        "components": {
+            one.name: {
+                "sigma_mm2": one.sigma,
+                "study_percent": one.study_percent,
+                "contribution_percent": one.contribution_percent,
+                "tolerance_percent": one.tolerance_percent,
+            }
+            for one in gauge.components
+        },
+        "agreement": None if study.agreement is None else asdict(study.agreement),
+    }

@@ -1,0 +1,156 @@
+"""The report of a study that people read: one HTML file with its figures inside."""
+
+import base64
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import jinja2
+
+from station.studies import figures
+from station.studies.cohort import PAPER_FAILURES
+from station.studies.failure import DEFINITION, Cause, image_at, interval
+from station.studies.folder import StudyFolder, identity_of
+from station.studies.sample import Task, segmentation_of
+from station.studies.study import Study, summary
+from station.twin.gel import MM_PER_PX
+
+PAPER_SAMPLES = 30
+
+
+def environment() -> jinja2.Environment:
+    """Where this room's templates are found."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("station.studies", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def data_uri(picture: bytes) -> str:
+    """A picture inside the document.
+
+    Args:
+        picture: the content of a PNG or a JPEG.
+    """
+    kind = "png" if picture.startswith(b"\x89PNG") else "jpeg"
+    return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
+
+
+def share(count: int, of: int) -> str:
+    """A share in words with its 95 % interval.
+
+    Args:
+        count: how many.
+        of: how many were looked at.
+    """
+    low, high = interval(count, of)
+    return f"{count / of:.1%} ({low:.1%} to {high:.1%})"
+
+
+def write_report(study: Study) -> None:
+    """Write `report.html` into the study's folder.
+
+    Args:
+        study: as judged.
+
+    Raises:
+        BadInputError: the folder is no longer the study's.
+        StationError: the disk is full or the folder has become unwritable.
+    """
+    request = study.request
+    identity = identity_of(Task(request.fruit, request.method, request.seed, 0))
+    page = (
+        environment()
+        .get_template("study.html.j2")
+        .render(
+            title=f"{request.fruit.replace('_', ' ').capitalize()}, {request.method}: {len(study.samples)} samples",
+            facts=_facts(study),
+            definition=DEFINITION,
+            failures=_failures(study),
+            summary=summary(study),
+            figures=_figures(study),
+            samples=_samples(study),
+            closings=study.result_closings_mm,
+        )
+    )
+    StudyFolder(request.out, identity).write("report.html", page.encode())
+
+
+def _facts(study: Study) -> list[tuple[str, str]]:
+    request = study.request
+    segmentation = segmentation_of(request.fruit, request.method)
+    parameters = segmentation.paper if request.method == "paper" else segmentation.robust
+    closings = study.samples[0].closings_mm
+    return [
+        ("Cohort", f"{request.fruit}, seed {request.seed}; sizes as listed in the paper, all else drawn"),
+        ("Images", f"{len(closings)} a sample, 1 mm apart, on the twin"),
+        ("Method", request.method),
+        ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
+        ("Program", f"fruit-station {version('fruit-station')}"),
+        ("The paper", "Computers and Electronics in Agriculture 235 (2025) 110397"),
+    ]
+
+
+def _failures(study: Study) -> list[tuple[str, str, str]]:
+    """Rows of: what, here, in the paper."""
+    number = len(study.samples)
+    paper = PAPER_FAILURES.get(study.request.kind)
+    later = sum(map(bool, study.later_causes))
+    told = {
+        Cause.NO_CONTACT: "no contact found",
+        Cause.FALLING_AREA: "area falls by more than 10 %",
+        Cause.WRONG_AREA: "area wrong by more than 50 %",
+    }
+    return [
+        ("failed", share(study.failed, number), "not told" if paper is None else share(paper, PAPER_SAMPLES)),
+        *((f"… {words}", share(sum(cause in c for c in study.causes), number), "") for cause, words in told.items()),
+        (
+            f"failed, looking only from {study.result_closings_mm[0]:g} mm of closing on",
+            share(later, number),
+            "",
+        ),
+    ]
+
+
+def _figures(study: Study) -> list[tuple[str, str]]:
+    """Captions and data URIs."""
+    found: list[tuple[str, bytes]] = [
+        ("Area over closing of every sample; dotted: the results' closings.", figures.cohort_curves([study])),
+        (
+            "Measured over true area at the results' closings. Grey: within 50 %; crosses: samples that failed.",
+            figures.areas_at_results([study]),
+        ),
+    ]
+    for failed, words in ((False, "did not fail"), (True, "failed")):
+        sample = figures.typical(study, failed=failed)
+        if sample is None:
+            continue
+        name = f"Sample {sample.number + 1}, {sample.width_mm:.1f} mm wide, the middle one of those that {words}"
+        found += [
+            (f"{name}: area over closing.", figures.one_curve([study], sample.number)),
+            (f"{name}: its images. Red: the true edge.", figures.press_sheet(study, sample.number)),
+        ]
+    return [(caption, data_uri(picture)) for caption, picture in found]
+
+
+def _samples(study: Study) -> list[dict[str, object]]:
+    rows: list[dict[str, object]] = []
+    for sample, causes in zip(study.samples, study.causes, strict=True):
+        places = image_at(sample.closings_mm, study.result_closings_mm)
+        rows.append(
+            {
+                "number": sample.number + 1,
+                "weight_g": sample.weight_g,
+                "length_mm": sample.length_mm,
+                "width_mm": sample.width_mm,
+                "areas": [_areas(sample.areas_px, sample.true_areas_px, place) for place in places],
+                "causes": ", ".join(sorted(cause.replace("_", " ") for cause in causes)),
+            }
+        )
+    return rows
+
+
+def _areas(areas_px: Sequence[int], true_areas_px: Sequence[int], place: int) -> tuple[float, float]:
+    return areas_px[place] * MM_PER_PX**2, true_areas_px[place] * MM_PER_PX**2

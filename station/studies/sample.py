@@ -1,0 +1,72 @@
+"""One sample of a study, measured: what a worker is asked for and what it answers."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from station.settings.recipe import find_recipe
+from station.settings.segmentation import Segmentation
+from station.studies.cohort import member
+from station.vision.methods import make_method
+
+
+class Task(NamedTuple):
+    """What a worker is asked for."""
+
+    fruit: str
+    method: str
+    seed: int
+    number: int
+    """Of the sample, from 0."""
+
+
+class SampleResult(BaseModel):
+    """A press as it was measured, with the truth; one value an image in the order of closing."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    number: int
+    weight_g: float
+    length_mm: float
+    width_mm: float
+    closings_mm: list[float]
+    areas_px: list[int]
+    true_areas_px: list[int]
+    confidences: list[float | None]
+    flags: list[list[str]]
+
+
+def segmentation_of(fruit: str, method: str) -> Segmentation:
+    """How a study measures: the shipped recipe's parameters, with the method asked for.
+
+    Args:
+        fruit: the recipe's name.
+        method: `paper` or `robust`.
+    """
+    return find_recipe(fruit).segmentation.model_copy(update={"method": method})
+
+
+def measure_sample(task: Task) -> SampleResult:
+    """Draw a sample's press and measure each image, on one thread.
+
+    Args:
+        task: which sample, and how.
+    """
+    cv2.setNumThreads(1)
+    one = member(task.fruit, task.seed, task.number)
+    press = one.press()
+    method = make_method(press.references, segmentation_of(task.fruit, task.method))
+    contacts = [method.measure(frame) for frame in press.frames]
+    return SampleResult(
+        number=task.number,
+        weight_g=one.fruit.weight_g,
+        length_mm=one.fruit.length_mm,
+        width_mm=one.fruit.width_mm,
+        closings_mm=press.closings_mm,
+        areas_px=[contact.area_px for contact in contacts],
+        true_areas_px=[int(np.count_nonzero(mask)) for mask in press.true_masks],
+        confidences=[contact.confidence for contact in contacts],
+        flags=[sorted(flag.value for flag in contact.flags) for contact in contacts],
+    )

@@ -1,0 +1,138 @@
+"""Where a study's samples are measured: on this machine's cores, or on a Dask cluster's.
+
+A sample's numbers depend on its task alone, so neither the place nor the number of workers changes them.
+"""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from typing import NoReturn, TypeVar
+
+from station.errors import BadInputError, StationError
+from station.studies.folder import identity_of
+from station.studies.sample import SampleResult, Task, measure_sample
+
+One = TypeVar("One")
+Answer = TypeVar("Answer")
+
+_PR_SET_PDEATHSIG = 1
+_CLUSTER_TIMEOUT_S = 10
+
+
+def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: int) -> Iterator[Answer]:
+    """Work in processes of this machine; they end when the iteration does, however it ends.
+
+    Args:
+        work: what is done with a task; a function of a module.
+        tasks: what it is done with.
+        jobs: number of processes, at least 1.
+
+    Yields:
+        The answers as they come.
+
+    Raises:
+        StationError: a process was killed from outside, as by a machine short of memory.
+    """
+    if jobs == 1 or len(tasks) < 2:
+        yield from map(work, tasks)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(
+        min(jobs, len(tasks)), mp_context=context, initializer=_tied_to, initargs=(os.getpid(),)
+    ) as pool:
+        try:
+            for future in as_completed([pool.submit(work, task) for task in tasks]):
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise StationError(
+                "a process that measured was killed; give the same command again, with fewer --jobs if memory was short"
+            ) from error
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+
+
+def stop_on_sigterm() -> None:
+    """Let SIGTERM end this process as Ctrl-C does, so that its workers end with it."""
+
+    def interrupt(_number: int, _frame: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+
+
+def _tied_to(parent: int) -> None:
+    """Leave Ctrl-C to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
+    """Measure on a Dask cluster whose workers have this same program installed.
+
+    Args:
+        tasks: which samples.
+        address: of the scheduler, such as `tcp://10.0.0.5:8786`.
+
+    Raises:
+        BadInputError: Dask is not installed here, or nobody answers at the address.
+        StationError: the cluster failed while it measured.
+    """
+    try:
+        import distributed  # noqa: PLC0415 (an optional extra, and slow to import)
+    except ImportError as error:
+        raise BadInputError(
+            "--scheduler needs Dask, which is not installed: pip install 'fruit-station[cluster]'"
+        ) from error
+    try:
+        client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S)
+    except (OSError, ValueError, TypeError, TimeoutError) as error:
+        raise BadInputError(
+            f"--scheduler {address}: no Dask scheduler answers there within {_CLUSTER_TIMEOUT_S} s; expected an "
+            "address such as tcp://10.0.0.5:8786: is `dask scheduler` running, and no firewall between?"
+        ) from error
+    with client:
+        _check_workers(client, address, tasks[0])
+        yield from _gathered(client, distributed.as_completed, tasks)
+
+
+def _check_workers(client, address: str, task: Task) -> None:  # noqa: ANN001 (of an optional library)
+    """Refuse a cluster without workers, or whose workers would measure otherwise than this program."""
+    try:
+        identities = client.run(identity_of, task)
+    except Exception as error:
+        raise BadInputError(
+            f"--scheduler {address}: a worker does not have this program ({error}); install the same version of "
+            "fruit-station there"
+        ) from error
+    if not identities:
+        raise BadInputError(f"--scheduler {address}: it has no worker; start some with: dask worker {address}")
+    others = [worker for worker, identity in identities.items() if identity != identity_of(task)]
+    if others:
+        raise BadInputError(
+            f"--scheduler {address}: {others[0]} has another version of the program or the recipe; install the same "
+            "version of fruit-station there"
+        )
+
+
+def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Iterator[SampleResult]:  # noqa: ANN001 (of an optional library)
+    futures = client.map(measure_sample, tasks, pure=False, retries=2)
+    try:
+        for future in as_they_come(futures):
+            yield future.result()
+    except Exception as error:
+        raise StationError(
+            f"the cluster failed: {error}; what was measured by then is kept: give the same command again"
+        ) from error
+    finally:
+        client.cancel(futures, force=True)

@@ -1,0 +1,115 @@
+"""`station grr` as a user gives it."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from station.commands.grr import grr
+from station.errors import BadInputError, StationError
+from station.settings.recipe import find_recipe
+from station.studies import grr as grr_room
+from station.studies.gauge_twin import (
+    GaugeTask,
+    deciding_closing_mm,
+    good_and_damaged_mm2,
+    measure_part,
+    part_of,
+    pose_of,
+    setup_of,
+)
+
+
+def asked(*arguments: object) -> Result:
+    """The command in this process, without its signal's handler."""
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        return CliRunner().invoke(grr, [str(one) for one in arguments])
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@pytest.fixture
+def measurements(tmp_path: Path) -> Path:
+    """A study of three parts, of which the last is damaged, with a little noise."""
+    rows = ["part,operator,repeat,area_mm2,outcome,reference"]
+    for number, (part, area, outcome) in enumerate((("a", 80, "PASS"), ("b", 90, "PASS"), ("c", 140, "FAIL"))):
+        for operator in "AB":
+            for repeat in (1, 2, 3):
+                noise = 0.1 * ((7 * number + 3 * repeat + (operator == "B")) % 5)
+                rows.append(f"{part},{operator},{repeat},{area + noise:.1f},{outcome},{outcome}")
+    path = tmp_path / "measurements.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def test_measurements_of_a_file_are_analysed(measurements: Path, tmp_path: Path):
+    out = tmp_path / "new" / "out"
+    found = asked(measurements, "--tolerance", 50, "--out", out)
+    assert found.exit_code == 0, found.output
+    assert "of the tolerance: acceptable" in found.output
+    summary = json.loads((out / "grr.json").read_text())
+    components = summary["components"]
+    assert components["PV"]["sigma_mm2"] == pytest.approx(32, rel=0.05)
+    assert components["GRR"]["tolerance_percent"] == pytest.approx(6 * components["GRR"]["sigma_mm2"] / 50 * 100)
+    assert summary["distinct_categories"] > 50
+    assert summary["agreement"]["all_alike"] == 3
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png") == 2
+    assert "kappa" in page
+    assert "http" not in page
+    assert sorted(path.name for path in out.parent.iterdir()) == ["out"]
+
+
+def test_without_a_tolerance_the_total_variation_judges(measurements: Path, tmp_path: Path):
+    found = asked(measurements, "--out", tmp_path / "out")
+    assert found.exit_code == 0, found.output
+    assert "of the total variation" in found.output
+    assert "of the tolerance" not in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_what_cannot_be_done_is_told(measurements: Path, tmp_path: Path):
+    assert "either a CSV file of measurements or --twin" in asked("--out", tmp_path / "a").output
+    assert "either a CSV file" in asked(measurements, "--twin", "--out", tmp_path / "a").output
+    assert "not in the range" in asked("--twin", "--parts", 1, "--out", tmp_path / "a").output
+    assert "not in the range" in asked(measurements, "--tolerance", 0, "--out", tmp_path / "a").output
+    for name, out in (("nothing.csv", tmp_path / "a"), (measurements.name, tmp_path)):
+        found = asked(tmp_path / name, "--out", out)
+        assert isinstance(found.exception, BadInputError)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [measurements.name]
+
+
+def test_a_full_disk_leaves_nothing(measurements: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(grr_room.os, "fsync", full)
+    found = asked(measurements, "--out", tmp_path / "out")
+    assert isinstance(found.exception, StationError)
+    assert "nothing is stored: free space" in str(found.exception)
+    assert [path.name for path in tmp_path.iterdir()] == [measurements.name]
+
+
+def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
+    """One press of a smooth fruit: the area at the deciding closing is near its truth, and repeats to the digit."""
+    task = GaugeTask("blueberry", 3, 0, 0, 0)
+    once = measure_part(task)
+    assert once == measure_part(task)
+    assert once != measure_part(task._replace(repeat=1))
+    assert (once.part, once.operator, once.repeat, once.reference) == ("1", "A", "1", "PASS")
+    good, damaged = good_and_damaged_mm2("blueberry", 3)
+    assert 1.2 * good < damaged < 2 * good
+    assert once.area_mm2 == pytest.approx(good, rel=0.35)
+    assert deciding_closing_mm(find_recipe("blueberry")) == 3
+
+
+def test_operators_differ_and_every_second_fruit_is_bruised():
+    task = GaugeTask("strawberry", 3, 0, 0, 0)
+    assert setup_of(task).unit is None
+    assert setup_of(task._replace(operator=1)) != setup_of(task._replace(operator=2))
+    assert setup_of(task) == setup_of(task._replace(part=4, repeat=2))
+    assert [part_of(task._replace(part=part)).bruised for part in range(4)] == [False, True, False, True]
+    assert part_of(task) == part_of(task._replace(operator=2, repeat=1))
+    assert pose_of(task) == pose_of(task._replace(repeat=1)) != pose_of(task._replace(operator=1))
