@@ -136,12 +136,16 @@ class Calibrating:
             self._say("press", number + 1, plan.number + 1, f"{step.width_mm:.2f} mm: {area}")
             if number == 0 and step.contact.found:
                 met_mm = self._settings.ball_mm + self._settings.holder_mm
-                raise RefusedError(f"something touches the gel at the start, {step.width_mm:.1f} mm, and a "
-                        f"{self._settings.ball_mm:g} mm ball is met at {met_mm:.1f} mm: take it out, look for the "
-                        "right ball and what holds it")
+                raise RefusedError(
+                    f"something touches the gel at the start, {step.width_mm:.1f} mm, and a "
+                    f"{self._settings.ball_mm:g} mm ball is met at {met_mm:.1f} mm: take it out, look for the "
+                    "right ball and what holds it"
+                )
         if not any(step.contact.found for step in steps):
-            raise RefusedError(f"nothing touched the gel down to {steps[-1].width_mm:.1f} mm: is the ball between the fingers? "
-                    "A smaller one is never met")
+            raise RefusedError(
+                f"nothing touched the gel down to {steps[-1].width_mm:.1f} mm: is the ball between the fingers? "
+                "A smaller one is never met"
+            )
         return steps
 
     async def _at_places(self, onset_mm: float) -> list[PlacePoint]:
@@ -157,8 +161,10 @@ class Calibrating:
             contact = step.contact
             where = f"place {number + 1}, {place.x_mm:g},{place.y_mm:g} mm"
             if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
-                raise RefusedError(f"{where}: at {step.width_mm:.1f} mm no whole contact is seen: lay the ball nearer to the "
-                        "gel's middle, as high as before")
+                raise RefusedError(
+                    f"{where}: at {step.width_mm:.1f} mm no whole contact is seen: lay the ball nearer to the "
+                    "gel's middle, as high as before"
+                )
             x_px, y_px = contact.centroid_px
             found.append(
                 PlacePoint(

@@ -6,7 +6,7 @@ import cv2
 import jinja2
 
 from station.calibration.calibrating import Draft
-from station.calibration.model import Calibration, Verification
+from station.calibration.model import Calibration
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE
 from station.calibration.verifying import Verified, outlined
@@ -53,7 +53,11 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
     area = area_plot(calibration, verification.curve)
     pictures = {name: png(picture) for name, picture in verified.pictures.items()}
     tiles = [
-        (f"{point.width_mm:.2f} mm", _area(calibration, point.area_px), _tile(verified.pictures[f"press_{number:02d}.png"]))
+        (
+            f"{point.width_mm:.2f} mm",
+            _area(calibration, point.area_px),
+            _tile(verified.pictures[f"press_{number:02d}.png"]),
+        )
         for number, point in enumerate(verification.curve)
     ]
     page = _page(
@@ -98,7 +102,10 @@ def _calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
         ("Onset", f"{calibration.onset_mm:.2f} mm; the gripper's zero is off by {calibration.zero_mm:+.2f} mm"),
         ("Noise", " / ".join(f"{level:.2f}" for level in noise.pixel_levels) + " grey levels in blue / green / red"),
         ("Gate", f"reaches {noise.gate:.2f} with nothing touching; this unit's factor is {noise.gate_factor:.2f}"),
-        ("Light", " / ".join(f"{level:.0f}" for level in calibration.light_levels) + " grey levels in blue / green / red"),
+        (
+            "Light",
+            " / ".join(f"{level:.0f}" for level in calibration.light_levels) + " grey levels in blue / green / red",
+        ),
     ]
 
 
@@ -125,5 +132,3 @@ def _tile(picture: Image) -> str:
 
 def _uri(data: bytes, kind: str = "png") -> str:
     return f"data:image/{kind};base64," + base64.b64encode(data).decode()
-
-

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import sys
 from collections.abc import AsyncIterator
 
 import click
@@ -28,9 +29,7 @@ _ARM_DEADLINE_S = 15.0
 
 
 @contextlib.asynccontextmanager
-async def at_the_bench(
-    site: Configuration, *, bench: bool, yes: bool
-) -> AsyncIterator[tuple[BallBench, Unit, Recipe]]:
+async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncIterator[tuple[BallBench, Unit, Recipe]]:
     """Open the devices that the site names, for this program alone.
 
     Args:
@@ -48,8 +47,10 @@ async def at_the_bench(
 
     async def lay(place: Place) -> None:
         if not yes:
-            where = f"{place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its first place"
-            await asyncio.to_thread(click.pause, f"lay the ball {where}, then press a key")
+            where = (
+                f"{place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its first place"
+            )
+            await _answered(f"lay the ball {where}, then press Enter")
 
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(os.close, _lock(site))
@@ -68,9 +69,27 @@ async def at_the_bench(
             await stack.enter_async_context(kept_healthy(arm))
         if not yes:
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
-            await asyncio.to_thread(click.confirm, f"Is the gel clean, {ball}, and nobody's hand there?", abort=True)
+            await _answered(
+                f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
+            )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
         yield BallBench(Cell(camera, gripper, arm), recipe, lay), unit, recipe
+
+
+async def _answered(request: str) -> None:
+    """Wait for a person's Enter; Ctrl-C ends the wait, and an input that has ended calls everything off."""
+    click.echo(request)
+    loop, line = asyncio.get_running_loop(), asyncio.Event()
+    try:
+        loop.add_reader(sys.stdin, line.set)
+    except PermissionError:  # a file, which is never waited for
+        line.set()
+    try:
+        await line.wait()
+    finally:
+        loop.remove_reader(sys.stdin)
+    if not sys.stdin.readline():
+        raise asyncio.CancelledError
 
 
 def _lock(site: Configuration) -> int:
