@@ -115,12 +115,12 @@ def scales(recipe: Recipe) -> tuple[str, list[Draft]]:
 
 def shifts(recipe: Recipe, draft: Draft, true_mm: float) -> str:
     """How far a verification of a sound sensor comes from its calibration, so what the tolerances have to bear."""
-    settings, golden = CalibrationSettings(), draft.reference
+    settings, golden, presses = CalibrationSettings(), draft.reference, [step.image for step in draft.steps]
     calibration = draft.calibration
     passed, ratios, contrasts, onsets = 0, [], [], []
     for seed in range(SHIFTS):
         ball = DrawnBall(100 + seed, unit=0, mm_per_px=true_mm)
-        procedure = Verifying(ball, recipe, settings, calibration, golden, "bench", lambda _: None)
+        procedure = Verifying(ball, recipe, settings, calibration, golden, presses, "bench", lambda _: None)
         verification = asyncio.run(procedure.run()).verification
         passed += verification.passed
         ratios.append(abs((verification.area_ratio or 0.0) - 1.0))

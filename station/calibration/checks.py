@@ -1,6 +1,7 @@
 """What a calibration and a verification are judged by, each with what to do where it is not so."""
 
 from collections.abc import Sequence
+from itertools import dropwhile
 
 from station.calibration import figures
 from station.calibration.figures import QUIET_GATE, MeasuredScale
@@ -120,7 +121,7 @@ def verification_checks(
         pixel_levels: noise of the untouched gel.
     """
     area = figures.area_ratio(curve, calibration.curve)
-    fall = figures.falls([point for point in curve if point.area_px])
+    fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
     shift_mm = None if onset_mm is None else onset_mm - calibration.onset_mm
     look = "look at the ball and how it lies, and at the gel; if both are as they were, calibrate"

@@ -97,14 +97,22 @@ def sharpness(image: Image) -> float:
 
 
 def side_by_side(before: Image, now: Image) -> Image:
-    """Two pictures beside each other, the earlier one left.
+    """Two pictures beside each other, the earlier one left, named.
 
     Args:
         before: shape (height, width, 3), dtype uint8.
         now: likewise.
     """
     gap = np.full((before.shape[0], 12, 3), 255, np.uint8)
-    return np.hstack([before, gap, now])
+    return np.hstack([_named(before, "then"), gap, _named(now, "now")])
+
+
+def _named(image: Image, name: str) -> Image:
+    """A picture with a word in its corner."""
+    size = image.shape[1] / 480
+    place = (round(14 * size), round(38 * size))
+    white, font = (255, 255, 255), cv2.FONT_HERSHEY_SIMPLEX
+    return np.asarray(cv2.putText(image.copy(), name, place, font, size, white, 2, cv2.LINE_AA), np.uint8)
 
 
 def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[Finding]:

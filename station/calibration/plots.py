@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from station.calibration.model import Calibration, FieldMap, PressPoint
 
 _BLUE, _RED, _GREY = "#1f4e79", "#b3261e", "#888888"
+_DOUBTFUL = 0.5
 
 
 def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None) -> bytes:
@@ -33,7 +34,7 @@ def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None)
     axes.set_ylabel("contact area [mm²]")
     axes.set_ylim(bottom=0)
     axes.grid(color="#dddddd", linewidth=0.6)
-    axes.legend(loc="upper left", frameon=False)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=8)
     return _png(figure)
 
 
@@ -63,20 +64,25 @@ def field_plot(field: FieldMap) -> bytes:
 
 
 def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px: float) -> None:  # noqa: ANN001 (matplotlib's)
-    widths = [point.width_mm for point in curve]
-    areas = [point.area_px * mm_per_px**2 for point in curve]
-    axes.plot(widths, areas, color=colour, marker="o", markersize=4, linewidth=1.5, label=label)
-    doubted = [index for index, point in enumerate(curve) if point.cut or (point.confidence or 0.0) < 0.5]
+    """Sure points are joined; doubtful ones, and a contact that was lost again, stand alone."""
+    first = next((index for index, point in enumerate(curve) if point.area_px), len(curve))
+    sure, doubted = [], []
+    for index, point in enumerate(curve):
+        lost = index > first and not point.area_px
+        doubtful = point.cut or lost or (point.confidence is not None and point.confidence < _DOUBTFUL)
+        (doubted if doubtful else sure).append((point.width_mm, point.area_px * mm_per_px**2))
+    if sure:
+        axes.plot(*zip(*sure, strict=True), color=colour, marker="o", markersize=4, linewidth=1.5, label=label)
     if doubted:
+        hollow = f"{label}: not sure, lost or cut by the border"
         axes.plot(
-            [widths[index] for index in doubted],
-            [areas[index] for index in doubted],
+            *zip(*doubted, strict=True),
             color=colour,
             marker="o",
             markerfacecolor="white",
             markersize=7,
             linestyle="none",
-            label=f"{label}: cut by the border, or not sure",
+            label=hollow,
         )
 
 

@@ -8,7 +8,7 @@ import jinja2
 from station.calibration.calibrating import Draft
 from station.calibration.model import Calibration
 from station.calibration.plots import area_plot, field_plot
-from station.calibration.store import PAGE, REFERENCE
+from station.calibration.store import PAGE, REFERENCE, press_name
 from station.calibration.verifying import Verified, outlined
 from station.vision.contact import Image
 
@@ -23,7 +23,7 @@ def calibration_files(draft: Draft) -> dict[str, bytes]:
     """
     calibration = draft.calibration
     area, field = area_plot(calibration), field_plot(calibration.field)
-    presses = {f"press_{number:02d}.png": png(step.image) for number, step in enumerate(draft.steps)}
+    presses = {press_name(number): png(step.image) for number, step in enumerate(draft.steps)}
     tiles = [
         (f"{step.width_mm:.2f} mm", _area(calibration, step.contact.area_px), _tile(outlined(step)))
         for step in draft.steps
@@ -56,7 +56,7 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
         (
             f"{point.width_mm:.2f} mm",
             _area(calibration, point.area_px),
-            _tile(verified.pictures[f"press_{number:02d}.png"]),
+            _tile(verified.pictures[press_name(number)]),
         )
         for number, point in enumerate(verification.curve)
     ]

@@ -109,11 +109,18 @@ class CalibrationStore:
         Raises:
             CalibrationError: it is gone or no picture.
         """
-        path = self.folder(calibration) / REFERENCE
-        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if picture is None:
-            raise CalibrationError(f"{path}: the calibration's picture cannot be read; calibrate again")
-        return np.asarray(picture, np.uint8)
+        return _picture(self.folder(calibration) / REFERENCE)
+
+    def presses(self, calibration: Calibration) -> list[Image]:
+        """A calibration's pictures of the ball, in the order of its curve.
+
+        Args:
+            calibration: one of these.
+
+        Raises:
+            CalibrationError: one is gone or no picture.
+        """
+        return [_picture(self.folder(calibration) / press_name(number)) for number in range(len(calibration.curve))]
 
     def folder(self, record: Calibration | Verification) -> Path:
         """Where a record and its page lie.
@@ -170,6 +177,22 @@ class CalibrationStore:
                 with contextlib.suppress(OSError, ValidationError):
                     _NAME.validate_python(path.name)
                     yield model.model_validate_json((path / RECORDS[kind]).read_bytes())
+
+
+def press_name(number: int) -> str:
+    """The file of a step's picture.
+
+    Args:
+        number: of the step, from 0.
+    """
+    return f"press_{number:02d}.png"
+
+
+def _picture(path: Path) -> Image:
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise CalibrationError(f"{path}: the calibration's picture cannot be read; calibrate again")
+    return np.asarray(picture, np.uint8)
 
 
 def _folders(folder: Path) -> list[Path]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -11,6 +12,7 @@ from station.calibration.checks import verification_checks
 from station.calibration.gel import REMEDIES, Finding, Ill
 from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
+from station.calibration.store import press_name
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
@@ -49,6 +51,7 @@ class Verifying:
         settings: the tolerances.
         calibration: the unit's.
         golden: the calibration's picture of the untouched gel.
+        presses: the calibration's pictures of the ball, in the order of its curve.
         operator: who does it.
         tell: gets the progress.
     """
@@ -60,11 +63,12 @@ class Verifying:
         settings: CalibrationSettings,
         calibration: Calibration,
         golden: Image,
+        presses: Sequence[Image],
         operator: str,
         tell: Tell,
     ) -> None:
         self._bench, self._recipe, self._settings = bench, recipe, settings
-        self._calibration, self._golden = calibration, golden
+        self._calibration, self._golden, self._presses = calibration, golden, presses
         self._operator, self._tell = operator, tell
         self._press = BallPress(bench, recipe, calibration.noise.gate_factor)
 
@@ -97,10 +101,10 @@ class Verifying:
         blue, green, red = (float(level) for level in pixel_levels)
         checks = verification_checks(self._settings, self._calibration, curve, onset_mm, (blue, green, red))
         if not any(finding.ill in {Ill.LED, Ill.FOG} for finding in findings):
-            findings += self._worn(steps, reference)
+            findings += self._worn(steps)
         pictures = {f"{finding.ill}.png": finding.picture for finding in findings}
         checks += [self._health(ill, findings) for ill in Ill]
-        pictures |= {f"press_{number:02d}.png": outlined(step) for number, step in enumerate(steps)}
+        pictures |= {press_name(number): outlined(step) for number, step in enumerate(steps)}
         verification = Verification(
             id=stamp(datetime.now(UTC)),
             serial=self._calibration.serial,
@@ -133,13 +137,15 @@ class Verifying:
         self._tell(Progress(1, 1, "where the contact begins", f"from {from_mm:.1f} mm"))
         return steps, await self._press.fine_onset(max(from_mm, touched.width_mm), touched.width_mm)
 
-    def _worn(self, steps: list[Step], reference: Image) -> list[Finding]:
+    def _worn(self, steps: list[Step]) -> list[Finding]:
         touched = [step for step in steps if step.contact.found]
         ratio = figures.contrast_ratio([step.point for step in touched], self._calibration.curve)
         if ratio is None or ratio >= self._settings.least_contrast:
             return []
         text = f"the ball changes the picture {ratio:.0%} as much as at the calibration: the coating is worn"
-        return [Finding(Ill.WEAR, text, gel.side_by_side(reference, outlined(touched[-1])))]
+        now = touched[len(touched) // 2]
+        widths = [abs(point.width_mm - now.width_mm) for point in self._calibration.curve]
+        return [Finding(Ill.WEAR, text, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
 
     @staticmethod
     def _health(ill: Ill, findings: list[Finding]) -> Check:

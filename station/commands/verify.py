@@ -34,8 +34,8 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
         cancelled_by_signals()
         async with at_the_bench(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
             calibration = _calibration(store, unit.serial, site)
-            golden = store.golden(calibration)
-            procedure = Verifying(ball_bench, recipe, site.calibration, calibration, golden, operator, show)
+            pictures = store.golden(calibration), store.presses(calibration)
+            procedure = Verifying(ball_bench, recipe, site.calibration, calibration, *pictures, operator, show)
             return await procedure.run(), calibration
 
     logging.basicConfig(format="station: %(message)s")

@@ -52,7 +52,7 @@ def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress
     return asyncio.run(
         Calibrating(
             ball, UNIT, recipe, CalibrationSettings(), [Place(*place) for place in places], "anna", "0.1", tell
-        ).run()  # type: ignore[arg-type]
+        ).run()
     )
 
 

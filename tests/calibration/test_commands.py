@@ -27,6 +27,7 @@ def until(process, words):
 def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
     process = begin(site, "calibrate", "--operator", "anna", "--place", "3,0")
     until(process, "press Enter")
+    assert process.stdin is not None
     process.stdin.write("\n")
     process.stdin.flush()
     until(process, "lay the ball 3 mm to the right")

@@ -17,7 +17,8 @@ from station.vision.methods import median_image
 
 def verified(ball, draft):
     recipe, settings = find_recipe("rubber_ball"), CalibrationSettings()
-    procedure = Verifying(ball, recipe, settings, draft.calibration, draft.reference, "anna", lambda _progress: None)
+    pictures = draft.reference, [step.image for step in draft.steps]
+    procedure = Verifying(ball, recipe, settings, draft.calibration, *pictures, "anna", lambda _progress: None)
     return asyncio.run(procedure.run())
 
 
@@ -53,6 +54,7 @@ def test_each_ill_of_the_gel_is_named_and_shown(drawn_ball, draft, condition, il
     assert picture is not None
     files = verification_files(result, draft.calibration)
     shown = cv2.imdecode(np.frombuffer(files[picture], np.uint8), cv2.IMREAD_COLOR)
+    assert shown is not None
     assert shown.shape[0] == 640
     assert shown.std() > 5
     page = files["report.html"].decode()
@@ -71,7 +73,9 @@ def test_real_sensors_without_contact_are_not_called_torn_or_dirty(real_images):
     pictures = sorted((real_images / "digit_backgrounds").glob("*.jpg"))
     assert len(pictures) >= 20
     for path in pictures:
-        picture = cv2.resize(cv2.imread(str(path)), (480, 640), interpolation=cv2.INTER_CUBIC)
+        small = cv2.imread(str(path))
+        assert small is not None
+        picture = cv2.resize(small, (480, 640), interpolation=cv2.INTER_CUBIC)
         assert examine(np.asarray(picture, np.uint8), None, 0.75) == [], path.name
 
 
