@@ -12,7 +12,7 @@ from station.settings.configuration import Configuration
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
 
 
-class InForce(NamedTuple):
+class InUse(NamedTuple):
     """What a fruit is measured by."""
 
     mm_per_px: float
@@ -54,13 +54,13 @@ class Calibrated:
         return self._calibration
 
     @property
-    def in_force(self) -> InForce:
+    def in_force(self) -> InUse:
         """The scale that areas are told by, and whose it is."""
         calibration = self.calibration
         if calibration is None:
-            return InForce(self._usual_mm_per_px, f"none: {self._usual_mm_per_px:g} mm/px, by the configuration")
+            return InUse(self._usual_mm_per_px, f"none: {self._usual_mm_per_px:g} mm/px, by the configuration")
         scale = calibration.mm_per_px if calibration.scale_measured else self._usual_mm_per_px
-        return InForce(scale, f"{calibration.in_words()}, in use {scale:g} mm/px")
+        return InUse(scale, f"{calibration.in_words()}, in use {scale:g} mm/px")
 
     @property
     def gate_factor(self) -> float:
