@@ -57,7 +57,7 @@ def repeats() -> str:
     methods = {"robust": robust, "paper": robust.model_copy(update={"method": "paper"})}
     rising, ratios = dict.fromkeys(methods, 0), {name: [] for name in methods}
     for seed in range(REPEATS):
-        ball = DrawnBall(seed, unit=None if seed == 0 else seed)
+        ball = DrawnBall(seed, unit=None if seed == 0 else seed, frames_per_step=3)
         references, steps = asyncio.run(press(ball))
         for name, segmentation in methods.items():
             areas = measured(references, steps, segmentation)
@@ -93,7 +93,7 @@ def scales(recipe: Recipe) -> tuple[str, list[Draft]]:
     """The scale found beside the true one and the usual one."""
     rows, drafts = [], []
     for seed, true_mm in enumerate(SCALES_MM):
-        ball = DrawnBall(seed, unit=seed, mm_per_px=true_mm, spill_mm=SPILL_MM)
+        ball = DrawnBall(seed, unit=seed, mm_per_px=true_mm, spill_mm=SPILL_MM, frames_per_step=3)
         try:
             draft = calibrated(ball, recipe, PLACES)
         except RefusedError as error:
@@ -119,7 +119,7 @@ def shifts(recipe: Recipe, draft: Draft, true_mm: float) -> str:
     calibration = draft.calibration
     passed, ratios, contrasts, onsets = 0, [], [], []
     for seed in range(SHIFTS):
-        ball = DrawnBall(100 + seed, unit=0, mm_per_px=true_mm)
+        ball = DrawnBall(100 + seed, unit=0, mm_per_px=true_mm, frames_per_step=3)
         procedure = Verifying(ball, recipe, settings, calibration, golden, presses, "bench", lambda _: None)
         verification = asyncio.run(procedure.run()).verification
         passed += verification.passed

@@ -28,6 +28,7 @@ class DrawnBall:
         condition: what is wrong with the sensor.
         holder_mm: what the ball lies in; where it is met moves with it.
         spill_mm: standard deviation of how exactly the ball is laid at a place.
+        frames_per_step: as the recipe's.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class DrawnBall:
         condition: Condition | None = None,
         holder_mm: float = _HOLDER_MM,
         spill_mm: float = 0.0,
-        frames_per_step: int = 3,
+        frames_per_step: int = 1,
     ) -> None:
         self._gel = Gel(mm_per_px=mm_per_px)
         self._fruit, self._holder_mm = draw_fruit(kind, seed), holder_mm

@@ -159,7 +159,9 @@ async def inspected(site, store, calibration):
                 asked = True
                 store.add_verification(verification(calibration, datetime.now(UTC)), {})
             elif state.boot and not reset:
-                reset = (await client.ask(Command(command=CommandName.RESET), CommandDone, deadline_s=40)).done
+                reset = (
+                    await client.ask(Command(command=CommandName.RESET, argument=0), CommandDone, deadline_s=40)
+                ).done
             await asyncio.sleep(0.1)
         assert asked
         site.ask(do="fruit", kind="strawberry", seed=2)

@@ -1,6 +1,7 @@
 """The shift's check: what passes, and each ill of the gel by its name and with a picture."""
 
 import asyncio
+import html
 
 import cv2
 import numpy as np
@@ -57,7 +58,7 @@ def test_each_ill_of_the_gel_is_named_and_shown(drawn_ball, draft, condition, il
     assert shown is not None
     assert shown.shape[0] == 640
     assert shown.std() > 5
-    page = files["report.html"].decode()
+    page = html.unescape(files["report.html"].decode())
     assert "FAIL" in page
     assert health[ill].found in page
     assert health[ill].remedy in page
@@ -80,7 +81,7 @@ def test_real_sensors_without_contact_are_not_called_torn_or_dirty(real_images):
 
 
 def test_a_mark_shows_where_the_dirt_lies(drawn_ball):
-    ball = drawn_ball(3)
+    ball = drawn_ball(1)
     golden = median_image(asyncio.run(ball.untouched(5)))
     ball.condition = Condition(dirt=1)
     [finding] = examine(median_image(asyncio.run(ball.untouched(5))), golden, 0.75)
