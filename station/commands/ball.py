@@ -73,7 +73,7 @@ async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncI
                 f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
             )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
-        yield BallBench(Cell(camera, gripper, arm), recipe, lay), unit, recipe
+        yield BallBench(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
 
 
 async def _answered(request: str) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from station.calibration.bench import Place, Pressed
 from station.devices.camera.interface import Image
 from station.devices.gripper.interface import ObjectState
-from station.service.grip import Cell, Grip, GripError
+from station.service.grip import FRAME_DEADLINE_S, Cell, Grip, GripError
 from station.settings.recipe import Recipe
 
 _OPEN_WITHIN_MM = 2.0
@@ -18,11 +18,14 @@ class BallBench:
         cell: the devices, opened.
         recipe: the ball's.
         lay: has the ball laid at a place; returns once it lies there.
+        patience: factor on the longest wait for a frame.
     """
 
-    def __init__(self, cell: Cell, recipe: Recipe, lay: Callable[[Place], Awaitable[None]]) -> None:
+    def __init__(
+        self, cell: Cell, recipe: Recipe, lay: Callable[[Place], Awaitable[None]], patience: float = 1.0
+    ) -> None:
         self._cell, self._lay = cell, lay
-        self._grip = Grip(cell, recipe)
+        self._grip = Grip(cell, recipe, FRAME_DEADLINE_S * patience)
 
     async def untouched(self, number: int) -> Sequence[Image]:
         """Open the jaws, away from the nest where there is an arm, and take frames of the untouched gel.

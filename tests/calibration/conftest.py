@@ -105,7 +105,7 @@ def site(tmp_path: Path, unused_port: int) -> Iterator[Site]:
     host = f"127.78.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
     configuration = tmp_path / "station.yaml"
     configuration.write_text(
-        "home: home\nservice: {bench: true}\n"
+        "home: home\nservice: {bench: true, patience: 20.0}\n"
         f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 3.0}}\n"
         f"camera: {{oldest_s: 2.0, open_deadline_s: 20.0, twin: {{port: {unused_port}}}}}\n"
     )
