@@ -96,7 +96,7 @@ class Site:
         return [sys.executable, "-m", "station", *map(str, arguments), "--config", str(self.configuration)]
 
     def station(self, *arguments: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(self.command(*arguments), capture_output=True, text=True, timeout=110, check=False)
+        return subprocess.run(self.command(*arguments), capture_output=True, text=True, timeout=280, check=False)
 
 
 @pytest.fixture
