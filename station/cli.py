@@ -21,6 +21,7 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
+    "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
     "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
@@ -33,6 +34,7 @@ COMMANDS = {
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
+    "verify": Entry("station.commands.verify:verify", "Verify the sensor with the ball, at the start of a shift."),
 }
 
 

@@ -13,6 +13,7 @@ from station.analysis.output import OutputFolder, flag_names
 from station.analysis.pictures import outlined, sheet, stacked, thumbnail
 from station.analysis.report import Report, ReportRow, data_uri, render
 from station.analysis.sources import Source
+from station.calibration.model import Calibration
 from station.errors import BadInputError
 from station.inspection.curve import Reading, area_curve
 from station.inspection.monotone import wrong_frames
@@ -42,6 +43,8 @@ class Request:
     out: Path
     stages: bool
     jobs: int
+    calibration: Calibration | None = None
+    """Of the unit that took the images; None where it is not known."""
 
 
 @dataclass(slots=True)
@@ -82,7 +85,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     _check_widths(request)
     references = [decoded.image for decoded in request.references]
     shape = references[0].shape
-    scale = Scale.typical(shape[0], shape[1])
+    scale = _scale(request.calibration, shape[0], shape[1])
     gathered = _Gathered()
     refused: list[Refused] = []
     with OutputFolder(request.out) as output:
@@ -206,9 +209,19 @@ def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
     return replace(row, closing_mm=closing_mm, flags=flags)
 
 
+def _scale(calibration: Calibration | None, height_px: int, width_px: int) -> Scale:
+    """The scale of images of the whole field, by the unit's calibration or as is typical."""
+    if calibration is None:
+        return Scale.typical(height_px, width_px)
+    smaller = max(calibration.height_px, calibration.width_px) / max(height_px, width_px)
+    return Scale(calibration.mm_per_px * smaller, calibration.scale_uncertainty)
+
+
 def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
     count = len(request.references)
     converted = sorted({text for decoded in request.references for text in decoded.conversions})
+    known = request.calibration
+    whose = "typical" if known is None else f"calibration {known.id} of {known.serial}"
     parameters = request.segmentation.paper if request.segmentation.method == "paper" else request.segmentation.robust
     return [
         ("Method", request.segmentation.method),
@@ -218,7 +231,7 @@ def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
             "Reference",
             "; ".join([request.reference_name + (f", median of {count} images" if count > 1 else ""), *converted]),
         ),
-        ("Scale", f"{scale.mm_per_px:.4f} mm per pixel, typical: areas in mm² are good to {2 * scale.uncertainty:.0%}"),
+        ("Scale", f"{scale.mm_per_px:.4f} mm per pixel, {whose}: areas in mm² are good to {2 * scale.uncertainty:.0%}"),
         ("Program", f"fruit-station {version('fruit-station')}"),
     ]
 

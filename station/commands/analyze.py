@@ -11,6 +11,9 @@ import cv2
 from station.analysis.analysis import Request, analyze
 from station.analysis.sources import list_sources, load_references
 from station.analysis.widths import read_widths
+from station.calibration.errors import UnknownCalibrationError
+from station.calibration.model import Calibration
+from station.calibration.store import CalibrationStore
 from station.errors import BadInputError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import find_recipe
@@ -24,6 +27,7 @@ PLACE = click.Path(path_type=Path, readable=False)
 @click.option("--recipe", "recipe_name", metavar="NAME", help="Recipe, by name or file, whose segmentation is used.")
 @click.option("--method", type=click.Choice(["paper", "robust"]), help="Method, in place of the recipe's.")
 @click.option("--widths", type=PLACE, help="CSV image,width_mm: adds closing and the area curve.")
+@click.option("--unit", metavar="SERIAL", help="The sensor that took the images, whose calibration gives the scale.")
 @click.option("--stages", is_flag=True, help="Write each stage's picture as well.")
 @click.option(
     "--jobs",
@@ -39,6 +43,7 @@ def analyze_command(
     recipe_name: str | None,
     method: str | None,
     widths: Path | None,
+    unit: str | None,
     stages: bool,  # noqa: FBT001 (click passes arguments by name)
     jobs: int,
     out: Path,
@@ -55,6 +60,7 @@ def analyze_command(
     segmentation = recipe.segmentation if recipe else Segmentation()
     if method:
         segmentation = segmentation.model_copy(update={"method": method})
+    calibration = _calibration(site.home, unit) if unit is not None else None
     references = load_references(reference)
     for conversion in sorted({text for decoded in references for text in decoded.conversions}):
         click.echo(f"station: reference converted: {conversion}", err=True)
@@ -72,6 +78,7 @@ def analyze_command(
         out=out,
         stages=stages,
         jobs=jobs,
+        calibration=calibration,
     )
     with click.progressbar(
         length=len(listing.sources), label="measuring", file=sys.stderr, hidden=not sys.stderr.isatty()
@@ -85,3 +92,12 @@ def analyze_command(
         click.echo(f"{outcome.measured} images measured; report: {out / 'report.html'}")
     if outcome.refused:
         raise BadInputError(f"{len(outcome.refused)} of {len(listing.sources)} images could not be measured")
+
+
+def _calibration(home: Path, serial: str) -> Calibration:
+    store = CalibrationStore(home)
+    calibration = store.current(serial)
+    if calibration is None:
+        known = ", ".join(store.serials()) or "none yet"
+        raise UnknownCalibrationError(f"--unit {serial}: it has no calibration in {home}; calibrated are: {known}")
+    return calibration

@@ -55,6 +55,7 @@ class AlarmId(StrEnum):
     MANY_NO_RESULT = "many_no_result"
     REJECT_RATE = "reject_rate"
     DEADLINE_MISSED = "deadline_missed"
+    CALIBRATION_OLD = "calibration_old"
 
 
 class Provocation(NamedTuple):
@@ -328,6 +329,14 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         "Its outcome is NO_RESULT, and the line diverts the fruit.",
         "Look at which phase was slow; check the load of the machine and the arm's speed slider.",
         (P("arm", "slow"), P("gripper", "delayed")),
+    ),
+    AlarmId.CALIBRATION_OLD: AlarmRow(
+        31,
+        Priority.LOW,
+        "The sensor's calibration is older than allowed, or its last verification failed.",
+        "Areas in mm² may be wrong; where verification is demanded, triggers are refused.",
+        "At the next pause stop the station, run `station verify`, and where it fails `station calibrate`.",
+        (P("camera", "gel_worn"),),
     ),
 }
 """Every alarm, in the order of its number."""

@@ -49,7 +49,7 @@ class BareGrip:
                 or the arm could not be brought back.
             StationError: a device's own fault; by then the gripper is open and the arm home where they could be.
         """
-        async with _kept_healthy(self._cell.arm):
+        async with kept_healthy(self._cell.arm):
             try:
                 await self._press()
             except (StationError, asyncio.CancelledError) as error:
@@ -85,8 +85,12 @@ class BareGrip:
 
 
 @contextlib.asynccontextmanager
-async def _kept_healthy(arm: Arm | None) -> AsyncIterator[None]:
-    """Renew the arm's lease for as long as this program's loop runs: if it hangs, the controller stops the arm."""
+async def kept_healthy(arm: Arm | None) -> AsyncIterator[None]:
+    """Renew the arm's lease for as long as this program's loop runs: if it hangs, the controller stops the arm.
+
+    Args:
+        arm: None on a bench, where there is nothing to renew.
+    """
 
     async def renew(arm: Arm) -> None:
         while True:

@@ -27,6 +27,8 @@ class Inspection:
     active: Active
     limits: Deadlines
     mm_per_px: float
+    calibration: str
+    """In words, for the record."""
     began_s: float = field(default_factory=time.monotonic)
     sequence: int | None = None
     """Once it is durable."""
@@ -106,7 +108,7 @@ class Inspection:
             duration_ms=round(1000 * (time.monotonic() - self.began_s)),
             curve=tuple(self._point(number, seen, onset_mm) for number, seen in enumerate(self.seen)),
             phases_s=dict(self.phases_s),
-            measures={**self.measures, "onset_mm": onset_mm},
+            measures={**self.measures, "onset_mm": onset_mm, "mm_per_px": self.mm_per_px},
             images=self._images(),
         )
 

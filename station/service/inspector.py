@@ -2,6 +2,7 @@
 
 import asyncio
 
+from station.calibration.gate import gated
 from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
@@ -9,6 +10,7 @@ from station.inspection.cycle import REASONS, Event
 from station.inspection.judge import early_stop, judge
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
+from station.service.calibrated import Calibrated
 from station.service.crew import CAMERA, GRIPPER, Crew
 from station.service.eye import Eye, Seen
 from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError
@@ -30,10 +32,19 @@ class Inspector:
         settings: placing, and how old a reference may be.
         alarms: told of a reference that cannot serve.
         metrics: counts the frames.
+        calibrated: how noisy the sensor is.
     """
 
-    def __init__(self, crew: Crew, eye: Eye, settings: ServiceSettings, alarms: AlarmDesk, metrics: Metrics) -> None:
-        self._crew, self._eye, self._settings = crew, eye, settings
+    def __init__(
+        self,
+        crew: Crew,
+        eye: Eye,
+        settings: ServiceSettings,
+        alarms: AlarmDesk,
+        metrics: Metrics,
+        calibrated: Calibrated,
+    ) -> None:
+        self._crew, self._eye, self._settings, self._calibrated = crew, eye, settings, calibrated
         self._alarms, self._metrics = alarms, metrics
         self._reached: MoveResult | None = None
         self._glanced: Seen | None = None
@@ -82,7 +93,8 @@ class Inspector:
     async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
         """Whether the frames may serve as the reference; tells why not."""
         try:
-            image, looks = await self._eye.take_reference(frames, now.active.recipe.segmentation)
+            segmentation = gated(now.active.recipe.segmentation, self._calibrated.gate_factor)
+            image, looks = await self._eye.take_reference(frames, segmentation)
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, str(error))
             self._alarms.raise_(error.alarm, str(error))

@@ -78,7 +78,8 @@ class Ledger:
         """
         if now.sequence is None:
             raise RuntimeError("an inspection without a number is recorded")
-        signed = replace(now.record(), devices=self._crew.names, versions=self._versions)
+        devices = {**self._crew.names, "calibration": now.calibration}
+        signed = replace(now.record(), devices=devices, versions=self._versions)
         try:
             now.standing = await self.records.conclude(now.sequence, signed)
         except RecordsError as error:

@@ -6,7 +6,7 @@ inspection is counted when the PLC is given its outcome, once, so that the count
 
 import platform
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from prometheus_client import (
@@ -49,6 +49,7 @@ class Metrics:
         self._active: set[tuple[str, str]] = set()
         self._reference: tuple[float, float] | None = None
         self._status: Callable[[], Status] | None = None
+        self._figures: Callable[[], Sequence[float | None]] | None = None
         buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
         self._made: dict[str, Any] = {
             key: _made(row, buckets, self.registry) for key, row in TABLE.items() if not row.at_scrape
@@ -122,6 +123,10 @@ class Metrics:
         """Ask the records at each scrape: `Records.status`."""
         self._status = status
 
+    def watch_calibration(self, figures: Callable[[], Sequence[float | None]]) -> None:
+        """Ask at each scrape for the calibration's age, the verification's age, and the drift: `Calibrated.figures`."""
+        self._figures = figures
+
     def exposition(self, accept: str = "") -> tuple[bytes, str]:
         """Everything, and the content type.
 
@@ -157,6 +162,11 @@ class Metrics:
             taken_s, drift_grey_levels = self._reference
             yield GaugeMetricFamily(TABLE["reference_age"].name, TABLE["reference_age"].help, now_s - taken_s)
             yield GaugeMetricFamily(TABLE["reference_drift"].name, TABLE["reference_drift"].help, drift_grey_levels)
+        if self._figures is not None:
+            shown = zip(("calibration_age", "verification_age", "calibration_drift"), self._figures(), strict=True)
+            for key, value in shown:
+                if value is not None:
+                    yield GaugeMetricFamily(TABLE[key].name, TABLE[key].help, value)
         if self._status is not None:
             yield from _of_records(self._status())
 

@@ -76,6 +76,23 @@ TABLE: dict[str, Row] = {
         "Difference of the reference from the golden reference",
         at_scrape=True,
     ),
+    "calibration_age": Row(
+        "station_calibration_age_seconds",
+        "gauge",
+        (),
+        "Age of the sensor's calibration",
+        at_scrape=True,
+    ),
+    "verification_age": Row(
+        "station_verification_age_seconds", "gauge", (), "Time since the last verification against it", at_scrape=True
+    ),
+    "calibration_drift": Row(
+        "station_calibration_drift_ratio",
+        "gauge",
+        (),
+        "Relative change of the ball's area since the calibration, by the last verification",
+        at_scrape=True,
+    ),
     "refused": Row("station_triggers_refused", "counter", ("reason",), "Triggers that were not accepted"),
     "unexpected": Row("station_unexpected_events", "counter", (), "Events that the cycle's table does not list"),
     "link_age": Row(

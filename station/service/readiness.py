@@ -2,6 +2,7 @@
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
+from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.health import Dependency, Liveness, Readiness
 from station.service.orders import Orders
@@ -23,12 +24,20 @@ class Gate:
         orders: the mode, and a recipe's change under way.
         book: the recipes there are.
         liveness: what has to make progress.
+        calibrated: whether the sensor is verified where that is demanded.
     """
 
     def __init__(
-        self, boot: str, service: Service, crew: Crew, orders: Orders, book: RecipeBook, liveness: Liveness
+        self,
+        boot: str,
+        service: Service,
+        crew: Crew,
+        orders: Orders,
+        book: RecipeBook,
+        liveness: Liveness,
+        calibrated: Calibrated,
     ) -> None:
-        self._boot = boot
+        self._boot, self._calibrated = boot, calibrated
         self._service, self._crew, self._orders = service, crew, orders
         self._book, self._liveness = book, liveness
 
@@ -51,6 +60,8 @@ class Gate:
         if service.active is None:
             numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
             return Refusal.NOT_READY, f"No recipe is active: choose one by its number ({numbers})."
+        if why := self._calibrated.not_verified():
+            return Refusal.NOT_READY, why
         if self._orders.mode != PRODUCTION:
             return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
         return None, ""

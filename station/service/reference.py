@@ -1,6 +1,8 @@
 """Whether a picture of the untouched gel may serve as the reference that everything is measured against."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -50,17 +52,23 @@ class Prepared:
     shape: tuple[int, ...]
     sharpness: float
     method: Method
+    renewal: str
+    """How a person gets another one."""
 
 
 class Golden:
     """The golden reference: the gel as it was when a person last saw that it was clean, kept in the home folder.
 
-    The first reference that is taken becomes it. After a change of gel, or once dirt was wiped off, its file is
-    removed by a person and the next reference takes its place.
+    A calibrated sensor's is its calibration's. Else the first reference that is taken becomes it; after a change of
+    gel, or once dirt was wiped off, its file is removed by a person and the next reference takes its place.
+
+    Args:
+        kept: the home folder.
+        calibrated: tells the file of the calibration's; None where there is none.
     """
 
-    def __init__(self, kept: Kept) -> None:
-        self._kept = kept
+    def __init__(self, kept: Kept, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+        self._kept, self._calibrated = kept, calibrated
         self._prepared: tuple[bytes, Segmentation, Prepared] | None = None
 
     def prepared(self, segmentation: Segmentation) -> Prepared | None:
@@ -69,7 +77,7 @@ class Golden:
         Args:
             segmentation: the recipe's method, which looks for a contact between it and another reference.
         """
-        data = self._kept.read(GOLDEN)
+        data, renewal = self._read()
         if data is None:
             return None
         if self._prepared is None or self._prepared[:2] != (data, segmentation):
@@ -80,7 +88,7 @@ class Golden:
             self._prepared = (
                 data,
                 segmentation,
-                Prepared(image.shape, sharpness(image), make_method([image], segmentation)),
+                Prepared(image.shape, sharpness(image), make_method([image], segmentation), renewal),
             )
         return self._prepared[2]
 
@@ -90,8 +98,15 @@ class Golden:
         Args:
             image: shape (height, width, 3), dtype uint8, BGR.
         """
-        if self._kept.read(GOLDEN) is None:
+        if self._read()[0] is None:
             self._kept.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+
+    def _read(self) -> tuple[bytes | None, str]:
+        """Its file's content, and how a person gets another one."""
+        calibrated = self._calibrated()
+        if calibrated is not None and (data := self._kept.read(str(calibrated))) is not None:
+            return data, "calibrate"
+        return self._kept.read(GOLDEN), f"remove {GOLDEN} from the home folder"
 
 
 def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) -> Looks:
@@ -128,13 +143,13 @@ def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) 
         raise BadReferenceError(
             AlarmId.CAMERA_LED_DEAD,
             f"reference: its light differs from the golden reference's by {drift:.0f} grey levels: look at the "
-            f"sensor's LEDs; after a change of gel or sensor remove {GOLDEN} from the home folder",
+            f"sensor's LEDs; after a change of gel or sensor {golden.renewal}",
         )
     if contact.found if contact.gate is None else contact.gate > settings.most_change:
         raise BadReferenceError(
             AlarmId.REFERENCE_BAD,
             "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
-            f"gel; if the gel was changed, remove {GOLDEN} from the home folder",
+            f"gel; if the gel was changed, {golden.renewal}",
         )
     return Looks(detail, saturated, drift)
 

@@ -15,6 +15,7 @@ from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
+from station.service.calibrated import Calibrated
 from station.service.conductor import Conductor, Happened, Work, event_of
 from station.service.crew import Crew
 from station.service.health import Liveness
@@ -45,6 +46,7 @@ class Service:
         metrics: counts.
         liveness: fed with the cycle's progress.
         versions: of the programs, for the records.
+        calibrated: the scale that areas are told by.
     """
 
     def __init__(
@@ -57,8 +59,9 @@ class Service:
         metrics: Metrics,
         liveness: Liveness,
         versions: Mapping[str, str],
+        calibrated: Calibrated,
     ) -> None:
-        self._settings, self._mm_per_px = configuration.service, configuration.camera.mm_per_px
+        self._settings, self._calibrated = configuration.service, calibrated
         self._crew, self._inspector = crew, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
         self.conductor = Conductor(self)
@@ -104,7 +107,8 @@ class Service:
                 self.active.snapshot,
                 self._crew.simulated,
             )
-            now = Inspection(trigger, self.active, self.pacing.limits(self.active.recipe), self._mm_per_px)
+            limits = self.pacing.limits(self.active.recipe)
+            now = Inspection(trigger, self.active, limits, *self._calibrated.in_force)
             self._pending = Pending(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()

@@ -13,6 +13,7 @@ from station.inspection.states import STATES
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
+from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.eye import Eye
 from station.service.health import HealthServer, Liveness
@@ -76,7 +77,9 @@ class Station:
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
         kept, alarms = Kept(configuration.home), AlarmDesk(metrics)
-        eye = Eye(Golden(kept), settings.reference)
+        calibrated = Calibrated(configuration, lambda: crew.cell.camera.description.serial)
+        metrics.watch_calibration(lambda: calibrated.figures)
+        eye = Eye(Golden(kept, calibrated.golden), settings.reference)
         stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
@@ -92,8 +95,10 @@ class Station:
                 metrics.heard(name)
 
         crew = Crew(configuration, device_changed, progress)
-        inspector = Inspector(crew, eye, settings, alarms, metrics)
-        self.service = service = Service(configuration, records, crew, inspector, alarms, metrics, liveness, versions)
+        inspector = Inspector(crew, eye, settings, alarms, metrics, calibrated)
+        self.service = service = Service(
+            configuration, records, crew, inspector, alarms, metrics, liveness, versions, calibrated
+        )
         try:
             await records.reopen()
             await alarms.recall(records)
@@ -103,7 +108,7 @@ class Station:
         await asyncio.to_thread(book.read)
         service.active = book.last_active()
         orders = Orders(service, crew, book, metrics)
-        gate = Gate(self.boot, service, crew, orders, book, liveness)
+        gate = Gate(self.boot, service, crew, orders, book, liveness, calibrated)
         upkeep = Upkeep(
             service,
             crew,
@@ -112,6 +117,7 @@ class Station:
             book,
             metrics,
             liveness,
+            calibrated,
             broken=self._broken,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,

@@ -10,6 +10,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.records.errors import RecordsError
+from station.service.calibrated import Calibrated
 from station.service.crew import GRIPPER, Crew
 from station.service.health import Liveness
 from station.service.metrics import Metrics
@@ -39,6 +40,7 @@ class Upkeep:
         book: the recipes.
         metrics: shows what is ready.
         liveness: fed with this task's progress.
+        calibrated: how old the sensor's calibration is.
         broken: what was wrong with the configuration at the start; empty for nothing.
         reserve_mb: space on the disk below which nothing is inspected.
         longest_pause_s: between two tries to bring something back.
@@ -53,13 +55,14 @@ class Upkeep:
         book: RecipeBook,
         metrics: Metrics,
         liveness: Liveness,
+        calibrated: Calibrated,
         *,
         broken: str,
         reserve_mb: int,
         longest_pause_s: float,
     ) -> None:
         self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
-        self._metrics, self._liveness = metrics, liveness
+        self._metrics, self._liveness, self._calibrated = metrics, liveness, calibrated
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
         self._told_ready_s = 0.0
         self._alarms_at_s = 0.0
@@ -139,6 +142,7 @@ class Upkeep:
         alarms.show(
             AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
         )
+        alarms.show(AlarmId.CALIBRATION_OLD, self._calibrated.trouble())
         self._orders.show_line()
         self._show_restarts()
         self._show_clock()

@@ -9,6 +9,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from station.settings.arm import ArmSettings
+from station.settings.calibration import CalibrationSettings
 from station.settings.camera import CameraSettings
 from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
@@ -89,6 +90,9 @@ class Configuration(Settings):
     arm: ArmSettings = setting(ArmSettings(), title="Arm", description="The UR10e and its poses.")
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
+    calibration: CalibrationSettings = setting(
+        CalibrationSettings(), title="Calibration", description="The ball, and what a calibration is good for."
+    )
     can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
         RecordsSettings(), title="Records", description="What the station keeps of its inspections."

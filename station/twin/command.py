@@ -16,6 +16,7 @@ from station.settings.configuration import load_configuration
 from station.twin.console import ask
 from station.twin.digit.press import render_press
 from station.twin.fruit import Kind
+from station.twin.gel import MM_PER_PX
 from station.twin.process import CONSOLE_PORT, LOOPBACK, Twin, TwinOptions, run
 
 FRUIT = click.Choice([kind.value for kind in Kind])
@@ -29,6 +30,13 @@ PORT = click.IntRange(0, 65535)
 @click.group("twin", invoke_without_command=True)
 @click.option("--fruit", type=FRUIT, default=Kind.STRAWBERRY.value, show_default=True, help="What lies in the nest.")
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit, and the sensor's noise.")
+@click.option(
+    "--mm-per-px",
+    type=click.FloatRange(0.02, 0.04),
+    default=MM_PER_PX,
+    show_default=True,
+    help="The sensor's scale.",
+)
 @click.option("--bench", is_flag=True, help="No arm: the fruit is always between the fingers.")
 @click.option("--polyscope", type=click.Choice(["5.22", "5.25"]), default="5.22", show_default=True, help="Version.")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="Listen where this station.yaml looks.")
@@ -38,6 +46,7 @@ def twin(
     context: click.Context,
     fruit: str,
     seed: int,
+    mm_per_px: float,
     bench: bool,  # noqa: FBT001 (click passes arguments by name)
     polyscope: Literal["5.22", "5.25"],
     config: Path | None,
@@ -50,6 +59,7 @@ def twin(
     options = TwinOptions(
         fruit=Kind(fruit),
         seed=seed,
+        mm_per_px=mm_per_px,
         bench=bench,
         arm=site.arm,
         gripper=site.gripper,
@@ -104,10 +114,13 @@ def fault_command(device: str | None, fault: str | None, amount: float, clear: b
 @click.argument("fruit", type=FRUIT)
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit of its kind.")
 @click.option("--bruised", is_flag=True, help="A soft one.")
+@click.option("--x-mm", type=float, default=0.0, help="Right of the gel's middle, as the image shows it.")
+@click.option("--y-mm", type=float, default=0.0, help="Below it.")
 @CONSOLE
-def lay(fruit: str, seed: int, bruised: bool, console: int) -> None:  # noqa: FBT001
+def lay(fruit: str, seed: int, bruised: bool, x_mm: float, y_mm: float, console: int) -> None:  # noqa: FBT001
     """Lay another fruit into the running twin's nest."""
-    click.echo(ask(LOOPBACK, console, {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised}))
+    request = {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised, "x_mm": x_mm, "y_mm": y_mm}
+    click.echo(ask(LOOPBACK, console, request))
 
 
 @twin.command("press")

@@ -8,10 +8,8 @@ import numpy.typing as npt
 
 from station.twin.fruit import Fruit
 from station.twin.gel import (
-    GRID_MM,
     GRID_SHAPE,
     GRID_STEP,
-    MM_PER_PX,
     SENSOR_SHAPE,
     FloatArray,
     Gel,
@@ -49,6 +47,7 @@ class Footprint:
     """mm, shape (320, 240)."""
     true_mask: Mask
     """The contact inside its edge, shape (640, 480), 0 or 255."""
+    mm_per_px: float
 
     @property
     def true_area_px(self) -> int:
@@ -58,7 +57,7 @@ class Footprint:
     @property
     def true_area_mm2(self) -> float:
         """The contact's area."""
-        return self.true_area_px * MM_PER_PX**2
+        return self.true_area_px * self.mm_per_px**2
 
 
 class FruitOnGel:
@@ -68,17 +67,18 @@ class FruitOnGel:
         self._fruit, self._gel = fruit, gel
         rows, columns = np.indices(GRID_SHAPE, dtype=np.float32)
         centre = (GRID_STEP - 1) / 2
-        x_mm = (columns * GRID_STEP + centre - pose.x_px) * MM_PER_PX
-        y_mm = (rows * GRID_STEP + centre - pose.y_px) * MM_PER_PX
+        x_mm = (columns * GRID_STEP + centre - pose.x_px) * np.float32(gel.mm_per_px)
+        y_mm = (rows * GRID_STEP + centre - pose.y_px) * np.float32(gel.mm_per_px)
         turn = np.deg2rad(pose.turn_deg)
         across = (x_mm * np.cos(turn) + y_mm * np.sin(turn)).astype(np.float32)
         along = (y_mm * np.cos(turn) - x_mm * np.sin(turn)).astype(np.float32)
         lean = np.tan(np.deg2rad(pose.tilt_deg))
         shape = fruit.gap_mm(across, along) + lean * x_mm + 0.5 * lean**2 * fruit.surface.radius_mm
         texture = fruit.texture_mm(across, along)
-        coarse = cv2.GaussianBlur(texture, (0, 0), _BRIDGE_MM / GRID_MM)
-        wide = cv2.GaussianBlur(texture, (0, 0), _LEVELLED_MM / GRID_MM)
-        self._relief = np.asarray(cv2.GaussianBlur(texture, (0, 0), _SKIN_MM / GRID_MM) - wide, np.float32)
+        grid_mm = gel.mm_per_px * GRID_STEP
+        coarse = cv2.GaussianBlur(texture, (0, 0), _BRIDGE_MM / grid_mm)
+        wide = cv2.GaussianBlur(texture, (0, 0), _LEVELLED_MM / grid_mm)
+        self._relief = np.asarray(cv2.GaussianBlur(texture, (0, 0), _SKIN_MM / grid_mm) - wide, np.float32)
         self._gap = np.maximum(0.0, shape + _BRIDGED * (coarse - wide)).astype(np.float32)
         height, width = SENSOR_SHAPE
         self._fine_gap = np.asarray(cv2.resize(self._gap, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
@@ -91,7 +91,8 @@ class FruitOnGel:
         """
         approach = squeezed.approach_mm
         if approach <= 0:
-            return Footprint(np.zeros(GRID_SHAPE, np.float32), np.zeros(SENSOR_SHAPE, np.uint8))
+            untouched = np.zeros(GRID_SHAPE, np.float32), np.zeros(SENSOR_SHAPE, np.uint8)
+            return Footprint(*untouched, self._gel.mm_per_px)
         surface = self._fruit.surface
         radius_mm = surface.radius_mm
         contact_radius_mm = float(np.sqrt(approach * radius_mm))
@@ -102,7 +103,8 @@ class FruitOnGel:
         dent = dent * np.float32(squeezed.gel_share) - np.float32(imprint) * self._relief * within
         edge_mm = visible_edge_mm(contact_radius_mm, squeezed.gel_share * contact_radius_mm / radius_mm)
         limit_mm = 0.5 * approach * (edge_mm / contact_radius_mm) ** 2
-        return Footprint(np.maximum(dent, 0.0).astype(np.float32), _filled(self._fine_gap < limit_mm))
+        inside = _filled(self._fine_gap < limit_mm)
+        return Footprint(np.maximum(dent, 0.0).astype(np.float32), inside, self._gel.mm_per_px)
 
 
 def _filled(inside: npt.NDArray[np.bool_]) -> Mask:

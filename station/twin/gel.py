@@ -39,6 +39,8 @@ class Gel:
     poisson: float = 0.48
     skirt_reach_mm: float = 4.0
     """Fits the presses of the 6 mm ball best (2.3 to 6 tried)."""
+    mm_per_px: float = MM_PER_PX
+    """How large the sensor's lens shows it; units differ."""
 
     def stiffening(self, approach_mm: npt.ArrayLike, radius_mm: float) -> npt.NDArray[np.float64]:
         """How many times stiffer than a half-space the layer is at an approach.

@@ -18,10 +18,12 @@ from station.twin.can.faults import line_faults
 from station.twin.can.line import LineNodes
 from station.twin.clock import Clock, SteadyClock
 from station.twin.console import Action, ConsoleServer
+from station.twin.contact import Pose
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.faults import FaultBoard
 from station.twin.fruit import Kind, draw_fruit
+from station.twin.gel import MM_PER_PX, Gel
 from station.twin.robotiq.faults import gripper_faults
 from station.twin.robotiq.modbus import RtuOverTcpServer
 from station.twin.robotiq.model import RobotiqGripper
@@ -33,6 +35,8 @@ from station.twin.world import World
 LOOPBACK = "127.0.0.1"
 CONSOLE_PORT = 49211
 _AT_NEST_MM = 10.0
+_FURTHEST_MM = 6.0
+"""From the gel's middle, where a fruit may be laid; the gel ends there."""
 _BALL_HOLDER_MM = 18.0
 """The paper (Computers and Electronics in Agriculture 235 (2025) 110397) sees the 24 mm ball from 42 mm of width on: we
 take the rest for what holds it."""
@@ -51,6 +55,8 @@ class TwinOptions:
     fruit: Kind = Kind.STRAWBERRY
     seed: int = 1
     """Of the fruit, and of the sensor's noise and drift."""
+    mm_per_px: float = MM_PER_PX
+    """The sensor's scale."""
     bench: bool = False
     """No arm: the fingers are always where the fruit lies."""
     arm: ArmSettings = field(default_factory=ArmSettings)
@@ -76,12 +82,13 @@ class Twin:
         """
         clock = clock or SteadyClock()
         self.boards: dict[str, FaultBoard] = {"camera": digit_faults(), "gripper": gripper_faults()}
-        self.world = World(clock)
+        self.world = World(clock, Gel(mm_per_px=options.mm_per_px))
+        self._mm_per_px = options.mm_per_px
         self.gripper = RobotiqGripper(clock, self.boards["gripper"], self.world)
         self.world.opening_mm = lambda: self.gripper.opening_mm(clock.now_s())
         self.camera = DigitCameraServer(
             self.world,
-            DigitSensor(options.seed),
+            DigitSensor(options.seed, mm_per_px=options.mm_per_px),
             clock,
             self.boards["camera"],
             host=options.camera.host,
@@ -144,8 +151,13 @@ class Twin:
         bruised = request.get("bruised", False)
         if not isinstance(bruised, bool):
             raise ValueError(f"bruised: expected true or false, found {bruised!r}")  # noqa: TRY004 (one error for all)
+        places = [request.get(axis, 0.0) for axis in ("x_mm", "y_mm")]
+        if not all(isinstance(mm, int | float) and abs(mm) <= _FURTHEST_MM for mm in places):
+            raise ValueError(f"x_mm, y_mm: expected numbers from -{_FURTHEST_MM:g} to {_FURTHEST_MM:g}, found {places}")
+        x_px, y_px = (middle + mm / self._mm_per_px for middle, mm in zip((240.0, 320.0), places, strict=True))
         fruit = draw_fruit(Kind(kind), seed, bruised=bruised)
-        self.world.place(fruit, holder_mm=_BALL_HOLDER_MM if kind == Kind.RUBBER_BALL else 0.0)
+        holder_mm = _BALL_HOLDER_MM if kind == Kind.RUBBER_BALL else 0.0
+        self.world.place(fruit, Pose(x_px, y_px), holder_mm)
         return f"{kind} {seed}, {fruit.width_mm:.1f} mm wide"
 
     def _remove(self, _request: Mapping[str, Any]) -> None:

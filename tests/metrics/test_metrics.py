@@ -45,6 +45,7 @@ def everything_told(metrics, outcome):
     metrics.ready(ready=True)
     status = Status(9, {"disk_full": 2}, 1, 2, {"kept": 5, "dropped": 1}, 1000, 2000, 3000, 0.5, "")
     metrics.watch_records(lambda: status)
+    metrics.watch_calibration(lambda: (86_400.0, 60.0, -0.02))
 
 
 def test_everything_in_the_table_is_exposed_and_nothing_else(metrics, outcome):

@@ -165,7 +165,8 @@ class DigitCamera:
     @property
     def description(self) -> CameraDescription:
         """Which camera it is; portrait."""
-        return CameraDescription(f"DIGIT {self._serial}", _MODE[1], _MODE[0], self._settings.mm_per_px, _MODE[2])
+        scale = self._settings.mm_per_px
+        return CameraDescription(f"DIGIT {self._serial}", _MODE[1], _MODE[0], scale, _MODE[2], self._serial)
 
     async def open(self) -> None:
         """Find the sensor and wait for its first frame. Idempotent.

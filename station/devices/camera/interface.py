@@ -57,6 +57,8 @@ class CameraDescription:
     mm_per_px: float
     frames_per_s: float | None
     """None where frames come as fast as they are asked for."""
+    serial: str = ""
+    """Of the sensor, by which its calibration is found; empty for a recording."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,8 @@ class TwinCamera:
     def description(self) -> CameraDescription:
         """Which camera it is."""
         height, width = _SIZE
-        return CameraDescription(f"twin DIGIT at {self._where}", width, height, self._settings.mm_per_px, _FRAMES_PER_S)
+        name, serial = f"twin DIGIT at {self._where}", f"TWIN-{self._settings.twin.port}"
+        return CameraDescription(name, width, height, self._settings.mm_per_px, _FRAMES_PER_S, serial)
 
     async def open(self) -> None:
         """Connect and wait for the first frame. Idempotent.

@@ -53,15 +53,16 @@ def slope_basis(slope_x: FloatArray, slope_y: FloatArray) -> FloatArray:
     return np.stack([[ring * wave for wave in waves] for ring in rings]).astype(np.float32)
 
 
-def slopes(dent: FloatArray, smoothing_mm: float) -> tuple[FloatArray, FloatArray]:
+def slopes(dent: FloatArray, smoothing_mm: float, grid_mm: float = GRID_MM) -> tuple[FloatArray, FloatArray]:
     """The slopes of a dent after the gel's and the lens's smoothing.
 
     Args:
         dent: mm, on the grid of `station.twin.gel`, shape (320, 240).
         smoothing_mm: standard deviation of the smoothing.
+        grid_mm: from one of the grid's points to the next.
     """
-    smooth = cv2.GaussianBlur(dent, (0, 0), smoothing_mm / GRID_MM, borderType=cv2.BORDER_REPLICATE)
-    scale = 1.0 / (2.0 * GRID_MM)
+    smooth = cv2.GaussianBlur(dent, (0, 0), smoothing_mm / grid_mm, borderType=cv2.BORDER_REPLICATE)
+    scale = 1.0 / (2.0 * grid_mm)
     slope_x = cv2.filter2D(smooth, cv2.CV_32F, np.array([[-scale, 0.0, scale]]), borderType=cv2.BORDER_REPLICATE)
     slope_y = cv2.filter2D(smooth, cv2.CV_32F, np.array([[-scale], [0.0], [scale]]), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)
@@ -81,10 +82,11 @@ class Optics:
     Args:
         table: grey levels, shape (knots - 1, directions, places, 3), channels B, G, R.
         smoothing_mm: standard deviation of the smoothing by gel and lens.
+        grid_mm: from one of the dent's points to the next.
     """
 
-    def __init__(self, table: FloatArray, smoothing_mm: float) -> None:
-        self._smoothing_mm = smoothing_mm
+    def __init__(self, table: FloatArray, smoothing_mm: float, grid_mm: float = GRID_MM) -> None:
+        self._smoothing_mm, self._grid_mm = smoothing_mm, grid_mm
         axis = np.linspace(-_TABLE_REACH, _TABLE_REACH, _TABLE_SIDE, dtype=np.float32)
         slope_x, slope_y = np.meshgrid(axis, axis)
         basis = slope_basis(slope_x, slope_y)
@@ -103,7 +105,7 @@ class Optics:
             Shape (640, 480, 3), dtype float32, channels B, G, R; exactly 0 where the gel is flat.
         """
         coarse = np.zeros((*GRID_SHAPE, 3), np.float32)
-        slope_x, slope_y = slopes(dent, self._smoothing_mm)
+        slope_x, slope_y = slopes(dent, self._smoothing_mm, self._grid_mm)
         size = cv2.magnitude(slope_x, slope_y)
         steep = size > SLOPE_KNOTS[0]
         rows, columns = np.flatnonzero(steep.any(axis=1)), np.flatnonzero(steep.any(axis=0))

@@ -22,6 +22,8 @@ class PressOptions:
     """Factor on the noise of each frame."""
     drift: float = 1.0
     """Factor on the slow drift of the light."""
+    mm_per_px: float = MM_PER_PX
+    """The unit's scale."""
     references: int = 5
     """No-contact frames before the press."""
     step_s: float = 1.0
@@ -63,8 +65,8 @@ def render_press(
     options = options or PressOptions()
     if not isinstance(fruit, Fruit):
         fruit = draw_fruit(fruit, seed)
-    gel = Gel()
-    sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
+    gel = Gel(mm_per_px=options.mm_per_px)
+    sensor = DigitSensor(seed, options.unit, options.noise, options.drift, options.mm_per_px)
     contact = FruitOnGel(fruit, options.pose, gel)
     references = [sensor.frame(None, index / 30.0, options.condition) for index in range(options.references)]
     sequence = PressSequence(references, [], [], [], list(closings_mm), [], [])
@@ -74,7 +76,7 @@ def render_press(
         now_s = options.references / 30.0 + (step + 1) * options.step_s
         sequence.frames.append(sensor.frame(footprint.dent, now_s, options.condition))
         sequence.true_masks.append(footprint.true_mask)
-        sequence.true_areas_mm2.append(footprint.true_area_px * MM_PER_PX**2)
+        sequence.true_areas_mm2.append(footprint.true_area_mm2)
         sequence.widths_mm.append(fruit.width_mm - closing_mm)
         sequence.forces_n.append(squeezed.force_n)
     return sequence

@@ -11,7 +11,7 @@ from station.twin.digit.backgrounds import background
 from station.twin.digit.noise import Drift, FrameNoise
 from station.twin.digit.numbers import Array, Fitted
 from station.twin.digit.optics import Optics
-from station.twin.gel import SENSOR_SHAPE, FloatArray
+from station.twin.gel import GRID_STEP, MM_PER_PX, SENSOR_SHAPE, FloatArray
 
 Image = npt.NDArray[np.uint8]
 
@@ -21,6 +21,8 @@ _DEAD_LED_REST = 0.12
 _FOG_BLUR_PX = 12.0
 _FULL_LIGHT = (1.0, 1.0, 1.0)
 _GAIN_LIMITS = (0.5, 1.6)
+_WORN_LOSS = 0.6
+"""Of the light's change, where the coating is worn through."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,8 @@ class Condition:
     """0 clear to 1: the image blurs towards a grey veil."""
     dirt: int = 0
     """Crumbs stuck on the gel: they dent it all the time."""
+    wear: float = 0.0
+    """0 new to 1 worn through: the coating reflects less of the light that a dent turns, most in the middle."""
     light: tuple[float, float, float] = _FULL_LIGHT
     """Brightness of the LEDs, blue, green and red, over that of the fit."""
 
@@ -46,11 +50,19 @@ class DigitSensor:
         unit: seed of the unit's light; None for the unit that the optics were fitted on.
         noise: factor on the noise of each frame; 0 for none.
         drift: factor on the slow drift; 0 for none.
+        mm_per_px: the gel's, which the dents are drawn at.
     """
 
-    def __init__(self, seed: int, unit: int | None = None, noise: float = 1.0, drift: float = 1.0) -> None:
+    def __init__(
+        self,
+        seed: int,
+        unit: int | None = None,
+        noise: float = 1.0,
+        drift: float = 1.0,
+        mm_per_px: float = MM_PER_PX,
+    ) -> None:
         fitted = Fitted.load()
-        self._optics = Optics(fitted.table, fitted.smoothing_mm)
+        self._optics = Optics(fitted.table, fitted.smoothing_mm, mm_per_px * GRID_STEP)
         self._background = background(fitted, unit)
         levels = self._background.mean(axis=(0, 1)) / background(fitted, None).mean(axis=(0, 1))
         self._gain = np.clip(levels, *_GAIN_LIMITS).astype(np.float32)
@@ -99,7 +111,8 @@ class DigitSensor:
             dent = crumbs if dent is None else np.maximum(dent, crumbs)
         image = self._background.copy()
         if dent is not None:
-            image += self._optics.change(dent, self._gain)
+            change = self._optics.change(dent, self._gain)
+            image += change * _worn(condition.wear) if condition.wear else change
         if condition.torn:
             _tear(image, self._background, generator)
         if condition.light != _FULL_LIGHT:
@@ -120,6 +133,13 @@ def _crumbs(count: int, generator: np.random.Generator) -> FloatArray:
         centre = (int(generator.integers(columns)), int(generator.integers(rows)))
         cv2.circle(dent, centre, int(generator.integers(5, 14)), float(generator.uniform(0.1, 0.35)), cv2.FILLED)
     return np.asarray(cv2.GaussianBlur(dent, (0, 0), 3.0), np.float32)
+
+
+def _worn(wear: float) -> Array:
+    """What a worn coating leaves of the light's change, shape (640, 480, 1)."""
+    rows, columns = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in SENSOR_SHAPE)
+    from_middle = np.square(rows)[:, None] + np.square(columns)
+    return (1.0 - np.float32(_WORN_LOSS * wear) * np.exp(-from_middle / 2)).astype(np.float32)[..., None]
 
 
 def _tear(image: Array, background_image: Array, generator: np.random.Generator) -> None:

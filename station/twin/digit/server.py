@@ -19,7 +19,7 @@ from station.twin.gel import SENSOR_SHAPE
 from station.twin.world import Touch, World
 
 FRAMES_PER_S = 30.0
-GEL_FAULTS = ("gel_torn", "led_dead", "lens_fogged", "dirt")
+GEL_FAULTS = ("gel_torn", "gel_worn", "led_dead", "lens_fogged", "dirt")
 _REMEMBERED = 90
 _BRIGHTEST = 15
 _DEAD: dict[int, Colour] = {1: "red", 2: "green", 3: "blue"}
@@ -40,7 +40,7 @@ def digit_faults() -> FaultBoard:
     it is 1 or less; a frame a minute comes at least);
     `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
     each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs, 200 at most),
-    `lens_fogged` (amount: 0 to 1) and
+    `lens_fogged` and `gel_worn` (amount: 0 to 1) and
     `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
     `frame_saturated` spoil whole frames.
     """
@@ -180,6 +180,7 @@ class DigitCameraServer:
             if faults.active("led_dead")
             else None,
             torn=faults.active("gel_torn"),
+            wear=_within(0.0, faults.amount("gel_worn"), 1.0),
             fog=_within(0.0, faults.amount("lens_fogged"), 1.0),
             dirt=round(_within(0.0, faults.amount("dirt"), _MOST_CRUMBS)),
             light=(blue / _BRIGHTEST, green / _BRIGHTEST, red / _BRIGHTEST),

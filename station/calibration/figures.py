@@ -1,0 +1,173 @@
+"""The numbers of a calibration, from frames, steps and places."""
+
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from station.calibration.model import FieldMap, Levels, Noise, PlacePoint, PressPoint
+from station.vision.contact import Contact, Image
+
+FIELD_ROWS, FIELD_COLUMNS = 16, 12
+QUIET_GATE = 0.8
+"""What the gate's statistic may reach with nothing touching, after the unit's factor."""
+_CENTROID_PX = 1.0
+"""Two standard deviations of a centroid in repeats on the twin."""
+_STEP_MM = 0.5
+
+
+def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
+    """What frames of the untouched gel differ by.
+
+    Args:
+        frames: three or more of one shape (height, width, 3), dtype uint8.
+        untouched: what the method makes of frames with nothing touching.
+    """
+    gate = max((contact.gate or 0.0 for contact in untouched), default=0.0)
+    return Noise(
+        pixel_levels=_by_colour(pixel_noise(frames).mean(axis=(0, 1))),
+        gate=round(gate, 3),
+        gate_factor=round(max(1.0, gate / QUIET_GATE), 3),
+        drift_levels=round(max((contact.drift_levels or 0.0 for contact in untouched), default=0.0), 2),
+    )
+
+
+def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
+    """Standard deviation of each pixel from frame to frame, without what changes the whole frame.
+
+    Args:
+        frames: three or more of one shape (height, width, 3), dtype uint8.
+
+    Returns:
+        Shape (height, width, 3), dtype float32, grey levels.
+    """
+    total, squares = (np.zeros(frames[0].shape, np.float32) for _ in range(2))
+    first = frames[0].astype(np.float32)
+    for frame in frames:
+        level = frame.astype(np.float32) - first
+        level -= level.mean(axis=(0, 1))
+        total += level
+        squares += level**2
+    number = len(frames)
+    return np.sqrt(np.maximum(0.0, (squares - total**2 / number) / (number - 1)))
+
+
+def field_map(reference: Image, frames: Sequence[Image]) -> FieldMap:
+    """Light and noise over the field. One ball at a few places tells nothing of the scale in between.
+
+    Args:
+        reference: shape (height, width, 3), dtype uint8.
+        frames: the frames behind it.
+    """
+    size = (FIELD_COLUMNS, FIELD_ROWS)
+    light = cv2.resize(reference.astype(np.float32), size, interpolation=cv2.INTER_AREA).reshape(-1, 3)
+    spread = cv2.resize(pixel_noise(frames).max(axis=2), size, interpolation=cv2.INTER_AREA)
+    return FieldMap(
+        rows=FIELD_ROWS,
+        columns=FIELD_COLUMNS,
+        light_levels=tuple(_by_colour(cell) for cell in light),
+        noise_levels=tuple(round(float(level), 2) for level in spread.ravel()),
+    )
+
+
+class MeasuredScale(NamedTuple):
+    """A scale from known distances."""
+
+    mm_per_px: float
+    uncertainty: float
+    """Relative, about two standard deviations: the places' tolerance, the centroids' noise, and how far the distances
+    disagree, which takes in the lens's distortion."""
+
+
+def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale:
+    """The scale from how far the ball's contact moves in the image when the ball is moved a known way.
+
+    Distances are compared, so that it does not matter how the places' axes lie in the image.
+
+    Args:
+        places: two or more, no two in one place.
+        tolerance_mm: how well a distance between two places is known.
+    """
+    ways_mm, ways_px = [], []
+    for one, other in combinations(places, 2):
+        ways_mm.append(float(np.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm)))
+        ways_px.append(
+            float(np.hypot(one.centroid_x_px - other.centroid_x_px, one.centroid_y_px - other.centroid_y_px))
+        )
+    mm, px = np.asarray(ways_mm), np.maximum(np.asarray(ways_px), 1e-6)
+    mm_per_px = float(mm @ px / (px @ px))
+    disagreement = 2 * float(np.sqrt(np.mean((mm - mm_per_px * px) ** 2))) / float(mm.mean())
+    known = tolerance_mm / float(mm.mean())
+    seen = _CENTROID_PX * float(np.sqrt(2.0)) / float(px.mean())
+    return MeasuredScale(mm_per_px, float(np.sqrt(disagreement**2 + known**2 + seen**2)))
+
+
+def falls(curve: Sequence[PressPoint]) -> tuple[PressPoint, PressPoint] | None:
+    """The first two neighbours between which the area does not rise; None where it rises all the way.
+
+    Args:
+        curve: in order of closing, from the first contact on.
+    """
+    return next(((one, other) for one, other in pairwise(curve) if other.area_px <= one.area_px), None)
+
+
+def judged(curve: Sequence[PressPoint], onset_mm: float, closing_mm: float) -> list[PressPoint]:
+    """The steps from the first contact on by which a ball is judged, in order of closing.
+
+    Args:
+        curve: in any order.
+        onset_mm: where the contact begins.
+        closing_mm: how far from there a ball's area is to be relied on; beyond it the border cuts it away.
+    """
+    within = [point for point in curve if onset_mm - closing_mm - _STEP_MM <= point.width_mm <= onset_mm]
+    return sorted((point for point in within if not point.cut), key=lambda point: -point.width_mm)
+
+
+def area_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
+    """A ball's areas over those of an earlier curve at the same widths, median; None where none can be compared.
+
+    Args:
+        curve: the new one.
+        golden: the earlier one; in between its points it is interpolated.
+    """
+    return _ratio(curve, golden, "area_px")
+
+
+def contrast_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
+    """Likewise of the contrast.
+
+    Args:
+        curve: the new one.
+        golden: the earlier one.
+    """
+    return _ratio(curve, golden, "contrast_levels")
+
+
+def _ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint], what: str) -> float | None:
+    known = sorted((point.width_mm, getattr(point, what)) for point in golden if point.area_px)
+    if len(known) < 2:
+        return None
+    widths, values = zip(*known, strict=True)
+    ratios = [
+        getattr(point, what) / float(np.interp(point.width_mm, widths, values))
+        for point in curve
+        if point.area_px and widths[0] - _STEP_MM <= point.width_mm <= widths[-1] + _STEP_MM
+    ]
+    return round(float(np.median(ratios)), 4) if ratios else None
+
+
+def roundness(contact: Contact) -> float:
+    """The longer over the shorter axis of a contact; 1 for a ball's, 0 where there is none."""
+    moments = cv2.moments(contact.mask, binaryImage=True)
+    if not moments["m00"]:
+        return 0.0
+    spread = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]])
+    shorter, longer = np.linalg.eigvalsh(spread)
+    return float(np.sqrt(longer / max(shorter, 1e-9)))
+
+
+def _by_colour(levels: np.ndarray) -> Levels:
+    blue, green, red = (round(float(level), 2) for level in levels)
+    return blue, green, red

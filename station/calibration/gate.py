@@ -1,0 +1,22 @@
+"""A recipe's contact gate on a unit that is noisier than most."""
+
+from station.settings.segmentation import Segmentation
+
+_MOST_RATIO, _MOST_BEND = 20.0, 10.0
+
+
+def gated(segmentation: Segmentation, factor: float) -> Segmentation:
+    """The segmentation with the robust method's gate raised; both limits of the gate grow alike.
+
+    Args:
+        segmentation: a recipe's.
+        factor: of the unit's calibration, 1 or more.
+    """
+    if factor <= 1.0:
+        return segmentation
+    robust = segmentation.robust
+    raised = {
+        "gate_ratio": min(_MOST_RATIO, factor * robust.gate_ratio),
+        "least_bend": min(_MOST_BEND, factor * robust.least_bend),
+    }
+    return segmentation.model_copy(update={"robust": robust.model_copy(update=raised)})

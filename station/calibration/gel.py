@@ -1,0 +1,184 @@
+"""The gel's and the light's health, told from a picture of the untouched gel: tear, dirt, LED loss, fog.
+
+With an earlier picture of the same gel, what is new is looked for. Without one only what no sound gel shows: real
+units have dust, bubbles and dark corners of their own, so small blemishes are let pass. Limits were found on real
+no-contact images (`docs/verification.md`) and the twin.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.calibration.model import Levels
+from station.vision.contact import Image, Mask
+
+_LONG_SIDE_PX = 640
+_FINE_PX, _COARSE_PX = 1.5, 12.0
+"""Between these two blurs lies what a tear or a crumb shows and drifting light does not."""
+_BLEMISH_LEVELS, _NEW_BLEMISH_LEVELS = 20.0, 12.0
+_JOINED_PX = 7
+_SMALLEST_PX, _SMALLEST_NEW_PX = 40, 150
+_BORDER_SHARE = 0.06
+_MOST_BLEMISHED = 0.006
+"""Real units reach 0.0032 of the field."""
+_TEAR_LENGTH, _TEAR_SLENDERNESS = 0.5, 10.0
+"""A tear's diagonal over the image's width, and over its own mean width; real blemishes reach 0.2 and 6."""
+_DEAD_LED = 1 / 3
+_LED_COLOURS = ("blue", "green", "red")
+_MARK = (0, 0, 255)
+
+
+class Ill(StrEnum):
+    """What may be wrong with gel and light."""
+
+    TEAR = "tear"
+    DIRT = "dirt"
+    LED = "led"
+    FOG = "fog"
+    WEAR = "wear"
+
+
+REMEDIES = {
+    Ill.TEAR: "change the gel, then calibrate",
+    Ill.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
+    Ill.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
+    Ill.FOG: "clean the sensor's lens and gel, then try again",
+    Ill.WEAR: "change the gel, then calibrate",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finding:
+    """One thing that is wrong, in a sentence and a picture."""
+
+    ill: Ill
+    sentence: str
+    picture: Image
+
+
+def examine(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
+    """Look for tear, dirt, LED loss and fog.
+
+    Args:
+        image: the untouched gel, shape (height, width, 3), dtype uint8, BGR.
+        golden: the same gel when it was sound, of the same shape; None where there is none.
+        least_light: of each colour against the golden picture.
+    """
+    lost = _lost_light(image, golden, least_light)
+    if lost:
+        return lost
+    if golden is not None and (fog := sharpness(image) / sharpness(golden)) < least_light:
+        text = f"the untouched gel shows {fog:.0%} of the detail it had: fogged or smeared"
+        return [Finding(Ill.FOG, text, side_by_side(golden, image))]
+    return _blemishes(image, golden)
+
+
+def light(image: Image) -> Levels:
+    """The mean of each colour.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8, BGR.
+    """
+    blue, green, red = image.mean(axis=(0, 1))
+    return float(blue), float(green), float(red)
+
+
+def sharpness(image: Image) -> float:
+    """Root mean square of the structure of the light between two scales, above the pixels' noise; grey levels.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+    """
+    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in (5.0, 15.0))
+    return float(np.sqrt(np.mean((finer - coarser) ** 2)))
+
+
+def side_by_side(before: Image, now: Image) -> Image:
+    """Two pictures beside each other, the earlier one left, named.
+
+    Args:
+        before: shape (height, width, 3), dtype uint8.
+        now: likewise.
+    """
+    gap = np.full((before.shape[0], 12, 3), 255, np.uint8)
+    return np.hstack([_named(before, "then"), gap, _named(now, "now")])
+
+
+def _named(image: Image, name: str) -> Image:
+    """A picture with a word in its corner."""
+    size = image.shape[1] / 480
+    place = (round(14 * size), round(38 * size))
+    white, font = (255, 255, 255), cv2.FONT_HERSHEY_SIMPLEX
+    return np.asarray(cv2.putText(image.copy(), name, place, font, size, white, 2, cv2.LINE_AA), np.uint8)
+
+
+def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
+    now = light(image)
+    before = (float(np.median(now)),) * 3 if golden is None else light(golden)
+    limit = _DEAD_LED if golden is None else least_light
+    shares = [(level / max(was, 1.0), colour) for level, was, colour in zip(now, before, _LED_COLOURS, strict=True)]
+    lost = [(share, colour) for share, colour in shares if share < limit]
+    if not lost:
+        return []
+    words = ", ".join(f"{colour} {share:.0%}" for share, colour in lost)
+    what = "is dead or not connected" if min(lost)[0] < _DEAD_LED else "has grown dim"
+    text = f"light of {words} of {'the other colours' if golden is None else 'what it was'}: an LED {what}"
+    return [Finding(Ill.LED, text, image if golden is None else side_by_side(golden, image))]
+
+
+def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
+    scale = max(image.shape) / _LONG_SIDE_PX
+    found, torn = _regions(image, golden, scale)
+    findings: list[Finding] = []
+    if torn.any():
+        text = "a long thin line runs across the gel: it is torn or cut"
+        findings.append(Finding(Ill.TEAR, text, _marked(image, torn)))
+    share = float(np.mean(found > 0))
+    if share > (_MOST_BLEMISHED if golden is None else 0.0):
+        number = cv2.connectedComponents(found)[0] - 1
+        what = "places" if golden is None else "new places"
+        text = f"{number} {what} on the gel, {share:.1%} of the field, look like dirt or damage"
+        findings.append(Finding(Ill.DIRT, text, _marked(image, found)))
+    return findings
+
+
+def _regions(image: Image, golden: Image | None, scale: float) -> tuple[Mask, Mask]:
+    """Compact blemishes, and long thin ones, each 0 or 255."""
+    levels = image.astype(np.float32) if golden is None else image.astype(np.float32) - golden
+    fine, coarse = (np.asarray(cv2.GaussianBlur(levels, (0, 0), sigma * scale)) for sigma in (_FINE_PX, _COARSE_PX))
+    strength = np.abs(fine - coarse).max(axis=2)
+    limit, smallest = (_BLEMISH_LEVELS, _SMALLEST_PX) if golden is None else (_NEW_BLEMISH_LEVELS, _SMALLEST_NEW_PX)
+    side = max(3, round(_JOINED_PX * scale))
+    strong = cv2.morphologyEx((strength > limit).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((side, side), np.uint8))
+    margin = round(_BORDER_SHARE * image.shape[1])
+    inner = np.zeros_like(strong)
+    inner[margin:-margin, margin:-margin] = strong[margin:-margin, margin:-margin]
+    _, labels, sizes, _ = cv2.connectedComponentsWithStats(np.asarray(inner, np.uint8))
+    compact, thin = np.zeros(strong.shape, np.uint8), np.zeros(strong.shape, np.uint8)
+    for label, (_, _, width, height, area) in enumerate(sizes[1:], start=1):
+        if area < smallest * scale**2:
+            continue
+        length = float(np.hypot(width, height))
+        is_tear = length > _TEAR_LENGTH * image.shape[1] and length**2 / area > _TEAR_SLENDERNESS
+        (thin if is_tear else compact)[labels == label] = 255
+    return compact, thin
+
+
+def outlined(image: Image, mask: Mask, colour: tuple[int, int, int] = (255, 255, 255)) -> Image:
+    """A picture with the outline of a mask.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+        mask: shape (height, width), 0 or more.
+        colour: B, G, R.
+    """
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(image.copy(), outlines, -1, colour, 2), np.uint8)
+
+
+def _marked(image: Image, places: npt.NDArray[np.uint8]) -> Image:
+    """The picture with an outline around places."""
+    return outlined(image, np.asarray(cv2.dilate(places, np.ones((9, 9), np.uint8)), np.uint8), _MARK)

@@ -1,0 +1,173 @@
+"""What is kept of a calibration and of a verification; read back, every field is checked."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Serial = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
+"""A unit's serial number; it names a folder."""
+Stamp = Annotated[str, Field(pattern=r"^\d{8}T\d{6}Z$")]
+"""A calibration's or verification's name: when it was made, UTC."""
+Levels = tuple[float, float, float]
+"""Grey levels of blue, green and red."""
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class Stored(BaseModel):
+    """A record that never changes; unknown fields are another version's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Check(Stored):
+    """One thing that was looked at."""
+
+    name: str
+    passed: bool
+    found: str
+    expected: str
+    remedy: str = ""
+    """What to do where it has not passed."""
+    picture: str | None = None
+    """The file beside the record that shows it."""
+
+
+class PressPoint(Stored):
+    """The ball at one width."""
+
+    width_mm: float
+    area_px: Annotated[int, Field(ge=0)]
+    confidence: float | None
+    cut: bool
+    """The image's border cuts the contact: the area is a lower bound."""
+    contrast_levels: Annotated[float, Field(ge=0.0)]
+    """How much the ball changes the image, grey levels; 0 where nothing touches."""
+
+
+class PlacePoint(Stored):
+    """The ball at one place on the gel."""
+
+    x_mm: float
+    y_mm: float
+    width_mm: float
+    centroid_x_px: float
+    centroid_y_px: float
+    area_px: int
+
+
+class FieldMap(Stored):
+    """The untouched gel in coarse cells, row by row from the image's upper left."""
+
+    rows: Annotated[int, Field(ge=1)]
+    columns: Annotated[int, Field(ge=1)]
+    light_levels: tuple[Levels, ...]
+    """Of the reference, mean of each cell."""
+    noise_levels: tuple[float, ...]
+    """Standard deviation of a pixel from frame to frame, worst colour, mean of each cell."""
+
+
+class Noise(Stored):
+    """What the untouched gel's frames differ by."""
+
+    pixel_levels: Levels
+    """Standard deviation of a pixel from frame to frame."""
+    gate: float
+    """The largest value of the contact gate's statistic with nothing touching; at 1 a contact would be looked for."""
+    gate_factor: Annotated[float, Field(ge=1.0)]
+    """What this unit's gate is multiplied by, so that noise stays below it."""
+    drift_levels: float
+    """The largest drift of the light against the reference, root mean square."""
+
+
+class Calibration(Stored):
+    """One unit's calibration."""
+
+    schema_version: Literal[1] = 1
+    id: Stamp
+    serial: Serial
+    unit: str
+    """As the camera names itself."""
+    operator: str
+    simulated: bool
+    program: str
+    """The version that made it."""
+    ball_mm: Positive
+    holder_mm: float
+    width_px: Annotated[int, Field(ge=1)]
+    height_px: Annotated[int, Field(ge=1)]
+    mm_per_px: Positive
+    scale_uncertainty: Positive
+    """Relative, of a length, about two standard deviations; an area's is twice that."""
+    scale_measured: bool
+    """From places of the ball a known way apart; else the usual scale of such sensors."""
+    places: tuple[PlacePoint, ...]
+    curve: tuple[PressPoint, ...]
+    onset_mm: float
+    """The width at which the contact begins, to one count of the gripper."""
+    zero_mm: float
+    """The onset minus ball and holder: what the gripper's zero is off by, about."""
+    noise: Noise
+    light_levels: Levels
+    sharpness_levels: float
+    field: FieldMap
+    checks: tuple[Check, ...]
+
+    @property
+    def made_at(self) -> datetime:
+        """When, UTC."""
+        return time_of(self.id)
+
+    @property
+    def area_uncertainty(self) -> float:
+        """Relative, of an area in mm²."""
+        return 2 * self.scale_uncertainty
+
+    def in_words(self) -> str:
+        """One line for records and reports."""
+        how = "measured" if self.scale_measured else "usual"
+        return f"{self.id}: {self.mm_per_px:.5f} mm/px ± {self.scale_uncertainty:.1%}, {how}"
+
+
+class Verification(Stored):
+    """One check of a unit against its calibration."""
+
+    schema_version: Literal[1] = 1
+    id: Stamp
+    serial: Serial
+    calibration: Stamp
+    operator: str
+    passed: bool
+    area_ratio: float | None
+    """The ball's area over the calibration's at the same widths, median; None where nothing was touched."""
+    onset_mm: float | None
+    checks: tuple[Check, ...]
+    curve: tuple[PressPoint, ...]
+
+    @property
+    def made_at(self) -> datetime:
+        """When, UTC."""
+        return time_of(self.id)
+
+    @property
+    def drift(self) -> float | None:
+        """The relative change of the ball's area since the calibration."""
+        return None if self.area_ratio is None else self.area_ratio - 1.0
+
+
+def stamp(at: datetime) -> str:
+    """A record's name from its time.
+
+    Args:
+        at: with its time zone.
+    """
+    return at.astimezone(UTC).strftime("%Y%m%dT%H%M%SZ")
+
+
+def time_of(name: str) -> datetime:
+    """The time that a record's name tells, UTC.
+
+    Args:
+        name: from `stamp`.
+    """
+    return datetime.strptime(name, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)

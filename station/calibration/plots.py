@@ -1,0 +1,100 @@
+"""A calibration's and a verification's numbers as pictures."""
+
+from collections.abc import Sequence
+from io import BytesIO
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from station.calibration.model import Calibration, FieldMap, PressPoint
+
+_BLUE, _RED, _GREY = "#1f4e79", "#b3261e", "#888888"
+_DOUBTFUL = 0.5
+
+
+def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None) -> bytes:
+    """The ball's area over the gripper's width, as the paper plots it; a verification's beside it.
+
+    Args:
+        calibration: its curve is drawn.
+        now: a verification's curve; None for none.
+
+    Returns:
+        A PNG file.
+    """
+    figure, axes = _axes()
+    _draw(axes, calibration.curve, _BLUE, "calibration", calibration.mm_per_px)
+    if now is not None:
+        _draw(axes, now, _RED, "now", calibration.mm_per_px)
+    axes.axvline(calibration.onset_mm, color=_GREY, linewidth=0.8, linestyle="--")
+    axes.text(calibration.onset_mm, 0.98, " onset", color="#555555", transform=axes.get_xaxis_transform(), va="top")
+    axes.invert_xaxis()
+    axes.set_xlabel("width between the fingers [mm]")
+    axes.set_ylabel("contact area [mm²]")
+    axes.set_ylim(bottom=0)
+    axes.grid(color="#dddddd", linewidth=0.6)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=8)
+    return _png(figure)
+
+
+def field_plot(field: FieldMap) -> bytes:
+    """Light and noise over the field.
+
+    Args:
+        field: the map.
+
+    Returns:
+        A PNG file.
+    """
+    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+    light = np.asarray(field.light_levels).reshape(field.rows, field.columns, 3)
+    noise = np.asarray(field.noise_levels).reshape(field.rows, field.columns)
+    maps = [(light[..., index], f"light, {name}") for index, name in enumerate(("blue", "green", "red"))]
+    for number, (values, title) in enumerate([*maps, (noise, "noise")], start=1):
+        axes = figure.add_subplot(1, 4, number)
+        shown = axes.imshow(values, cmap="viridis", vmin=0)
+        axes.set_title(title, fontsize=9)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        bar = figure.colorbar(shown, ax=axes, orientation="horizontal", pad=0.03)
+        bar.ax.tick_params(labelsize=7)
+    figure.supxlabel("grey levels", fontsize=8)
+    return _png(figure)
+
+
+def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px: float) -> None:  # noqa: ANN001 (matplotlib's)
+    """Sure points are joined; doubtful ones, and a contact that was lost again, stand alone."""
+    first = next((index for index, point in enumerate(curve) if point.area_px), len(curve))
+    sure, doubted = [], []
+    for index, point in enumerate(curve):
+        lost = index > first and not point.area_px
+        doubtful = point.cut or lost or (point.confidence is not None and point.confidence < _DOUBTFUL)
+        (doubted if doubtful else sure).append((point.width_mm, point.area_px * mm_per_px**2))
+    if sure:
+        axes.plot(*zip(*sure, strict=True), color=colour, marker="o", markersize=4, linewidth=1.5, label=label)
+    if doubted:
+        hollow = f"{label}: not sure, lost or cut by the border"
+        axes.plot(
+            *zip(*doubted, strict=True),
+            color=colour,
+            marker="o",
+            markerfacecolor="white",
+            markersize=7,
+            linestyle="none",
+            label=hollow,
+        )
+
+
+def _axes():  # noqa: ANN202 (matplotlib's)
+    with mpl.rc_context({"font.size": 10}):
+        figure = Figure(figsize=(7.2, 3.8), layout="constrained")
+        axes = figure.add_subplot()
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _png(figure: Figure) -> bytes:
+    data = BytesIO()
+    figure.savefig(data, format="png", dpi=110)
+    return data.getvalue()

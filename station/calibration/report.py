@@ -1,0 +1,134 @@
+"""A calibration's or a verification's page, and the files that are stored with it."""
+
+import base64
+
+import cv2
+import jinja2
+
+from station.calibration.calibrating import Draft
+from station.calibration.model import Calibration
+from station.calibration.plots import area_plot, field_plot
+from station.calibration.store import PAGE, REFERENCE, press_name
+from station.calibration.verifying import Verified, outlined
+from station.vision.contact import Image
+
+_TILE_PX = 220
+
+
+def calibration_files(draft: Draft) -> dict[str, bytes]:
+    """The pictures and the page of a calibration, by file name.
+
+    Args:
+        draft: good.
+    """
+    calibration = draft.calibration
+    area, field = area_plot(calibration), field_plot(calibration.field)
+    presses = {press_name(number): png(step.image) for number, step in enumerate(draft.steps)}
+    tiles = [
+        (f"{step.width_mm:.2f} mm", _area(calibration, step.contact.area_px), _tile(outlined(step)))
+        for step in draft.steps
+    ]
+    page = _page(
+        title=f"Calibration {calibration.id} of {calibration.serial}",
+        verdict=None,
+        facts=_calibration_facts(calibration),
+        checks=[(check, None) for check in calibration.checks],
+        plots=[
+            ("The ball's area over the width", _uri(area)),
+            ("Light and noise over the field, as the image shows it", _uri(field)),
+        ],
+        tiles=[("untouched", "reference", _tile(draft.reference)), *tiles],
+    )
+    return {REFERENCE: png(draft.reference), "area.png": area, "field.png": field, **presses, PAGE: page}
+
+
+def verification_files(verified: Verified, calibration: Calibration) -> dict[str, bytes]:
+    """The pictures and the page of a verification, by file name.
+
+    Args:
+        verified: passed or not.
+        calibration: what it was compared with.
+    """
+    verification = verified.verification
+    area = area_plot(calibration, verification.curve)
+    pictures = {name: png(picture) for name, picture in verified.pictures.items()}
+    tiles = [
+        (
+            f"{point.width_mm:.2f} mm",
+            _area(calibration, point.area_px),
+            _tile(verified.pictures[press_name(number)]),
+        )
+        for number, point in enumerate(verification.curve)
+    ]
+    page = _page(
+        title=f"Verification {verification.id} of {verification.serial}",
+        verdict=verification.passed,
+        facts=[
+            ("Unit", calibration.unit),
+            ("Calibration", calibration.in_words()),
+            ("Operator", verification.operator or "not told"),
+            ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
+        ],
+        checks=[(check, _uri(pictures[check.picture]) if check.picture else None) for check in verification.checks],
+        plots=[("The ball's area over the width", _uri(area))],
+        tiles=[("untouched", "now", _tile(verified.reference)), *tiles],
+    )
+    return {REFERENCE: png(verified.reference), "area.png": area, **pictures, PAGE: page}
+
+
+def png(picture: Image) -> bytes:
+    """A picture as a PNG file.
+
+    Args:
+        picture: shape (height, width, 3), dtype uint8.
+    """
+    return cv2.imencode(".png", picture)[1].tobytes()
+
+
+def _calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
+    how = (
+        f"measured with the ball at {len(calibration.places)} places"
+        if calibration.scale_measured
+        else "not measured: the usual scale of such sensors; calibrate with --place to measure it"
+    )
+    noise = calibration.noise
+    return [
+        ("Unit", f"{calibration.unit}{', simulated' if calibration.simulated else ''}"),
+        ("Operator", calibration.operator or "not told"),
+        ("Made", f"{calibration.made_at:%Y-%m-%d %H:%M:%S} UTC, fruit-station {calibration.program}"),
+        ("Scale", f"{calibration.mm_per_px:.5f} mm/px ± {calibration.scale_uncertainty:.1%}, {how}"),
+        ("Areas", f"in mm² good to {calibration.area_uncertainty:.1%}, beside what repeating an image differs by"),
+        ("Ball", f"{calibration.ball_mm:g} mm, its holder takes {calibration.holder_mm:g} mm"),
+        ("Onset", f"{calibration.onset_mm:.2f} mm; the gripper's zero is off by {calibration.zero_mm:+.2f} mm"),
+        ("Noise", " / ".join(f"{level:.2f}" for level in noise.pixel_levels) + " grey levels in blue / green / red"),
+        ("Gate", f"reaches {noise.gate:.2f} with nothing touching; this unit's factor is {noise.gate_factor:.2f}"),
+        (
+            "Light",
+            " / ".join(f"{level:.0f}" for level in calibration.light_levels) + " grey levels in blue / green / red",
+        ),
+    ]
+
+
+def _area(calibration: Calibration, area_px: int) -> str:
+    return f"{area_px * calibration.mm_per_px**2:.1f} mm²" if area_px else "no contact"
+
+
+def _page(**values: object) -> bytes:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("station.calibration", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.j2").render(**values).encode()
+
+
+def _tile(picture: Image) -> str:
+    height, width = picture.shape[:2]
+    small = cv2.resize(picture, (_TILE_PX, round(_TILE_PX * height / width)), interpolation=cv2.INTER_AREA)
+    return _uri(cv2.imencode(".jpg", small)[1].tobytes(), "jpeg")
+
+
+def _uri(data: bytes, kind: str = "png") -> str:
+    return f"data:image/{kind};base64," + base64.b64encode(data).decode()

@@ -1,0 +1,147 @@
+"""`station calibrate`: what this sensor on this gripper makes of a ball of known size."""
+
+import asyncio
+import getpass
+import logging
+from importlib.metadata import version
+from pathlib import Path
+
+import click
+
+from station.calibration.bench import Place
+from station.calibration.calibrating import Calibrating, Draft
+from station.calibration.model import Check
+from station.calibration.report import calibration_files
+from station.calibration.store import PAGE, CalibrationStore
+from station.commands.ball import at_the_bench, cancelled_by_signals, show
+from station.errors import BadInputError
+from station.settings.configuration import Configuration, load_configuration
+
+_CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+
+
+class _PlaceType(click.ParamType):
+    """A place of the ball, `x,y` in mm."""
+
+    name = "x,y"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Place:
+        """Read a place.
+
+        Args:
+            value: as typed.
+            param: click's.
+            ctx: click's.
+        """
+        if isinstance(value, Place):
+            return value
+        try:
+            x_mm, y_mm = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"expected two numbers of mm as 4,0, got {value!r}", param, ctx)
+        if not (abs(x_mm) <= 10 and abs(y_mm) <= 10):
+            self.fail(f"expected numbers from -10 to 10 mm, the gel ends there, got {value!r}", param, ctx)
+        return Place(x_mm, y_mm)
+
+
+@click.group("calibrate", invoke_without_command=True)
+@click.option("--operator", default=getpass.getuser, show_default="the user", help="Who calibrates.")
+@click.option(
+    "--place",
+    "places",
+    type=_PlaceType(),
+    multiple=True,
+    metavar="X,Y",
+    help="Also press the ball so many mm beside its first place, which measures the scale; may be repeated.",
+)
+@click.option("--bench", is_flag=True, help="No arm: the ball is held between the fingers.")
+@click.option("--yes", is_flag=True, help="Do not ask: the ball lies there, and at each place when its turn comes.")
+@_CONFIG
+@click.pass_context
+def calibrate(
+    context: click.Context,
+    operator: str,
+    places: tuple[Place, ...],
+    bench: bool,  # noqa: FBT001 (click passes arguments by name)
+    yes: bool,  # noqa: FBT001
+    config: Path | None,
+) -> None:
+    """Calibrate the sensor with the rubber ball, and store the result. The gripper closes on the ball.
+
+    The station must not run meanwhile. A result that is no good is not stored, and the reasons are told. Called off
+    with Ctrl-C, nothing is stored.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    site = load_configuration(config)
+    draft = _run(site, operator, places, bench=bench, yes=yes)
+    folder = CalibrationStore(site.home).add_calibration(draft.calibration, calibration_files(draft))
+    _tell(draft.calibration.checks)
+    click.echo(f"calibration {draft.calibration.in_words()}")
+    click.echo(f"stored; look at {folder / PAGE}")
+
+
+def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench: bool, yes: bool) -> Draft:
+    async def run() -> Draft:
+        cancelled_by_signals()
+        async with at_the_bench(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
+            try:
+                procedure = Calibrating(
+                    ball_bench,
+                    unit,
+                    recipe,
+                    site.calibration,
+                    places,
+                    operator,
+                    version("fruit-station"),
+                    show,
+                )
+            except ValueError as error:
+                raise BadInputError(f"--place: {error}") from error
+            return await procedure.run()
+
+    logging.basicConfig(format="station: %(message)s")
+    try:
+        return asyncio.run(run())
+    except asyncio.CancelledError:
+        raise click.Abort from None
+
+
+def _tell(checks: tuple[Check, ...]) -> None:
+    for check in checks:
+        click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:12}{check.found}")
+
+
+@calibrate.command("list")
+@_CONFIG
+def list_command(config: Path | None) -> None:
+    """List the calibrations of every unit, the newest first."""
+    store = CalibrationStore(load_configuration(config).home)
+    rows = [
+        (serial, calibration, store.last_verification(calibration))
+        for serial in store.serials()
+        for calibration in store.calibrations(serial)
+    ]
+    if not rows:
+        click.echo("nothing is calibrated yet; see station calibrate --help")
+    for serial, calibration, verified in rows:
+        state = "" if verified is None else f", verified {verified.id}: {'PASS' if verified.passed else 'FAIL'}"
+        click.echo(f"{serial:16}{calibration.in_words()}, by {calibration.operator}{state}")
+
+
+@calibrate.command("show")
+@click.argument("name", metavar="ID")
+@_CONFIG
+def show_command(name: str, config: Path | None) -> None:
+    """Show one calibration: its numbers, its checks, and where its page lies."""
+    store = CalibrationStore(load_configuration(config).home)
+    calibration = store.find(name)
+    click.echo(f"{calibration.serial}, {calibration.unit}, by {calibration.operator}")
+    click.echo(calibration.in_words())
+    click.echo(f"onset {calibration.onset_mm:.2f} mm, the gripper's zero is off by {calibration.zero_mm:+.2f} mm")
+    _tell(calibration.checks)
+    for verification in store.verifications(calibration.serial):
+        if verification.calibration == calibration.id:
+            verdict = "PASS" if verification.passed else "FAIL"
+            click.echo(f"verified {verification.id}: {verdict}, {store.folder(verification) / PAGE}")
+    click.echo(f"page {store.folder(calibration) / PAGE}")

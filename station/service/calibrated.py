@@ -1,0 +1,128 @@
+"""The sensor's calibration as the station uses it: scale, gate, golden reference, age, and whether it is verified."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from station.calibration.model import Calibration, Verification
+from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
+from station.settings.configuration import Configuration
+
+_DAY_S, _HOUR_S = 86_400.0, 3_600.0
+
+
+class InUse(NamedTuple):
+    """What a fruit is measured by."""
+
+    mm_per_px: float
+    words: str
+    """For its record."""
+
+
+class Figures(NamedTuple):
+    """For the metrics; None where there is nothing to tell."""
+
+    age_s: float | None
+    verification_age_s: float | None
+    drift: float | None
+
+
+class Calibrated:
+    """The newest calibration of the sensor that is in use; read again when another one is stored.
+
+    Args:
+        configuration: home folder, camera, limits.
+        serial: tells the sensor's serial number.
+        clock: seconds since 1970, as calibrations are dated.
+    """
+
+    def __init__(
+        self, configuration: Configuration, serial: Callable[[], str], clock: Callable[[], float] = time.time
+    ) -> None:
+        self._store, self._home = CalibrationStore(configuration.home), configuration.home
+        self._settings, self._usual_mm_per_px = configuration.calibration, configuration.camera.mm_per_px
+        self._serial, self._clock = serial, clock
+        self._seen: object = None
+        self._calibration: Calibration | None = None
+        self._verification: Verification | None = None
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The one in force; None where the sensor has none."""
+        self._look()
+        return self._calibration
+
+    @property
+    def in_force(self) -> InUse:
+        """The scale that areas are told by, and whose it is."""
+        calibration = self.calibration
+        if calibration is None:
+            return InUse(self._usual_mm_per_px, f"none: {self._usual_mm_per_px:g} mm/px, by the configuration")
+        scale = calibration.mm_per_px if calibration.scale_measured else self._usual_mm_per_px
+        return InUse(scale, f"{calibration.in_words()}, in use {scale:g} mm/px")
+
+    @property
+    def gate_factor(self) -> float:
+        """What the recipe's contact gate is raised by on this unit."""
+        return 1.0 if self.calibration is None else self.calibration.noise.gate_factor
+
+    def golden(self) -> Path | None:
+        """The file of the untouched gel as it was calibrated."""
+        return None if self.calibration is None else self._store.folder(self.calibration) / REFERENCE
+
+    @property
+    def figures(self) -> Figures:
+        """Ages and drift now."""
+        calibration, verified = self.calibration, self._verification
+        return Figures(
+            None if calibration is None else self._clock() - calibration.made_at.timestamp(),
+            None if verified is None else self._clock() - verified.made_at.timestamp(),
+            None if verified is None else verified.drift,
+        )
+
+    def not_verified(self) -> str:
+        """Why nothing may be inspected, with what to do; empty where verification is not demanded, or was passed."""
+        limit_h = self._settings.verify_every_h
+        if limit_h is None:
+            return ""
+        calibration, verified, age_s = self.calibration, self._verification, self.figures.verification_age_s
+        do = "stop the station, run `station verify` with the ball, and start it again."
+        if calibration is None:
+            return "The sensor is not calibrated: stop the station, run `station calibrate` with the ball, then verify."
+        if verified is None or age_s is None:
+            return f"The calibration was never verified, and it is demanded: {do}"
+        if not verified.passed:
+            return f"The last verification failed: mend what its page names, {do}"
+        if age_s > limit_h * _HOUR_S:
+            return f"The last verification is {age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed: {do}"
+        return ""
+
+    def trouble(self) -> str:
+        """What the alarm calibration_old tells; empty where there is nothing."""
+        calibration, verified = self.calibration, self._verification
+        if calibration is None:
+            return ""
+        age_days = (self.figures.age_s or 0.0) / _DAY_S
+        if age_days > self._settings.oldest_days:
+            return f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"
+        if verified is not None and not verified.passed:
+            failed = ", ".join(check.name for check in verified.checks if not check.passed)
+            return f"the last verification, {verified.id}, failed: {failed}"
+        return ""
+
+    def _look(self) -> None:
+        serial = self._serial()
+        seen = (serial, *(_changed(self._home / kind / serial) for kind in (CALIBRATIONS, VERIFICATIONS)))
+        if not serial or seen == self._seen:
+            return
+        self._calibration = self._store.current(serial)
+        self._verification = None if self._calibration is None else self._store.last_verification(self._calibration)
+        self._seen = seen
+
+
+def _changed(folder: Path) -> int:
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return 0

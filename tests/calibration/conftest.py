@@ -1,0 +1,124 @@
+"""Balls that are drawn instead of pressed, a simulated bench on the wire, and one stored calibration for many tests."""
+
+import asyncio
+import importlib.util
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import pytest
+
+from station.calibration.bench import Place, Progress, Unit
+from station.calibration.calibrating import Calibrating, Draft
+from station.calibration.report import calibration_files
+from station.calibration.store import CalibrationStore
+from station.settings.calibration import CalibrationSettings
+from station.settings.recipe import find_recipe
+from station.twin.console import ask
+
+ROOT = Path(__file__).resolve().parents[2]
+UNIT = Unit("T0001", "drawn DIGIT", simulated=True)
+_NUMBERS = itertools.count(1)
+
+_spec = importlib.util.spec_from_file_location("drawn_ball", ROOT / "benchmarks" / "drawn_ball.py")
+assert _spec is not None
+assert _spec.loader is not None
+_module = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(_module)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    cv2.setNumThreads(1)
+
+
+@pytest.fixture(scope="session")
+def drawn_ball() -> Callable[..., Any]:
+    """Makes a drawn ball; see `benchmarks/drawn_ball.py`."""
+    return _module.DrawnBall
+
+
+def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress] | None = None) -> Draft:
+    """Run a calibration."""
+    recipe = find_recipe("rubber_ball")
+    tell = [].append if told is None else told.append
+    return asyncio.run(
+        Calibrating(
+            ball, UNIT, recipe, CalibrationSettings(), [Place(*place) for place in places], "anna", "0.1", tell
+        ).run()
+    )
+
+
+@pytest.fixture(scope="session", name="calibrate_drawn")
+def calibrate_drawn_fixture() -> Callable[..., Draft]:
+    return calibrate_drawn
+
+
+@pytest.fixture(scope="session")
+def draft() -> Draft:
+    """A good calibration on two places."""
+    cv2.setNumThreads(1)
+    return calibrate_drawn(_module.DrawnBall(1, mm_per_px=0.0285), (-2.5, 0.0), (0.0, 3.0))
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> CalibrationStore:
+    return CalibrationStore(tmp_path)
+
+
+@pytest.fixture
+def stored(store: CalibrationStore, draft: Draft) -> CalibrationStore:
+    """A store that has the calibration."""
+    store.add_calibration(draft.calibration, calibration_files(draft))
+    return store
+
+
+@dataclass
+class Site:
+    """A running twin on a bench, and the configuration that leads to it."""
+
+    home: Path
+    configuration: Path
+    serial: str
+    console: int
+
+    def ask(self, **request: Any) -> Any:
+        return ask("127.0.0.1", self.console, request)
+
+    def command(self, *arguments: object) -> list[str]:
+        return [sys.executable, "-m", "station", *map(str, arguments), "--config", str(self.configuration)]
+
+    def station(self, *arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(self.command(*arguments), capture_output=True, text=True, timeout=280, check=False)
+
+
+@pytest.fixture
+def site(tmp_path: Path, unused_port: int) -> Iterator[Site]:
+    """A twin in a process of its own with the ball in its nest."""
+    host = f"127.78.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
+    configuration = tmp_path / "station.yaml"
+    configuration.write_text(
+        "home: home\nservice: {bench: true, patience: 20.0}\n"
+        f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 3.0}}\n"
+        f"camera: {{oldest_s: 2.0, open_deadline_s: 20.0, twin: {{port: {unused_port}}}}}\n"
+    )
+    arguments = ("twin", "--bench", "--fruit", "rubber_ball", "--console", "0", "--config", str(configuration))
+    process = subprocess.Popen([sys.executable, "-m", "station", *arguments], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    console = 0
+    for line in process.stdout:
+        if line.startswith("console"):
+            console = int(line.split(":")[1])
+        if line.startswith("running"):
+            break
+    yield Site(tmp_path / "home", configuration, f"TWIN-{unused_port}", console)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    assert process.returncode == 0

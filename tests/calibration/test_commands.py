@@ -1,0 +1,128 @@
+"""`station calibrate` and `station verify` as a person runs them, against a twin on the real wire."""
+
+import os
+import signal
+import subprocess
+
+import pytest
+
+from station.calibration.store import CalibrationStore
+from station.records.opening import lock_folder
+
+pytestmark = pytest.mark.timeout(600)
+
+
+def begin(site, *arguments):
+    return subprocess.Popen(
+        site.command(*arguments), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def until(process, words):
+    for line in process.stdout:
+        if words in line:
+            return line
+    pytest.fail(f"{words!r} was never told: {process.stderr.read()}")
+
+
+@pytest.mark.timeout(900)
+def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
+    process = begin(site, "calibrate", "--operator", "anna", "--place", "3,0")
+    until(process, "press Enter")
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+    until(process, "lay the ball 3 mm to the right")
+    site.ask(do="fruit", kind="rubber_ball", x_mm=3.0)
+    output, errors = process.communicate("\n", timeout=280)
+    assert process.returncode == 0, errors
+    store = CalibrationStore(site.home)
+    calibration = store.current(site.serial)
+    assert calibration is not None
+    assert calibration.operator == "anna"
+    assert calibration.scale_measured
+    assert abs(calibration.mm_per_px / 0.0266 - 1) < calibration.scale_uncertainty
+    assert str(store.folder(calibration) / "report.html") in output
+
+    listed = site.station("calibrate", "list")
+    assert calibration.in_words() in listed.stdout
+    site.ask(do="fruit", kind="rubber_ball")
+    good = site.station("verify", "--yes")
+    assert good.returncode == 0, good.stdout + good.stderr
+    assert "PASS; look at" in good.stdout
+    site.ask(do="set", device="camera", fault="gel_torn")
+    bad = site.station("verify", "--yes")
+    assert bad.returncode == 1
+    assert "FAIL  tear" in bad.stdout
+    assert "station: not verified: tear: change the gel" in bad.stderr
+    shown = site.station("calibrate", "show", calibration.id)
+    assert "PASS" in shown.stdout
+    assert "FAIL" in shown.stdout
+
+    folder = store.folder(calibration)
+    images = ["--reference", folder / "reference.png", "--out", tmp_path / "out", folder / "press_07.png"]
+    analyzed = site_analyze(site, "--unit", site.serial, *images)
+    assert analyzed.returncode == 0, analyzed.stderr
+    header, row = (tmp_path / "out" / "results.csv").read_text().splitlines()
+    cells = dict(zip(header.split(","), row.split(","), strict=True))
+    assert float(cells["area_mm2"]) == pytest.approx(int(cells["area_px"]) * calibration.mm_per_px**2, rel=1e-3)
+    assert f"calibration {calibration.id} of {site.serial}" in (tmp_path / "out" / "report.html").read_text()
+    unknown = site_analyze(site, "--unit", "D00000", *images)
+    assert unknown.returncode == 2
+    assert "has no calibration" in unknown.stderr
+    assert "Traceback" not in analyzed.stderr + unknown.stderr + bad.stderr
+
+
+def site_analyze(site, *arguments):
+    command = [*site.command("analyze", *arguments)[:-2]]
+    environment = {**os.environ, "STATION_HOME": str(site.home)}
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, env=environment)
+
+
+def test_called_off_in_the_middle_nothing_is_stored_and_the_jaws_open(site):
+    process = begin(site, "calibrate", "--yes")
+    until(process, " 6/14")
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=200)
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert not (site.home / "calibrations").exists()
+    assert site.ask(do="state")["width_mm"] > 52
+
+
+def test_it_asks_first_and_an_input_that_has_ended_calls_it_off(site):
+    done = subprocess.run(site.command("calibrate"), input="", capture_output=True, text=True, timeout=200, check=False)
+    assert done.returncode == 130
+    assert "hands are away" in done.stdout
+    assert site.ask(do="state")["width_mm"] > 52
+
+
+def test_nothing_is_verified_without_a_calibration_of_this_very_unit(site):
+    folder = site.home / "calibrations" / "D11111"
+    folder.mkdir(parents=True)
+    done = site.station("verify", "--yes")
+    assert done.returncode == 1
+    assert f"unit {site.serial} has no calibration" in done.stderr
+    assert "calibrated are: D11111: is this the right sensor?" in done.stderr
+
+
+def test_a_running_station_keeps_its_devices(site):
+    lock = lock_folder(site.home / "records")
+    try:
+        for command in ("calibrate", "verify"):
+            done = site.station(command, "--yes")
+            assert done.returncode == 1
+            assert "the devices are in use" in done.stderr
+            assert "stop the station" in done.stderr
+    finally:
+        os.close(lock)
+
+
+def test_bad_places_and_bad_names_are_bad_usage(site):
+    for arguments in (("--place", "4"), ("--place", "a,b"), ("--place", "40,0"), ("--yes", "--place", "0.5,0")):
+        done = site.station("calibrate", *arguments)
+        assert done.returncode == 2, done.stderr
+        assert "Traceback" not in done.stderr
+    done = site.station("calibrate", "show", "yesterday")
+    assert done.returncode == 2
+    assert "there is no calibration 'yesterday'" in done.stderr

@@ -1,0 +1,176 @@
+"""The station measures by its sensor's calibration, says so, and demands a verification where it is told to."""
+
+import asyncio
+import contextlib
+import subprocess
+import time
+import urllib.request
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from station.calibration.model import Check, Verification, stamp
+from station.calibration.report import calibration_files
+from station.calibration.store import CalibrationStore
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    CommandName,
+    Line,
+    Outcome,
+    StationState,
+)
+from station.records.database import reading, records_folder
+from station.records.reading import read_inspection
+from station.service.calibrated import Calibrated
+from station.service.keeping import Kept
+from station.service.reference import Golden
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.plc import line_endpoint
+from station.settings.segmentation import Segmentation
+
+LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
+FAILED = Check(name="wear", passed=False, found="41%", expected="75%")
+
+
+def verification(calibration, made_at, *checks):
+    return Verification(
+        id=stamp(made_at),
+        serial=calibration.serial,
+        calibration=calibration.id,
+        operator="anna",
+        passed=all(check.passed for check in checks),
+        area_ratio=0.97,
+        onset_mm=41.8,
+        checks=checks,
+        curve=(),
+    )
+
+
+def in_use(home, after, serial="T0001", **settings):
+    """What the station sees some time after the calibration was made."""
+    configuration = Configuration.model_validate({"home": home, "calibration": settings})
+    return Calibrated(configuration, lambda: serial, after.timestamp)
+
+
+def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, tmp_path):
+    calibration = draft.calibration.model_copy(
+        update={
+            "id": stamp(draft.calibration.made_at + timedelta(hours=1)),
+            "noise": draft.calibration.noise.model_copy(update={"gate_factor": 1.3}),
+        }
+    )
+    calibrated = in_use(tmp_path, draft.calibration.made_at)
+    assert calibrated.in_force.mm_per_px == draft.calibration.mm_per_px
+    assert draft.calibration.id in calibrated.in_force.words
+    stored.add_calibration(calibration, calibration_files(draft))
+    assert calibrated.calibration == calibration
+    assert calibrated.gate_factor == 1.3
+    golden = Golden(Kept(tmp_path), calibrated.golden)
+    golden.keep_first(np.zeros((640, 480, 3), np.uint8))
+    assert not (tmp_path / "golden_reference.png").exists()
+    prepared = golden.prepared(Segmentation())
+    assert prepared is not None
+    assert prepared.renewal == "calibrate"
+    another = in_use(tmp_path, calibration.made_at, "D11111")
+    assert another.in_force == (0.0266, "none: 0.0266 mm/px, by the configuration")
+    assert (another.gate_factor, another.golden(), another.trouble()) == (1.0, None, "")
+
+
+def test_a_scale_that_was_not_measured_leaves_the_sites_in_force(store, draft, tmp_path):
+    usual = draft.calibration.model_copy(update={"scale_measured": False, "mm_per_px": 0.0266})
+    store.add_calibration(usual, {})
+    configuration = Configuration.model_validate({"home": tmp_path, "camera": {"mm_per_px": 0.028}})
+    assert Calibrated(configuration, lambda: "T0001").in_force.mm_per_px == 0.028
+
+
+def test_age_and_a_failed_verification_are_told(stored, draft, tmp_path):
+    made_at = draft.calibration.made_at
+    young = in_use(tmp_path, made_at + timedelta(days=80))
+    assert (young.trouble(), young.figures.age_s) == ("", 80 * 86_400.0)
+    assert young.figures[1:] == (None, None)
+    assert "91 days old, at most 90" in in_use(tmp_path, made_at + timedelta(days=91)).trouble()
+    stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=1), FAILED), {})
+    assert "failed: wear" in young.trouble()
+    assert young.figures.verification_age_s == pytest.approx(80 * 86_400 - 3600)
+    assert young.figures.drift == pytest.approx(-0.03)
+
+
+def test_nothing_is_ready_without_the_verification_that_is_demanded(stored, draft, tmp_path):
+    made_at = draft.calibration.made_at
+    assert in_use(tmp_path, made_at).not_verified() == ""
+    assert "not calibrated" in in_use(tmp_path, made_at, "D11111", verify_every_h=8.0).not_verified()
+    demanded = in_use(tmp_path, made_at + timedelta(hours=9), verify_every_h=8.0)
+    assert "never verified" in demanded.not_verified()
+    stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=0.5)), {})
+    assert "8.5 h old, at most 8 h" in demanded.not_verified()
+    stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8)), {})
+    assert demanded.not_verified() == ""
+    stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8.5), FAILED), {})
+    assert "run `station verify`" in demanded.not_verified()
+
+
+@pytest.mark.timeout(600)
+def test_a_fruit_is_measured_by_the_calibration_and_its_record_names_it(site, draft, unused_ports):
+    [metrics_port] = unused_ports(1)
+    with site.configuration.open("a") as file:
+        file.write(f"calibration: {{verify_every_h: 8}}\nmetrics: {{port: {metrics_port}}}\n")
+    site.ask(do="remove")
+    store = CalibrationStore(site.home)
+    calibration = draft.calibration.model_copy(update={"serial": site.serial, "id": stamp(datetime.now(UTC))})
+    store.add_calibration(calibration, {})
+    process = subprocess.Popen(
+        site.command("service", "--log", "json"), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    try:
+        outcome = asyncio.run(inspected(site, store, calibration))
+        metrics = urllib.request.urlopen(f"http://127.0.0.1:{metrics_port}/metrics", timeout=20).read().decode()
+    finally:
+        process.terminate()
+        process.communicate(timeout=60)
+    assert outcome.area_mm2 == pytest.approx(outcome.area_px * calibration.mm_per_px**2)
+    assert "station_calibration_age_seconds" in metrics
+    assert "station_calibration_drift_ratio -0.03" in metrics
+    folder = records_folder(site.home)
+    with reading(folder) as connection:
+        judged = read_inspection(connection, outcome.sequence, folder).judged
+    assert judged is not None
+    assert calibration.id in judged.devices["calibration"]
+    assert judged.measures["mm_per_px"] == calibration.mm_per_px
+
+
+async def inspected(site, store, calibration):
+    """One fruit's outcome, with the verification made only once it is asked for."""
+    configuration = load_configuration(site.configuration)
+    asked = reset = False
+    async with ChannelClient(line_endpoint(configuration.handshake, configuration.home), "the station") as client:
+        deadline_s = time.monotonic() + 300
+        while not (state := await beat(client)).ready:
+            assert time.monotonic() < deadline_s, state.why_not_ready
+            if "No recipe is active" in state.why_not_ready:
+                command = Command(command=CommandName.CHANGE_RECIPE, argument=1)
+                await client.ask(command, CommandDone, deadline_s=40)
+            elif "never verified" in state.why_not_ready:
+                asked = True
+                store.add_verification(verification(calibration, datetime.now(UTC)), {})
+            elif state.boot and not reset:
+                reset = (
+                    await client.ask(Command(command=CommandName.RESET, argument=0), CommandDone, deadline_s=40)
+                ).done
+            await asyncio.sleep(0.1)
+        assert asked
+        site.ask(do="fruit", kind="strawberry", seed=2)
+        begun = await client.ask(Begin(trigger_id=1, encoder=0, lot="A"), Begun, deadline_s=40)
+        assert begun.sequence is not None, begun
+        return await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
+
+
+async def beat(client):
+    with contextlib.suppress(Exception):
+        return await client.ask(LINE, StationState, deadline_s=10)
+    return StationState.model_construct(boot="", ready=False, why_not_ready="it does not answer yet")

@@ -1,0 +1,88 @@
+"""Stored whole or not at all, and read back with care."""
+
+import errno
+import os
+from datetime import timedelta
+
+import pytest
+
+from station.calibration.errors import CalibrationError, UnknownCalibrationError
+from station.calibration.model import Verification, stamp
+from station.calibration.report import calibration_files
+from station.calibration.store import CALIBRATIONS
+
+
+def test_what_is_stored_is_read_back_with_its_page_and_pictures(stored, draft):
+    calibration = draft.calibration
+    assert stored.current("T0001") == calibration
+    assert stored.find(calibration.id) == calibration
+    assert (stored.golden(calibration) == draft.reference).all()
+    names = {path.name for path in stored.folder(calibration).iterdir()}
+    assert {"report.html", "area.png", "field.png", "reference.png", "press_13.png", "calibration.json"} <= names
+    page = (stored.folder(calibration) / "report.html").read_text()
+    assert "0.0285" in page or "0.0284" in page or "0.0286" in page
+    assert page.count("data:image/") == 2 + 1 + 14
+    with pytest.raises(UnknownCalibrationError):
+        stored.find("20000101T000000Z")
+
+
+def test_the_newest_is_the_units_and_a_broken_one_is_passed_over(stored, draft, tmp_path):
+    later = draft.calibration.model_copy(
+        update={"id": stamp(draft.calibration.made_at + timedelta(days=1)), "operator": "ben"}
+    )
+    stored.add_calibration(later, {})
+    assert [one.operator for one in stored.calibrations("T0001")] == ["ben", "anna"]
+    (stored.folder(later) / "calibration.json").write_text('{"mm_per_px": "wide"}')
+    assert stored.current("T0001") == draft.calibration
+    assert stored.current("T0002") is None
+    assert stored.current("../T0001") is None
+
+
+def test_a_verification_belongs_to_one_calibration(stored, draft):
+    verification = Verification(
+        id=stamp(draft.calibration.made_at),
+        serial="T0001",
+        calibration=draft.calibration.id,
+        operator="anna",
+        passed=True,
+        area_ratio=0.98,
+        onset_mm=41.8,
+        checks=(),
+        curve=(),
+    )
+    stored.add_verification(verification, {"reference.png": b"x"})
+    assert stored.last_verification(draft.calibration) == verification
+    assert verification.drift == pytest.approx(-0.02)
+    newer = draft.calibration.model_copy(update={"id": stamp(draft.calibration.made_at + timedelta(days=1))})
+    assert stored.last_verification(newer) is None
+
+
+@pytest.mark.parametrize("number", [1, 4, 17])
+def test_a_full_disk_leaves_nothing_and_keeps_the_calibration_before(store, draft, tmp_path, monkeypatch, number):
+    files = calibration_files(draft)
+    synced = os.fsync
+    calls = 0
+
+    def full(descriptor):
+        nonlocal calls
+        calls += 1
+        if calls == number:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        synced(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(CalibrationError, match="No space left on device; free space there"):
+        store.add_calibration(draft.calibration, files)
+    assert list((tmp_path / CALIBRATIONS / "T0001").iterdir()) == []
+    store.add_calibration(draft.calibration, files)
+    assert store.current("T0001") == draft.calibration
+
+
+def test_what_a_killed_one_left_is_never_seen_and_swept_away(store, draft, tmp_path):
+    left = tmp_path / CALIBRATIONS / "T0001" / ".unfinished-1"
+    left.mkdir(parents=True)
+    (left / "calibration.json").write_text(draft.calibration.model_dump_json())
+    assert store.current("T0001") is None
+    assert store.serials() == ("T0001",)
+    store.add_calibration(draft.calibration, {})
+    assert not left.exists()
