@@ -21,6 +21,7 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
+    "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
