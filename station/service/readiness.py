@@ -90,7 +90,7 @@ class Gate:
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
     def _records(self) -> Dependency:
-        fault, status = self._service.records_fault, self._service.records.status()
+        fault, status = self._service.ledger.fault, self._service.ledger.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
         return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
@@ -108,5 +108,5 @@ class Gate:
     def _trouble(self) -> str:
         if self._service.state not in _DEVICES_DECIDE:
             return ""
-        faults = [*self._crew.faults.values(), *([self._service.records_fault] if self._service.records_fault else [])]
+        faults = [*self._crew.faults.values(), *([self._service.ledger.fault] if self._service.ledger.fault else [])]
         return str(faults[0]) if faults else ""

@@ -81,7 +81,7 @@ class Upkeep:
     async def _bring_back(self) -> None:
         service, now_s = self._service, time.monotonic()
         activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
-        if now_s >= self._again_s and (service.records_fault is not None or activate):
+        if now_s >= self._again_s and (service.ledger.fault is not None or activate):
             self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
             await self._open_records_again()
             if activate:
@@ -89,7 +89,7 @@ class Upkeep:
                     await self._crew.activate_if_safe()
             self._again_s = time.monotonic() + self._pause_s
         entered_s = service.conductor.entered_s
-        if service.records_fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
+        if service.ledger.fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
             self._told_ready_s = time.monotonic()
             service.conductor.post(Event.READY)
 
@@ -99,24 +99,24 @@ class Upkeep:
 
     async def _open_records_again(self) -> None:
         service = self._service
-        if service.records_fault is None:
+        if service.ledger.fault is None:
             return
         try:
-            await service.records.reopen()
-            free_mb = service.records.status().free_bytes / _MB
+            await service.ledger.records.reopen()
+            free_mb = service.ledger.records.status().free_bytes / _MB
             if free_mb >= self._reserve_mb:
-                service.records_fault = None
+                service.ledger.fault = None
         except RecordsError as error:
-            service.records_fault = error
+            service.ledger.fault = error
 
     def _show_conditions(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
         for name, watch in self._crew.watches.items():
             alarms.device(name, watch.told_fault)
-        fault = service.records_fault
+        fault = service.ledger.fault
         alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
-        free_mb = service.records.status().free_bytes / _MB
+        free_mb = service.ledger.records.status().free_bytes / _MB
         alarms.show(
             AlarmId.DISK_LOW,
             f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
