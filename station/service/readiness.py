@@ -7,7 +7,7 @@ from station.service.health import Dependency, Liveness, Readiness
 from station.service.orders import Orders
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-from station.vocabulary import Refusal
+from station.vocabulary import PackmlState, Refusal
 
 PRODUCTION = 1
 _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
@@ -65,7 +65,7 @@ class Gate:
             healthy=not self._liveness.stuck(),
             ready=refusal is None,
             why_not_ready=why,
-            packml_state=STATES[service.state].packml,
+            packml_state=self._packml(),
             mode=self._orders.mode,
             recipe_number=0 if snapshot is None else snapshot.number,
             recipe_checksum=0 if snapshot is None else snapshot.checksum,
@@ -73,6 +73,11 @@ class Gate:
             alarms=service.alarms.alarms.word,
             simulated=self._crew.simulated,
         )
+
+    def _packml(self) -> PackmlState | None:
+        """The state's own; on the way to an end that was asked for it is stopping, whatever is still done."""
+        facts = STATES[self._service.state]
+        return PackmlState.STOPPING if self._service.stop_asked and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
         """The same for supervisors, with every dependency's age."""
