@@ -73,10 +73,13 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
 @_config
 def list_all(config: Path | None) -> None:
     """List the recipes: the revision in force, what the file says beside it, and what waits for whom."""
-    for standing in _store(config).read():
+    standings, problems = _store(config).read()
+    for standing in standings:
         click.echo(_line(standing))
         if standing.note:
             click.echo(f"    {standing.note}")
+    for problem in problems:
+        click.echo(problem, err=True)
 
 
 @recipes.command()
@@ -128,7 +131,7 @@ def adopt(config: Path | None) -> None:
     """Begin the history, as the station's first start does: what is there counts as approved. Idempotent."""
     store = _store(config)
     store.begin({})
-    for standing in store.read():
+    for standing in store.read()[0]:
         click.echo(_line(standing))
 
 

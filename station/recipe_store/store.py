@@ -1,21 +1,23 @@
 """The door to a station's recipes: for the command line, the service and the panel alike. Every verb blocks."""
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Hashable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 from sqlalchemy import Connection
 
 from station.errors import BadInputError
-from station.recipe_store.files import locked, read_folder
+from station.recipe_store.files import Folder, locked, read_folder
 from station.recipe_store.history import Person, approve, read_revisions, retire, submit, take_up
 from station.recipe_store.revision import Origin, RecipeStoreError, Revision, Status
 from station.recipe_store.standing import Found, Standing, standings
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import FILE_NAME, reading, records_folder
 from station.records.direct import writing
-from station.settings.problems import shortened
-from station.settings.recipe import approved_by_distribution
+from station.records.errors import RecordsError
+from station.settings.problems import SettingsError, shortened
+from station.settings.recipe import approved_by_distribution, shipped_folder
 from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
 
@@ -33,23 +35,32 @@ class RecipeStore:
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder, self._records = home, folder, records_folder(home)
 
-    def read(self) -> tuple[Standing, ...]:
-        """How each recipe stands.
+    def read(self) -> tuple[tuple[Standing, ...], tuple[str, ...]]:
+        """How each recipe stands, and what is wrong with the files by themselves or with their folder.
 
         Raises:
-            SettingsError: the folder cannot be read, or holds no recipe at all.
             RecordsError: the history cannot be read.
         """
-        folder = read_folder(self._folder)
-        return standings(folder.found, folder.broken, self.history())
+        try:
+            folder = read_folder(self._folder)
+        except SettingsError as error:
+            folder = Folder((), {}, error.problems)
+        return standings(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
 
-    def problems(self) -> tuple[str, ...]:
-        """What is wrong with the files by themselves, one sentence each.
-
-        Raises:
-            SettingsError: the folder cannot be read, or holds no recipe at all.
-        """
-        return tuple(map(str, read_folder(self._folder).problems))
+    def signature(self) -> Hashable:
+        """Another value whenever a file or the history has changed; it tells nothing else."""
+        folder = self._folder or shipped_folder()
+        files = []
+        with contextlib.suppress(OSError):
+            for path in sorted(folder.iterdir()):
+                with contextlib.suppress(OSError):
+                    stat = path.stat()
+                    files.append((path.name, stat.st_mtime_ns, stat.st_size, stat.st_ino))
+        try:
+            history = [(each.name, each.revision, each.status) for each in self.history()]
+        except RecordsError as error:
+            return tuple(files), str(error)
+        return tuple(files), tuple(history)
 
     def history(self, name: str = "") -> list[Revision]:
         """The revisions, oldest first; none before the history began.
@@ -159,7 +170,7 @@ class RecipeStore:
         Raises:
             BadInputError: there is none of this name.
         """
-        every = self.read()
+        every, _ = self.read()
         for standing in every:
             if standing.name == name:
                 return standing
