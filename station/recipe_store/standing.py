@@ -62,13 +62,17 @@ def standings(
 
     Args:
         found: the good files, of different names.
-        broken: what is wrong with the others, by the files' stems.
+        broken: what is wrong with the others, by the files' stems. Any recipe without a good file may be the one of a
+            file whose stem is no recipe's name.
         history: all revisions, oldest first.
     """
     files = {file.recipe.name: file for file in found}
     names = dict.fromkeys(sorted({*files, *(each.name for each in history)}))
+    nobodys = [problem for stem, problems in broken.items() if stem not in names for problem in problems]
     return tuple(
-        _standing(name, files.get(name), broken.get(name, ()), [each for each in history if each.name == name])
+        _standing(
+            name, files.get(name), [*broken.get(name, ()), *nobodys], [each for each in history if each.name == name]
+        )
         for name in names
     )
 

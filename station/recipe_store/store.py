@@ -44,7 +44,7 @@ class RecipeStore:
         try:
             folder = read_folder(self._folder)
         except SettingsError as error:
-            folder = Folder((), {}, error.problems)
+            folder = Folder((), {"": list(error.problems)}, error.problems)
         return standings(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
 
     def signature(self) -> Hashable:

@@ -101,7 +101,7 @@ class RecipeBook:
             return
         self._notice(standings)
         self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in standings if each.note)]))
-        gone = {each.name for each in standings if each.file_state is FileState.MISSING and not broken}
+        gone = {each.name for each in standings if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
         self._keep(controls)
 
