@@ -32,6 +32,7 @@ COMMANDS = {
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
+    "whatif": Entry("station.commands.whatif:whatif", "Judge stored inspections again by a draft of a recipe."),
 }
 
 
