@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,20 +99,30 @@ def orchard(tmp_path: Path) -> Orchard:
     return Orchard(tmp_path / "home" / "records", find_recipe("strawberry"))
 
 
+def with_values(recipe: Recipe, **changes: object) -> Recipe:
+    """A recipe with other values, each by its path with double underscores."""
+    values: Any = recipe.model_dump(mode="json")
+    for path, value in changes.items():
+        inner = values
+        *parts, last = path.split("__")
+        for part in parts:
+            inner = inner[int(part) if part.isdigit() else part]
+        inner[last] = value
+    return Recipe.model_validate_json(json.dumps(values))
+
+
+@pytest.fixture
+def changed() -> Callable[..., Recipe]:
+    return with_values
+
+
 @pytest.fixture
 def draft(tmp_path: Path, orchard: Orchard) -> Callable[..., Path]:
     """Write the recipe with other values into a file."""
 
-    def write(name: str = "draft.json.yaml", **changes: object) -> Path:
-        values = orchard.recipe.model_dump(mode="json")
-        for path, value in changes.items():
-            inner = values
-            *parts, last = path.split("__")
-            for part in parts:
-                inner = inner[int(part) if part.isdigit() else part]
-            inner[int(last) if last.isdigit() else last] = value
-        file = tmp_path / name
-        file.write_text(Recipe.model_validate_json(json.dumps(values)).model_dump_json())
+    def write(**changes: object) -> Path:
+        file = tmp_path / "draft.yaml"
+        file.write_text(with_values(orchard.recipe, **changes).model_dump_json())
         return file
 
     return write
