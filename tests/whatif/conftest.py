@@ -3,7 +3,10 @@
 import asyncio
 import itertools
 import json
-from collections.abc import Callable, Sequence
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -142,3 +145,41 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tu
         return done.exit_code, done.output
 
     return call
+
+
+@pytest.fixture
+def apart(tmp_path: Path) -> Callable[..., tuple[int, str]]:
+    """Call the command line in a process of its own, for what leaves threads and helpers behind until its end."""
+
+    def call(*arguments: object) -> tuple[int, str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "station", *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+            env={**os.environ, "STATION_HOME": str(tmp_path / "home")},
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    return call
+
+
+_CLUSTER = """
+from distributed import LocalCluster
+with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, host="127.0.0.1",
+                  protocol="tcp") as cluster:
+    print(cluster.scheduler_address, flush=True)
+    input()
+"""
+
+
+@pytest.fixture
+def cluster() -> Iterator[str]:
+    """A Dask scheduler with a worker, in a process of its own; its address."""
+    with subprocess.Popen(
+        [sys.executable, "-c", _CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.communicate("\n", timeout=60)
