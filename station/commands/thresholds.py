@@ -36,9 +36,7 @@ _ROUND = 0.5
 
 @click.command("thresholds")
 @click.option("--recipe", "name", required=True, metavar="NAME", help="The fruit's recipe, by its name.")
-@click.option(
-    "--marks", required=True, type=click.Path(path_type=Path), metavar="CSV", help="sequence,mark: good or bad."
-)
+@click.option("--marks", required=True, type=click.Path(path_type=Path), metavar="CSV", help="With sequence,mark.")
 @click.option("--lots", multiple=True, metavar="LOT", help="Only these, may be repeated. [default: all]")
 @click.option(
     "--false-rejects", "rate", default=0.02, show_default=True, metavar="SHARE", type=click.FloatRange(0.0001, 0.5),
@@ -173,9 +171,8 @@ def _lines(told: dict[str, Any]) -> list[str]:
     for limit in told["limits"]:
         what = "growth" if limit["closing_mm"] is None else f"area at {limit['closing_mm']:g} mm"
         low, high = ("not known" if end is None else f"{end:.1f}" for end in limit["interval"])
-        lines.append(
-            f"{what}: {limit['limit']:.1f} {limit['unit']}, 95 % interval {low} to {high}, {limit['good']} good"
-        )
+        value = f"{limit['limit']:.1f} {limit['unit']}"
+        lines.append(f"{what}: {value}, 95 % interval {low} to {high}, from {limit['good']} good fruit")
         if limit["interval"][1] is None:
             lines.append(f"  too few: {limit['good_needed']} good fruit are needed for the interval's upper end")
         if limit["not_known"]:

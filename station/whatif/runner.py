@@ -2,12 +2,14 @@
 
 import importlib
 import multiprocessing
+import socket
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import ExitStack, closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import urlsplit
 
 import cv2
 
@@ -19,6 +21,7 @@ from station.whatif.stored import StoredPress, read_stored
 
 CHUNK = 200
 _WITH_IMAGES = 8
+_REACH_S = 10.0
 _AHEAD = 3
 """Chunks that wait for each worker: so many that none is idle, so few that memory stays small."""
 
@@ -101,8 +104,9 @@ def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
         distributed = importlib.import_module("distributed")
     except ImportError as error:
         raise BadInputError("--scheduler: install the extra first: pip install fruit-station[cluster]") from error
+    _reach(address)
     try:
-        client = distributed.Client(address, timeout="10s", set_as_default=False)
+        client = distributed.Client(address, timeout=f"{_REACH_S:g}s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
     with closing(client):
@@ -111,6 +115,17 @@ def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
             raise StationError(f"--scheduler {address}: it has no workers; start some with `dask worker {address}`")
         executor = client.get_executor(pure=False)
         yield lambda batch: executor.submit(replay_batch, batch), width
+
+
+def _reach(address: str) -> None:
+    """Dask's own client leaves threads and tracebacks behind where nobody answers."""
+    try:
+        parts = urlsplit(address)
+        if parts.scheme not in {"tcp", "tls"} or parts.hostname is None or parts.port is None:
+            raise BadInputError(f"--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT")
+        socket.create_connection((parts.hostname, parts.port), _REACH_S).close()
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
 
 
 def _flow(parts: Iterable[Batch], submit: Callable[[Batch], Any], most: int) -> Iterator[list[Replayed]]:

@@ -131,19 +131,13 @@ def test_two_processes_and_a_cluster_say_the_same_as_one(orchard, draft, station
     assert one["newly_rejected"] > 0
 
 
-def test_a_scheduler_that_does_not_answer_is_told(orchard, draft, apart, tmp_path):
-    orchard.store([orchard.press(SOUND)])
-    code, told = apart("whatif", "--recipe", draft(), "--out", tmp_path / "out", "--scheduler", "nonsense")
-    assert code == 2
-    assert "no Dask scheduler answers there" in told
-    assert "Traceback" not in told
-
-
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (("--lots", "Z"), "no judged inspection of strawberry"),
         (("--recipe", "none.yaml"), "expected a readable file"),
+        (("--scheduler", "nonsense"), "expected tcp://HOST:PORT"),
+        (("--scheduler", "tcp://127.0.0.1:1"), "no Dask scheduler answers there"),
     ],
 )
 def test_bad_input_is_told(orchard, draft, station, tmp_path, arguments, told):
