@@ -114,8 +114,8 @@ def main() -> None:
 | two processes, their start included | {two:.0f} |
 | the judge alone on a curve in memory, for comparison | {alone:.0f} |
 
-Each inspection is judged by its own recipe and by the draft, and the draft's early stop is tried at every step. Where images
-have to be measured again, [the measurement](speed.md) takes nearly all of the time.
+Each inspection is judged by its own recipe and by the draft, and the draft's early stop is tried at every step. Where
+images have to be measured again, [the measurement](speed.md) takes nearly all of the time.
 """
     print(text)
     (ROOT / "docs" / "whatif-speed.md").write_text(text, encoding="utf-8")

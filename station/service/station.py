@@ -53,6 +53,8 @@ class Station:
         self._stop = asyncio.Event()
         self.service: Service | None = None
         """The cycle, once `run` has put it together."""
+        self.book: RecipeBook | None = None
+        """The recipes in force, likewise."""
 
     def stop(self) -> None:
         """Ask for an orderly end; asking again changes nothing."""
@@ -104,7 +106,7 @@ class Station:
             await alarms.recall(records)
         except RecordsError as error:
             service.ledger.fault = error
-        book = RecipeBook(configuration.recipes_folder, kept)
+        self.book = book = RecipeBook(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
         lots = LotKeeper(service, book, trail)
         await asyncio.to_thread(lots.recall)
