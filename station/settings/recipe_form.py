@@ -73,6 +73,26 @@ def upgrade(values: MutableMapping[str, Any]) -> int | None:
     return found
 
 
+def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
+    """What a migration renames a field by: its place and, in a text, its comment stay.
+
+    Args:
+        values: the mapping that has the field.
+        old: its name; nothing happens where there is none.
+        new: its name from now on.
+    """
+    if old not in values:
+        return
+    comments = getattr(getattr(values, "ca", None), "items", {})  # ruamel's, by key
+    comment = comments.pop(old, None)
+    entries = [(new if name == old else name, value) for name, value in values.items()]
+    for name in list(values):
+        del values[name]
+    values.update(entries)
+    if comment is not None:
+        comments[new] = comment
+
+
 def canonical_text(recipe: Recipe) -> str:
     """A recipe's values as JSON of one form only: what its hash and the PLC's checksum are made of.
 

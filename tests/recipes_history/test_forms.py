@@ -8,7 +8,7 @@ import pytest
 from station.settings import recipe_form
 from station.settings.problems import SettingsError
 from station.settings.recipe import load_recipe
-from station.settings.recipe_form import FORM, content_sha256, parse_recipe
+from station.settings.recipe_form import FORM, content_sha256, parse_recipe, rename
 from station.settings.recipe_text import with_values
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -17,7 +17,7 @@ FORMS = sorted(GOLDEN.iterdir())
 
 def to_first_form(values):
     """A migration as a release would have it: one field got another name."""
-    values["damage"]["growth_mm2_per_mm"] = values["damage"].pop("growth")
+    rename(values["damage"], "growth", "growth_mm2_per_mm")
 
 
 @pytest.fixture
