@@ -21,13 +21,13 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def trail(folder: Path) -> Callable[..., None]:
-    """Append some rows, each in a transaction of its own."""
+    """Append some rows."""
 
     def write(number: int = 5, **of_entry: Any) -> None:
-        for place in range(number):
-            values = {"who": "Ida", "role": "quality", "action": "test.done", "subject": f"thing {place}", **of_entry}
-            with writing(folder) as connection:
-                append_audit(connection, AuditEntry(**values))
+        with writing(folder) as connection:
+            for place in range(number):
+                values = {"who": "Ida", "role": "quality", "action": "test.done", "subject": f"thing {place}"}
+                append_audit(connection, AuditEntry(**{**values, **of_entry}))
 
     return write
 
