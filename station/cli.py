@@ -21,6 +21,7 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
+    "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
     "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
@@ -28,13 +29,15 @@ COMMANDS = {
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
-    "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
+    "recipes": Entry("station.commands.recipes:recipes", "Look after recipes, their revisions and approvals."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
+    "thresholds": Entry("station.commands.thresholds:thresholds", "Propose damage thresholds from marked fruit."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
     "verify": Entry("station.commands.verify:verify", "Verify the sensor with the ball, at the start of a shift."),
+    "whatif": Entry("station.commands.whatif:whatif", "Judge stored inspections again by a draft of a recipe."),
 }
 
 

@@ -17,7 +17,7 @@ def described(record: FullRecord) -> str:
     Args:
         record: as the records give it.
     """
-    return _printable("\n".join(_described(record)))
+    return printable("\n".join(_described(record)))
 
 
 def listed(summaries: Sequence[Summary]) -> str:
@@ -41,7 +41,16 @@ def listed(summaries: Sequence[Summary]) -> str:
         )
         for summary in summaries
     ]
-    return _printable(_columns(rows))
+    return printable(_columns(rows))
+
+
+def printable(text: str) -> str:
+    """A text without what would command the terminal: a lot's name comes from outside.
+
+    Args:
+        text: of several lines.
+    """
+    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
 def _described(record: FullRecord) -> Iterator[str]:
@@ -150,11 +159,6 @@ def _pairs(values: Mapping[str, Any]) -> str:
 
 def _number(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
-
-
-def _printable(text: str) -> str:
-    """Without what would command the terminal: a lot's name comes from outside."""
-    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
 def _field(title: str, text: str) -> str:

@@ -108,7 +108,12 @@ class Inspection:
             duration_ms=round(1000 * (time.monotonic() - self.began_s)),
             curve=tuple(self._point(number, seen, onset_mm) for number, seen in enumerate(self.seen)),
             phases_s=dict(self.phases_s),
-            measures={**self.measures, "onset_mm": onset_mm, "mm_per_px": self.mm_per_px},
+            measures={
+                **self.measures,
+                "onset_mm": onset_mm,
+                "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
+                "mm_per_px": self.mm_per_px,
+            },
             images=self._images(),
         )
 

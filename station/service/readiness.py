@@ -5,6 +5,7 @@ from station.inspection.states import STATES, State
 from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.health import Dependency, Liveness, Readiness
+from station.service.lot import LotKeeper
 from station.service.orders import Orders
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
@@ -23,6 +24,7 @@ class Gate:
         crew: the devices.
         orders: the mode, and a recipe's change under way.
         book: the recipes there are.
+        lots: why a lot could not begin.
         liveness: what has to make progress.
         calibrated: whether the sensor is verified where that is demanded.
     """
@@ -34,10 +36,11 @@ class Gate:
         crew: Crew,
         orders: Orders,
         book: RecipeBook,
+        lots: LotKeeper,
         liveness: Liveness,
         calibrated: Calibrated,
     ) -> None:
-        self._boot, self._calibrated = boot, calibrated
+        self._boot, self._lots, self._calibrated = boot, lots, calibrated
         self._service, self._crew, self._orders = service, crew, orders
         self._book, self._liveness = book, liveness
 
@@ -59,7 +62,8 @@ class Gate:
             return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
         if service.active is None:
             numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
-            return Refusal.NOT_READY, f"No recipe is active: choose one by its number ({numbers})."
+            why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
+            return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
         if why := self._calibrated.not_verified():
             return Refusal.NOT_READY, why
         if self._orders.mode != PRODUCTION:
