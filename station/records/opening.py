@@ -9,6 +9,8 @@ from pathlib import Path
 
 from sqlalchemy import Connection, func, select
 
+from station.records.audit import continue_audit, newer_head
+from station.records.audit_head import Head, keep_head, read_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
 from station.records.failures import DAMAGED_REMEDY, in_words
@@ -104,7 +106,8 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
         sync_folder(folder)
         writer = Writer(*_connector(path, mark), str(path))
         try:
-            lost = writer.submit(lambda connection: _begin_again(connection, mark, boot, notices)).result()
+            head = read_head(folder)
+            lost = writer.submit(lambda connection: _begin_again(connection, mark, head, boot, notices)).result()
             images = ImageStore(folder, settings, writer.submit)
         except BaseException:
             writer.close()
@@ -157,11 +160,15 @@ def _migrate(folder: Path) -> None:
         engine.dispose()
 
 
-def _connector(path: Path, mark: SequenceMark) -> tuple[Callable[[], Connection], Callable[[Connection], None]]:
-    """How the writer connects, and what it does before each commit."""
+def _connector(
+    path: Path, mark: SequenceMark
+) -> tuple[Callable[[], Connection], Callable[[Connection], None], Callable[[], None]]:
+    """How the writer connects, and what it does before and after each commit."""
     engine = open_engine(path, "rw")
     found = path.stat()
     saved = mark.value if mark.known else 0
+    head = read_head(path.parent)
+    ahead: Head | None = None
 
     def confirm() -> None:
         """A file that was taken away could be written for ever, and nobody would find it again."""
@@ -173,21 +180,31 @@ def _connector(path: Path, mark: SequenceMark) -> tuple[Callable[[], Connection]
         confirm()
         return engine.connect()
 
-    def before_commit(_connection: Connection) -> None:
-        nonlocal saved
+    def before_commit(connection: Connection) -> None:
+        nonlocal saved, ahead
         if mark.value != saved:
             mark.save()
             saved = mark.value
+        ahead = newer_head(connection, head)
         confirm()
 
-    return connect, before_commit
+    def after_commit() -> None:
+        nonlocal head
+        if ahead is not None:
+            keep_head(path.parent, ahead)
+            head = ahead
+
+    return connect, before_commit, after_commit
 
 
-def _begin_again(connection: Connection, mark: SequenceMark, boot: str, notices: tuple[Notice, ...]) -> tuple[int, ...]:
+def _begin_again(
+    connection: Connection, mark: SequenceMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
+) -> tuple[int, ...]:
     """The first transaction of a start."""
     mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
     lost = end_what_was_left(connection)
     add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
+    continue_audit(connection, head)
     for notice in notices:
         add_event(connection, f"notice_{notice.code}", None, {"cause": notice.cause, "remedy": notice.remedy})
     return tuple(lost)

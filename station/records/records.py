@@ -14,6 +14,7 @@ from typing import Any, Self, TypeVar
 from sqlalchemy import Connection
 
 from station.channel.line import Outcome
+from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.database import FILE_NAME, reading
 from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_kept
@@ -281,6 +282,15 @@ class Records:
     async def note_event(self, name: str, details: Mapping[str, Any], sequence: int | None = None) -> None:
         """Append to the events, with the time."""
         await self._ask(lambda connection: add_event(connection, name, sequence, details))
+
+    async def audit(self, *entries: AuditEntry) -> tuple[AuditRow, ...]:
+        """Append to the audit trail, in one transaction.
+
+        Raises:
+            BadRecordError: an entry is malformed.
+            RecordsError: it may not be durable.
+        """
+        return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
     def status(self) -> Status:
         """How the records do; never waits."""

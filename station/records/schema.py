@@ -230,3 +230,52 @@ events = Table(
     Column("sequence", Integer),
     Column("details", JSON, nullable=False),
 )
+
+audit = Table(
+    "audit",
+    metadata,
+    Column("seq", Integer, primary_key=True, autoincrement=False),
+    Column("utc_ms", Integer, nullable=False),
+    Column("who", Text, nullable=False),
+    Column("role", Text, nullable=False),
+    Column("action", Text, nullable=False),
+    Column("subject", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("old", Text),
+    Column("new", Text),
+    Column("previous_hash", Text, nullable=False),
+    Column("hash", Text, nullable=False),
+    Index("ix_audit_action", "action", "seq"),
+)
+"""Triggers refuse every change but an insert behind the last row. `old` and `new` are canonical JSON, as hashed."""
+
+recipe_revisions = Table(
+    "recipe_revisions",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("revision", Integer, primary_key=True, autoincrement=False),
+    Column("number", Integer, nullable=False),
+    Column("sha256", Text, nullable=False),
+    Column("text", Text, nullable=False),
+    Column("status", Text, nullable=False),
+    Column("origin", Text, nullable=False),
+    Column("based_on", Integer),
+    Column("author", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("created_utc_ms", Integer, nullable=False),
+    Column("approver", Text),
+    Column("approval_reason", Text),
+    Column("approved_utc_ms", Integer),
+    Column("retired_by", Text),
+    Column("retired_reason", Text),
+    Column("retired_utc_ms", Integer),
+    CheckConstraint("status IN ('draft', 'approved', 'retired')", name="status"),
+    CheckConstraint("approver IS NULL OR approver <> author", name="approver"),
+)
+"""`text` is the YAML file as it was, `sha256` that of its values, as a snapshot has it."""
+Index(
+    "ix_recipe_revisions_approved",
+    recipe_revisions.c.name,
+    unique=True,
+    sqlite_where=recipe_revisions.c.status == "approved",
+)

@@ -35,13 +35,18 @@ class Writer:
     """Runs requests on one connection, in the order in which they came."""
 
     def __init__(
-        self, connect: Callable[[], Connection], before_commit: Callable[[Connection], None], place: str
+        self,
+        connect: Callable[[], Connection],
+        before_commit: Callable[[Connection], None],
+        after_commit: Callable[[], None],
+        place: str,
     ) -> None:
         """Start the thread.
 
         Args:
             connect: called in the thread, again after each failure.
             before_commit: called in each transaction after its requests; what it raises fails them all.
+            after_commit: called after each commit, before the answers; it raises nothing.
             place: the database's path, for messages.
 
         Raises:
@@ -53,7 +58,7 @@ class Writer:
         self.error = ""
         self._connect = connect
         self._connection: Connection | None = None
-        self._before_commit = before_commit
+        self._before_commit, self._after_commit = before_commit, after_commit
         self._place = place
         self._queue: queue.SimpleQueue[tuple[Work[Any], Future[Any]] | None] = queue.SimpleQueue()
         self._closed = False
@@ -128,6 +133,7 @@ class Writer:
             self.error = str(told)
             self._disconnect()  # the next batch begins with a sound connection, if there can be one
         else:
+            self._after_commit()
             self.writes += 1
             self.last_write_s = time.monotonic()
             self.error = ""

@@ -5,7 +5,9 @@ import sqlite3
 
 import pytest
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 
 from station.records import database
 from station.records.database import FILE_NAME, MIGRATIONS, migrate, open_engine
@@ -15,8 +17,8 @@ from station.records.schema import metadata
 NEXT = """
 from alembic import op
 import sqlalchemy as sa
-revision = "0002"
-down_revision = "0001"
+revision = "9999"
+down_revision = "{head}"
 def upgrade():
     with op.batch_alter_table("inspections") as table:
         table.add_column(sa.Column("grower", sa.Text()))
@@ -25,13 +27,20 @@ def upgrade():
 
 
 @pytest.fixture
-def next_form(tmp_path, monkeypatch):
-    """Let the program be one whose form is 0002."""
+def head():
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    return ScriptDirectory.from_config(config).get_current_head()
+
+
+@pytest.fixture
+def next_form(tmp_path, monkeypatch, head):
+    """Let the program be one whose form is 9999."""
 
     def use(then="pass"):
         folder = tmp_path / "migrations"
         shutil.copytree(MIGRATIONS, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
-        (folder / "versions" / "0002_next.py").write_text(NEXT.format(then=then))
+        (folder / "versions" / "9999_next.py").write_text(NEXT.format(then=then, head=head))
         monkeypatch.setattr(database, "MIGRATIONS", folder)
 
     return use
@@ -53,11 +62,11 @@ def test_migrations_from_nothing_lead_to_the_tables_of_the_program(tmp_path):
         context = MigrationContext.configure(connection, opts={"compare_type": True, "target_metadata": metadata})
         assert compare_metadata(context, metadata) == []
         made = {row[0] for row in connection.exec_driver_sql("SELECT sql FROM sqlite_master WHERE sql LIKE '%CHECK%'")}
-    assert sum(text.count("CHECK") for text in made) == 5
+    assert sum(text.count("CHECK") for text in made) == 7
     engine.dispose()
 
 
-def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario, folder, trigger, next_form):
+def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario, folder, trigger, next_form, head):
     async def steps():
         async with opened() as records:
             await records.begin(trigger)
@@ -66,22 +75,22 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
             assert records.lost == (1,)
             assert await records.begin(trigger) == 2
         (backup,) = (folder / "backups").iterdir()
-        assert backup.name.endswith("-form-0001.sqlite3")
+        assert backup.name.endswith(f"-form-{head}.sqlite3")
         assert query(backup, "SELECT sequence, outcome FROM inspections") == [(1, None)]
         assert query(folder / FILE_NAME, "SELECT grower FROM inspections") == [(None,), (None,)]
 
     scenario(steps)
 
 
-def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form):
+def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form, head):
     async def steps():
         async with opened() as records:
             await records.begin(trigger)
         next_form('op.execute("INSERT INTO nowhere VALUES (1)")')
-        with pytest.raises(SchemaError, match=r"it is as it was.*; a copy of it is .*form-0001"):
+        with pytest.raises(SchemaError, match=rf"it is as it was.*; a copy of it is .*form-{head}"):
             async with opened():
                 pass
-        assert query(folder / FILE_NAME, "SELECT version_num FROM alembic_version") == [("0001",)]
+        assert query(folder / FILE_NAME, "SELECT version_num FROM alembic_version") == [(head,)]
         with pytest.raises(sqlite3.OperationalError, match="no such column"):
             query(folder / FILE_NAME, "SELECT grower FROM inspections")
 
@@ -98,7 +107,7 @@ def test_a_newer_form_is_left_alone(opened, scenario, folder, trigger, next_form
                 pass
         monkeypatch.setattr(database, "MIGRATIONS", MIGRATIONS)
         before = (folder / FILE_NAME).read_bytes()
-        with pytest.raises(SchemaError, match=r"form '0002' of a newer fruit-station; install that version again"):
+        with pytest.raises(SchemaError, match=r"form '9999' of a newer fruit-station; install that version again"):
             async with opened():
                 pass
         assert (folder / FILE_NAME).read_bytes() == before

@@ -1,0 +1,206 @@
+"""The audit trail: who changed or commanded what, when and why; each row's hash covers the row before it."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select
+
+from station.records.audit_head import FILE_NAME as HEAD_NAME
+from station.records.audit_head import Head
+from station.records.errors import BadRecordError
+from station.records.schema import audit
+from station.records.writing import utc_ms
+
+GENESIS = "0" * 64
+"""What the first row of all has as the hash of the row before it."""
+CONTINUED = "audit.continued"
+"""The action of a row that says that rows before it are missing from this database."""
+STATION = "station"
+"""Who acts where no person does, and its role."""
+LONGEST_WORD, LONGEST_REASON = 64, 1000
+
+_SPARE_NUMBERS = 1000
+"""Left out where the trail goes on without its last rows: rows that the head did not yet tell of keep theirs."""
+_FORM = "fruit-station audit 1"
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """Something that was done, before it has its place in the trail."""
+
+    who: str
+    """A person's name or account; `station` or `plc` where none acted. One printable line."""
+    role: str
+    """In what capacity, as `operator`, `quality`, `service`, `plc`, `station`."""
+    action: str
+    """What was done, as `recipe.approved`, `alarm.acknowledged`, `service.started`."""
+    subject: str
+    """To what, as `recipe strawberry`, `alarm camera_lost`; may be empty."""
+    reason: str = ""
+    """In the words of who did it."""
+    old: Any = None
+    """What was before, as JSON has it."""
+    new: Any = None
+    """What is from now on, as JSON has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class AuditRow:
+    """A row of the trail."""
+
+    seq: int
+    """Rises by one; never given twice in one folder of records."""
+    utc_ms: int
+    who: str
+    role: str
+    action: str
+    subject: str
+    reason: str
+    old: str | None
+    """Canonical JSON."""
+    new: str | None
+    previous_hash: str
+    hash: str
+
+    @property
+    def true_hash(self) -> str:
+        """The SHA-256, hexadecimal, that the row's other columns have."""
+        columns = (self.seq, self.utc_ms, self.who, self.role, self.action, self.subject, self.reason)
+        text = json.dumps([_FORM, *columns, self.old, self.new, self.previous_hash], ensure_ascii=True)
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
+    """Append to the trail, within the transaction of what is told of: both are durable, or neither.
+
+    Args:
+        connection: of a transaction that was begun for writing: the writer's, or one of `writing_connection`.
+        entry: what was done.
+
+    Raises:
+        BadRecordError: a text is empty, too long or not printable, or a value has no JSON.
+    """
+    _check(entry)
+    return _append(connection, entry, last_row(connection), None)
+
+
+def continue_audit(connection: Connection, known: Head | None) -> AuditRow | None:
+    """At a start: where the trail lacks rows that are known to have been there, say so in it.
+
+    Args:
+        connection: as above.
+        known: the head as kept outside the database.
+
+    Returns:
+        The row that says so, with the last row that is here as `old` and the last one known as `new`; None where
+        nothing is missing.
+    """
+    last = last_row(connection)
+    if (known is None and last is None) or (known is not None and holds(connection, known)):
+        return None
+    if known is None:
+        reason = f"{HEAD_NAME} is missing or unreadable: whether these are the last rows of the trail is not known"
+    else:
+        reason = "the last rows of the trail are not in this database: it was replaced, cut or begun anew"
+    found, told = (None if head is None else {"seq": head.seq, "hash": head.hash} for head in (last, known))
+    entry = AuditEntry(STATION, STATION, CONTINUED, "audit", reason, found, told)
+    return _append(connection, entry, last, max(head.seq for head in (last, known) if head) + _SPARE_NUMBERS)
+
+
+def holds(connection: Connection, head: Head) -> bool:
+    """Whether the trail has this very row.
+
+    Args:
+        connection: any.
+        head: its number and hash.
+    """
+    return connection.scalar(select(audit.c.hash).where(audit.c.seq == head.seq)) == head.hash
+
+
+def newer_head(connection: Connection, known: Head | None) -> Head | None:
+    """The trail's head where it is beyond the one known; None where not.
+
+    Args:
+        connection: any.
+        known: as saved last.
+    """
+    found = connection.execute(
+        select(audit.c.seq, audit.c.hash)
+        .where(audit.c.seq > (known.seq if known else 0))
+        .order_by(audit.c.seq.desc())
+        .limit(1)
+    ).one_or_none()
+    return None if found is None else Head(found.seq, found.hash)
+
+
+def last_row(connection: Connection) -> AuditRow | None:
+    """The trail's last row; None where there is none.
+
+    Args:
+        connection: any.
+    """
+    found = connection.execute(select(audit).order_by(audit.c.seq.desc()).limit(1)).one_or_none()
+    return None if found is None else row_of(found)
+
+
+def row_of(found: Row[Any]) -> AuditRow:
+    """A row as read from the table.
+
+    Args:
+        found: with all columns.
+    """
+    return AuditRow(**found._asdict())
+
+
+def canonical(value: Any) -> str | None:
+    """JSON of one form only: keys in order, no spaces; None for None.
+
+    Args:
+        value: as JSON has it.
+
+    Raises:
+        BadRecordError: it has no JSON, as NaN.
+    """
+    if value is None:
+        return None
+    try:
+        return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    except (ValueError, TypeError) as error:
+        raise BadRecordError(f"the audit trail cannot hold {value!r:.200}: {error}", "see the log") from error
+
+
+def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, seq: int | None) -> AuditRow:
+    row = AuditRow(
+        seq=seq or (last.seq + 1 if last else 1),
+        utc_ms=utc_ms(),
+        who=entry.who,
+        role=entry.role,
+        action=entry.action,
+        subject=entry.subject,
+        reason=entry.reason,
+        old=canonical(entry.old),
+        new=canonical(entry.new),
+        previous_hash=last.hash if last else GENESIS,
+        hash="",
+    )
+    values = {name: getattr(row, name) for name in row.__slots__} | {"hash": row.true_hash}
+    connection.execute(insert(audit).values(values))
+    return AuditRow(**values)
+
+
+def _check(entry: AuditEntry) -> None:
+    words = {"who": entry.who, "role": entry.role, "action": entry.action}
+    for name, text in words.items():
+        if not text.strip() or len(text) > LONGEST_WORD or not text.isprintable():
+            raise BadRecordError(
+                f"audit: {name}: expected one printable line of 1 to {LONGEST_WORD} characters, got {text!r:.100}",
+                f"give a proper {name}",
+            )
+    for name, text in {"subject": entry.subject, "reason": entry.reason}.items():
+        if len(text) > LONGEST_REASON or not all(letter.isprintable() or letter == "\n" for letter in text):
+            raise BadRecordError(
+                f"audit: {name}: expected at most {LONGEST_REASON} printable characters, got {text!r:.100}",
+                f"give a shorter {name}, without control characters",
+            )
