@@ -216,7 +216,8 @@ class ImageStore:
                 file.unlink(missing_ok=True)
         missing = frozenset(wanted.keys() - found)
         if missing:
-            log.warning("%d images that the records refer to are missing in %s", len(missing), self._folder)
+            log.warning("%d of %d images that the records refer to are missing", len(missing), len(wanted))
+        if missing and found:  # none at all is a disk that is not mounted: they may come back
             self._record(lambda connection: forget_missing(connection, missing))
         self.size_bytes = sum(size for name, size in wanted.items() if name in found)
         self._counted = True

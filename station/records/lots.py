@@ -71,17 +71,20 @@ def end_lot(connection: Connection, name: str) -> Lot:
     return _told(connection, name)
 
 
-def read_lots(connection: Connection, limit: int, grower: str | None = None) -> list[Lot]:
+def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[Lot]:
     """The lots told of, newest first.
 
     Args:
         connection: any.
         limit: at most so many.
         grower: of this one; of all by default.
+        name: only the lot of this name.
     """
     query = select(*_COLUMNS).order_by(lots.c.id.desc()).limit(limit)
-    rows = connection.execute(query if grower is None else query.where(lots.c.grower == grower))
-    return [Lot(*row) for row in rows]
+    for column, wanted in ((lots.c.grower, grower), (lots.c.name, name)):
+        if wanted is not None:
+            query = query.where(column == wanted)
+    return [Lot(*row) for row in connection.execute(query)]
 
 
 _COLUMNS = (lots.c.name, lots.c.grower, lots.c.began_utc_ms, lots.c.ended_utc_ms, lots.c.revision)

@@ -8,7 +8,7 @@ from typing import Any
 from station.channel.line import Outcome
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.reading import Summary
-from station.records.wording import sentence, sparkline
+from station.records.wording import printable, sentence, sparkline
 
 
 def described(record: FullRecord) -> str:
@@ -17,7 +17,7 @@ def described(record: FullRecord) -> str:
     Args:
         record: as the records give it.
     """
-    return _printable("\n".join(_described(record)))
+    return printable("\n".join(_described(record)))
 
 
 def listed(summaries: Sequence[Summary]) -> str:
@@ -26,13 +26,14 @@ def listed(summaries: Sequence[Summary]) -> str:
     Args:
         summaries: in the order of the lines.
     """
-    rows = [("number", "begun (UTC)", "trigger", "lot", "fruit", "outcome", "s", "reasons", "curve")]
+    rows = [("number", "begun (UTC)", "trigger", "lot", "grower", "fruit", "outcome", "s", "reasons", "curve")]
     rows += [
         (
             str(summary.sequence),
             _time(summary.began_utc_ms),
             str(summary.trigger_id),
             summary.lot or "-",
+            summary.grower or "-",
             summary.fruit,
             summary.outcome or "running",
             "-" if summary.duration_ms is None else f"{summary.duration_ms / 1000:.2f}",
@@ -41,7 +42,7 @@ def listed(summaries: Sequence[Summary]) -> str:
         )
         for summary in summaries
     ]
-    return _printable(_columns(rows))
+    return printable(_columns(rows))
 
 
 def _described(record: FullRecord) -> Iterator[str]:
@@ -150,11 +151,6 @@ def _pairs(values: Mapping[str, Any]) -> str:
 
 def _number(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
-
-
-def _printable(text: str) -> str:
-    """Without what would command the terminal: a lot's name comes from outside."""
-    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
 def _field(title: str, text: str) -> str:

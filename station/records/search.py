@@ -17,6 +17,7 @@ from typing import NamedTuple
 from sqlalchemy import Connection
 
 from station.channel.line import OutcomeName, Reason
+from station.records.database import plain
 from station.records.errors import RecordsError
 from station.records.finding import HOUR_MS
 from station.records.reading import Summary, read_summaries
@@ -81,9 +82,7 @@ def find(connection: Connection, query: Query, highest: int = LARGEST) -> Iterat
         query: what is looked for.
         highest: none above this one.
     """
-    database = connection.connection.driver_connection
-    if not isinstance(database, sqlite3.Connection):
-        raise TypeError(f"{database} is no connection of sqlite3")
+    database = plain(connection)
     lists = _lists(database, query)
     timed = query.from_utc_ms is not None or query.to_utc_ms is not None
     earliest, latest = query.from_utc_ms or 0, 2**63 - 1 if query.to_utc_ms is None else query.to_utc_ms - 1

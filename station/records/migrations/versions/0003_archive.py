@@ -74,6 +74,11 @@ def upgrade() -> None:
         'INSERT INTO outbox (kind, "row") SELECT \'inspection\', sequence FROM inspections'
         " WHERE published_utc_ms IS NOT NULL ORDER BY sequence"
     )
+    op.execute("INSERT INTO outbox (kind, \"row\") SELECT 'audit', seq FROM audit ORDER BY seq")
+    op.execute(
+        "CREATE TRIGGER audit_told AFTER INSERT ON audit"
+        " BEGIN INSERT INTO outbox (kind, \"row\") VALUES ('audit', NEW.seq); END"
+    )
 
 
 def _holds() -> None:
