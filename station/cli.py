@@ -27,6 +27,7 @@ COMMANDS = {
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
+    "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),

@@ -72,7 +72,11 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--to", "begun_to", metavar="TIME", type=Moment(), help="Begun before then."),
         click.option("--outcome", type=click.Choice(["PASS", "FAIL", "NO_RESULT"]), help="Ended so."),
-        click.option("--reason", type=click.Choice([str(reason) for reason in Reason]), help="With this reason among its reasons."),
+        click.option(
+            "--reason",
+            type=click.Choice([str(reason) for reason in Reason]),
+            help="With this reason among its reasons.",
+        ),
     )
     decorated: Callable[..., Any] = gathered
     for option in reversed(options):

@@ -51,9 +51,8 @@ def check_records(folder: Path) -> Found:
     files = {file.stem for file in (folder / FOLDER_NAME).glob("*/*.png")}
     with reading(folder) as connection:  # the station may have removed or added some meanwhile
         still = referred(connection)
-    faults += [f"{image_path(folder, name)}: missing, though an inspection refers to it" for name in missing if name in still]
-    faults += damaged
+    gone = [image_path(folder, name) for name in missing if name in still]
+    faults += [*damaged, *(f"{path}: missing, though an inspection refers to it" for path in gone)]
     orphans = len(files - wanted.keys() - still.keys())
     notes = [f"{orphans} image files belong to no inspection (yet)"] if orphans else []
     return Found(number, len(wanted), tuple(faults), tuple(notes))
-

@@ -43,10 +43,7 @@ def note_hour(connection: Connection, sequence: int, began_utc_ms: int) -> None:
     """
     hour = began_utc_ms // HOUR_MS
     before = connection.scalar(
-        select(hours.c.hour)
-        .where(hours.c.first_sequence <= sequence)
-        .order_by(hours.c.first_sequence.desc())
-        .limit(1)
+        select(hours.c.hour).where(hours.c.first_sequence <= sequence).order_by(hours.c.first_sequence.desc()).limit(1)
     )
     if before == hour:
         return

@@ -103,7 +103,7 @@ def _is(thing: int | str) -> ColumnElement[bool]:
 
 def _standing(connection: Connection, thing: int | str) -> Hold | None:
     row = connection.execute(select(*_COLUMNS).where(_is(thing), holds.c.released_utc_ms.is_(None))).one_or_none()
-    return row and Hold(*row)
+    return None if row is None else Hold(*row)
 
 
 def _named(thing: int | str) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
+
 from station.records.errors import RecordsError
 from station.records.failures import in_words
 from station.records.model import Image
@@ -206,7 +207,7 @@ class ImageStore:
         return shutil.disk_usage(self._folder).free
 
     def _reconcile(self) -> None:
-        """Remove files that nothing refers to, as of a station that was killed, say which are missing, count the rest."""
+        """Remove files that nothing refers to, as of a station that was killed, say what is missing, count the rest."""
         wanted = self._record(referred)
         found = set()
         for file in (self._folder / FOLDER_NAME).glob("*/*"):

@@ -92,7 +92,7 @@ _COLUMNS = (lots.c.name, lots.c.grower, lots.c.began_utc_ms, lots.c.ended_utc_ms
 
 def _known(connection: Connection, name: str) -> Lot | None:
     row = connection.execute(select(*_COLUMNS).where(lots.c.name == name)).one_or_none()
-    return row and Lot(*row)
+    return None if row is None else Lot(*row)
 
 
 def _change(connection: Connection, lot: Lot, **values: object) -> None:

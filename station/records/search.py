@@ -27,7 +27,6 @@ LARGEST_PAGE = 1000
 
 Seek = Callable[[int], int | None]
 """The highest number of a list that is not above this one."""
-_ONE = "ORDER BY sequence DESC LIMIT 1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,13 +121,15 @@ def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
         lists.append(
             _seek(
                 database,
-                f"SELECT sequence FROM inspections INDEXED BY ix_inspections_outcome WHERE outcome = ? "
-                f"AND sequence <= ? {_ONE}",
+                "SELECT sequence FROM inspections INDEXED BY ix_inspections_outcome WHERE outcome = ? "
+                "AND sequence <= ? ORDER BY sequence DESC LIMIT 1",
                 query.outcome,
             )
         )
     if query.lot is None and query.outcome is None and query.reason is None and query.grower is None:
-        lists.append(_seek(database, f"SELECT sequence FROM inspections WHERE sequence <= ? {_ONE}"))
+        lists.append(
+            _seek(database, "SELECT sequence FROM inspections WHERE sequence <= ? ORDER BY sequence DESC LIMIT 1")
+        )
     return lists
 
 
@@ -144,7 +145,9 @@ def _seek(database: sqlite3.Connection, statement: str, *values: str) -> Seek:
 
 def _with_reason(database: sqlite3.Connection, reason: Reason, outcome: OutcomeName | None) -> Seek:
     """Of one outcome, or of the two that have reasons."""
-    statement = f"SELECT sequence FROM reasons WHERE reason = ? AND outcome = ? AND sequence <= ? {_ONE}"
+    statement = (
+        "SELECT sequence FROM reasons WHERE reason = ? AND outcome = ? AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
+    )
     seeks = [_seek(database, statement, reason, each) for each in ([outcome] if outcome else ["FAIL", "NO_RESULT"])]
 
     def seek(highest: int) -> int | None:
@@ -159,14 +162,18 @@ def _of_lot(database: sqlite3.Connection, lot: str, outcome: OutcomeName | None)
 
 def _lot_statement(lot: str, outcome: OutcomeName | None) -> str:
     index, also = ("ix_inspections_lot_outcome", "AND outcome = ?") if outcome else ("ix_inspections_lot", "")
-    return f"SELECT sequence FROM inspections INDEXED BY {index} WHERE lot = {lot} {also} AND sequence <= ? {_ONE}"
+    return (
+        f"SELECT sequence FROM inspections INDEXED BY {index} WHERE lot = {lot} {also} "  # noqa: S608 (of constants)
+        "AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
+    )
 
 
 def _of_grower(database: sqlite3.Connection, grower: str, outcome: OutcomeName | None) -> Seek:
     """The lots' lists merged: a heap of each one's highest number not above the last that was asked for."""
     chosen = (outcome,) if outcome else ()
+    head = _lot_statement("lots.name", outcome)
     heads = database.execute(
-        f"SELECT name, ({_lot_statement('lots.name', outcome)}) AS head FROM lots WHERE grower = ? AND head NOT NULL",
+        f"SELECT name, ({head}) AS head FROM lots WHERE grower = ? AND head NOT NULL",  # noqa: S608 (of constants)
         (*chosen, LARGEST, grower),
     )
     heap = [(-head, lot) for lot, head in heads]

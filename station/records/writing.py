@@ -11,8 +11,8 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.records.errors import BadRecordError, UnknownInspectionError
-from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.finding import note_hour, note_reasons
+from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
     alarms,
     alarms_log,
@@ -154,7 +154,7 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
 
 
 def tell(connection: Connection, kind: OutboxKind, row: int) -> None:
-    """Have other systems told of a row: an inspection when it is published, and again if it is judged after that.
+    """Have other systems told of a row: an inspection when it is published, and again when it changes after that.
 
     Args:
         connection: the writer's, in the transaction that makes it so.
@@ -192,7 +192,10 @@ def end_what_was_left(connection: Connection) -> list[int]:
             .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
         )
         note_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
-    connection.execute(update(inspections).where(table.images_state == PENDING).values(images_state=LOST))
+    lost_images = update(inspections).where(table.images_state == PENDING).values(images_state=LOST)
+    for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
+        if row.published_utc_ms is not None:
+            tell(connection, "inspection", row.sequence)
     return [row.sequence for row in rows]
 
 
@@ -223,7 +226,10 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
     """Reference images whose files are durable, and say how many were kept."""
     if rows:
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
-    connection.execute(update(inspections).where(inspections.c.sequence == sequence).values(images_state=state))
+    table = inspections.c
+    changed = update(inspections).where(table.sequence == sequence).values(images_state=state)
+    if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
+        tell(connection, "inspection", sequence)
 
 
 def _row(connection: Connection, sequence: int) -> Any:

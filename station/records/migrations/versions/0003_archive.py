@@ -71,7 +71,7 @@ def upgrade() -> None:
         " WHERE before IS NULL OR before <> hour"
     )
     op.execute(
-        'INSERT INTO outbox (kind, "row") SELECT \'inspection\', sequence FROM inspections'
+        "INSERT INTO outbox (kind, \"row\") SELECT 'inspection', sequence FROM inspections"
         " WHERE published_utc_ms IS NOT NULL ORDER BY sequence"
     )
     op.execute("INSERT INTO outbox (kind, \"row\") SELECT 'audit', seq FROM audit ORDER BY seq")
