@@ -1,7 +1,6 @@
 """Many inspections, written straight into a database of the records' form: a season in a minute."""
 
 import json
-import random
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,13 +15,14 @@ LOT_SIZE = 2_000
 GROWERS = 40
 _RECIPE = "0" * 64
 _BATCH = 20_000
+_UNMEASURED = (Reason.NO_CONTACT, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.IMAGE_STALE)
 
 _INSPECTION = (
     "INSERT INTO inspections (sequence, boot, trigger_id, encoder, lot, recipe_sha256, recipe_number, recipe_checksum, "
     "simulated, began_utc_ms, ended_utc_ms, duration_ms, judged, reasons, explanation, late, partial, area_mm2, area_px, "
     "closing_mm, confidence, phases_s, measures, devices, versions, images_state, outcome, standing, published_utc_ms, "
     "acknowledged_utc_ms) VALUES (?, 'boot', ?, 0, ?, ?, 3, 1, 0, ?, ?, 3000, ?, ?, '[]', 0, 0, ?, 40000, 4.0, 0.9, "
-    "'{\"approach\":0.8,\"steps\":2.1}', '{}', '{\"camera\":\"DIGIT D20966\"}', '{\"fruit-station\":\"0.1.0\"}', "
+    '\'{"approach":0.8,"steps":2.1}\', \'{}\', \'{"camera":"DIGIT D20966"}\', \'{"fruit-station":"0.1.0"}\', '
     "'not wanted', ?, ?, ?, ?)"
 )
 
@@ -33,16 +33,15 @@ def made(number: int) -> tuple[str, str, tuple[str, ...]]:
     Args:
         number: its sequence.
     """
-    chance = random.Random(number)
+    chance = number * 2_654_435_761 % 2**32 / 2**32  # Knuth, The Art of Computer Programming, vol. 3, section 6.4
     lot = f"L{number // LOT_SIZE:05d}"
-    share = chance.random()
-    if share < 0.92:
+    if number % 100_000 == 7:
+        return lot, "NO_RESULT", (Reason.CAMERA_FAULT,)
+    if chance < 0.92:
         return lot, "PASS", ()
-    if share < 0.98:
-        extra = (Reason.EARLY_STOP,) if chance.random() < 0.5 else ()
-        return lot, "FAIL", (Reason.AREA_OVER_LIMIT, *extra)
-    why = chance.choice((Reason.NO_CONTACT, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.IMAGE_STALE))
-    return lot, "NO_RESULT", (Reason.CAMERA_FAULT,) if number % 100_000 == 7 else (why,)
+    if chance < 0.98:
+        return lot, "FAIL", (Reason.AREA_OVER_LIMIT, *((Reason.EARLY_STOP,) if chance < 0.95 else ()))
+    return lot, "NO_RESULT", (_UNMEASURED[int(chance * 1e6) % len(_UNMEASURED)],)
 
 
 def grower_of(lot: str) -> str:

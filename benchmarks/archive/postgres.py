@@ -43,7 +43,9 @@ class Server:
         data = self.folder / "data"
         self._call("initdb", "--no-sync", "--auth=trust", "--username=fruit", "--encoding=UTF8", "-D", data)
         self.start()
-        with psycopg.connect(host=str(self.folder), port=PORT, user="fruit", dbname="postgres", autocommit=True) as made:
+        with psycopg.connect(
+            host=str(self.folder), port=PORT, user="fruit", dbname="postgres", autocommit=True
+        ) as made:
             made.execute("CREATE DATABASE fruit")
         with self.connect() as connection:
             connection.execute(SCHEMA.read_bytes())
