@@ -7,6 +7,9 @@ import click
 from station.commands.records_options import config_option, folder_of, query_options
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
+from station.records.failures import in_words
+from station.records.lot_report import WAYS, write_report
+from station.records.lot_summary import summarise
 from station.records.search import Query
 
 
@@ -22,5 +25,16 @@ def export(file: Path, query: Query, config: Path | None) -> None:
 
 
 @click.command()
-def report() -> None:
-    """Later."""
+@click.argument("lot")
+@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+@config_option
+def report(lot: str, file: Path, config: Path | None) -> None:
+    """Write a report of the lot LOT to FILE: .html or .pdf by its ending, one file that needs no other."""
+    if file.suffix not in WAYS:
+        raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(WAYS)}")
+    summary = summarise(folder_of(config), lot)
+    try:
+        write_report(summary, file)
+    except OSError as error:
+        raise in_words(error, str(file)) from error
+    click.echo(f"{file}: {summary.total} inspections of lot {lot}")
