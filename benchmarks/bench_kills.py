@@ -1,9 +1,9 @@
 """A station that writes is killed (SIGKILL) at random moments, and what it had acknowledged is looked for.
 
-Run with `./run bench kills`: 1,000 kills; `--rounds N` for others. Three fruits are under way at a time, with images that
-push each other out of a small quota, and a row of the audit trail for each. Afterwards: no acknowledged trigger, outcome
-or audit row is missing, none is there twice, the database is sound, and every image has its row and every row its image.
-Writes docs/records-kills.md. Exits 1 where something is wrong.
+Run with `./run bench kills`: 1,000 kills; `--rounds N` for others. Three fruits are under way at a time, with images
+that push each other out of a small quota, and a row of the audit trail for each. Afterwards: no acknowledged trigger,
+outcome or audit row is missing, none is there twice, the database is sound, and every image has its row and every row
+its image. Writes docs/records-kills.md. Exits 1 where something is wrong.
 """
 
 import argparse
@@ -168,11 +168,13 @@ def main() -> int:
         "`./run bench kills` writes this page: a station that writes three fruits at a time is killed (SIGKILL) at a "
         "random moment,\none time in ten while it starts. A sample is part of every test run.\n\n"
         "| acknowledged before a kill | |\n| --- | --- |\n"
-        f"| kills | {arguments.rounds} |\n| triggers | {len(told['begun'])} |\n| outcomes | {len(told['concluded'])} |\n"
-        f"| outcomes noted as told | {len(told['published'])} |\n| rows of the audit trail | {len(told['audited'])} |\n\n"
+        f"| kills | {arguments.rounds} |\n| triggers | {len(told['begun'])} |\n"
+        f"| outcomes | {len(told['concluded'])} |\n| outcomes noted as told | {len(told['published'])} |\n"
+        f"| rows of the audit trail | {len(told['audited'])} |\n\n"
         "| wrong afterwards | |\n| --- | --- |\n"
         + "".join(f"| {what} | {count} |\n" for what, count in wrong.items())
-        + f"\n{took_s:.0f} s; {platform.machine()}, Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}.\n"
+        + f"\n{took_s:.0f} s; {platform.machine()}, Python {platform.python_version()}, "
+        f"SQLite {sqlite3.sqlite_version}.\n"
     )
     print(text)
     DOCUMENT.write_text(text, encoding="utf-8")

@@ -1,8 +1,8 @@
 """Three stations tell one PostgreSQL of their inspections, while it is stopped, killed, and its connections are cut.
 
-Run with `./run bench outbox`: 100,000 inspections each of 34 a thousand lots' part, then none may be missing, doubled or
-out of order. Beside it, in the same run: the same rows by psycopg's executemany, without any of that. Writes
-docs/outbox-speed.md. Exits 1 where something is missing.
+Run with `./run bench outbox`: of 100,000 inspections none may be missing, doubled or out of order afterwards. Beside
+it, in the same run: the same events by psycopg's executemany, without any of that. Writes docs/outbox-speed.md. Exits 1
+where something is wrong.
 """
 
 import argparse
@@ -150,9 +150,9 @@ def main() -> int:
         alone_s, bare_s = undisturbed(server, folder, some), bare(server, folder, some)
         text = (
             "# How fast other systems are told\n\n"
-            f"`./run bench outbox` writes this page. {STATIONS} stations, {rows} inspections with 4 curve points each, one "
-            f"PostgreSQL. Half of\nthem are written while they are told; meanwhile the server is disturbed at random "
-            f"moments.\n\n"
+            f"`./run bench outbox` writes this page. {STATIONS} stations, {rows} inspections with 4 curve points "
+            f"each, one PostgreSQL. Half of\nthem are written while they are told; meanwhile the server is disturbed at "
+            f"random moments.\n\n"
             f"| done to the server | times |\n| --- | --- |\n| connections cut | {done['cut']} |\n"
             f"| crashed (stopped with `immediate`) | {done['crashed']} |\n| stopped orderly | {done['stopped']} |\n\n"
             "| found afterwards | inspections |\n| --- | --- |\n"
@@ -161,8 +161,8 @@ def main() -> int:
             f"| one station, undisturbed, {some} inspections | inspections/s |\n| --- | --- |\n"
             f"| outbox: COPY, then typed columns, idempotent | {some / alone_s:.0f} |\n"
             f"| bare psycopg: the same JSON by executemany | {some / bare_s:.0f} |\n\n"
-            f"Server and stations on one machine: {platform.machine()}, Python {platform.python_version()}. A station makes "
-            "some 0.3 inspections/s.\n"
+            f"Server and stations on one machine: {platform.machine()}, Python {platform.python_version()}. A station "
+            "makes some 0.3 inspections/s.\n"
         )
     print(text)
     DOCUMENT.write_text(text, encoding="utf-8")

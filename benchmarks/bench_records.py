@@ -1,8 +1,8 @@
 """What it costs to make an inspection durable, to find it among millions, and to export: beside bare sqlite3.
 
 An inspection is a begin, a conclusion with 13 curve points, and the note that it was published: three commits that
-somebody waits for, with synchronous=FULL. Prints the tables and writes docs/records-speed.md. The folder to write in can
-be given: what is measured is above all its disk; 5 million inspections take some 6 GB of it.
+somebody waits for, with synchronous=FULL. Prints the tables and writes docs/records-speed.md. The folder to write in
+can be given: what is measured is above all its disk; 5 million inspections take some 6 GB of it.
 """
 
 import argparse
@@ -285,8 +285,8 @@ def main() -> int:
             ["records", "begin p50, ms", "begin p99, ms", "conclude p50, ms", "conclude p99, ms", "inspections/s"], rows
         )
         + f"\n\n{INSPECTIONS} inspections each; one sync of 4 KiB took {synced_ms:.2f} ms (median).\n\n## To find\n\n"
-        f"Pages of 50 among {arguments.rows:,} inspections ({size_gb:.1f} GB, generated in {filled_s:.0f} s), read with "
-        "their curves,\nup to 20 pages of each question. Bare sqlite3 gets the same question in plain SQL on the same "
+        f"Pages of 50 among {arguments.rows:,} inspections ({size_gb:.1f} GB, generated in {filled_s:.0f} s), read "
+        "with their curves,\nup to 20 pages of each question. Bare sqlite3 gets the same question in plain SQL on the same "
         "tables and indexes, for the\nnumbers of the first page alone, and is given up after "
         f"{PATIENCE_S:g} s; the answers are the same.\n\n"
         + markdown(["asked for", "found", "first page, ms", "slowest page, ms", "bare sqlite3, ms"], found)

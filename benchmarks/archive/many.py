@@ -19,8 +19,9 @@ _UNMEASURED = (Reason.NO_CONTACT, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reaso
 
 _INSPECTION = (
     "INSERT INTO inspections (sequence, boot, trigger_id, encoder, lot, recipe_sha256, recipe_number, recipe_checksum, "
-    "simulated, began_utc_ms, ended_utc_ms, duration_ms, judged, reasons, explanation, late, partial, area_mm2, area_px, "
-    "closing_mm, confidence, phases_s, measures, devices, versions, images_state, outcome, standing, published_utc_ms, "
+    "simulated, began_utc_ms, ended_utc_ms, duration_ms, judged, reasons, explanation, late, partial, area_mm2, "
+    "area_px, closing_mm, confidence, phases_s, measures, devices, versions, images_state, outcome, standing, "
+    "published_utc_ms, "
     "acknowledged_utc_ms) VALUES (?, 'boot', ?, 0, ?, ?, 3, 1, 0, ?, ?, 3000, ?, ?, '[]', 0, 0, ?, 40000, 4.0, 0.9, "
     '\'{"approach":0.8,"steps":2.1}\', \'{}\', \'{"camera":"DIGIT D20966"}\', \'{"fruit-station":"0.1.0"}\', '
     "'not wanted', ?, ?, ?, ?)"
@@ -113,8 +114,8 @@ def _rows(numbers: range) -> Iterator[tuple[object, ...]]:
         lot, outcome, reasons = made(number)
         area = 20.0 + number % 60
         told = json.dumps({
-            "sequence": number, "trigger_id": number % 65_535 + 1, "outcome": outcome, "reasons": reasons, "late": False,
-            "partial": False, "simulated": False, "area_mm2": area, "area_px": 40_000, "closing_mm": 4.0,
+            "sequence": number, "trigger_id": number % 65_535 + 1, "outcome": outcome, "reasons": reasons,
+            "late": False, "partial": False, "simulated": False, "area_mm2": area, "area_px": 40_000, "closing_mm": 4.0,
             "confidence": 0.9, "recipe_number": 3, "recipe_checksum": 1, "began_utc_ms": _began(number),
             "ended_utc_ms": _began(number) + 2900, "duration_ms": 3000, "encoder": 0, "lot": lot,
         })  # fmt: skip

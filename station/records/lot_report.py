@@ -84,7 +84,7 @@ def pdf_report(lot: LotSummary) -> bytes:
         _line(pdf, "Nothing was rejected.")
     _heading(pdf, "Recipes")
     for name, revision, sha256, number in lot.recipes:
-        _line(pdf, f"{number} inspections with {name}, revision {revision or '–'}, SHA-256 {sha256[:16]}…")
+        _line(pdf, f"{number} inspections with {name}, revision {revision or '-'}, SHA-256 {sha256[:16]}…")
     if lot.examples:
         _heading(pdf, "The last rejected fruit")
         _examples(pdf, lot.examples)

@@ -116,7 +116,8 @@ def summarise(folder: Path, name: str) -> LotSummary:
         mean_s, simulated, late = ask(sums, (name,)).fetchone()
         held = ask(
             "SELECT coalesce('inspection ' || sequence, 'the lot') || ': ' || reason FROM holds "
-            "WHERE released_utc_ms IS NULL AND (lot = ?1 OR sequence IN (SELECT sequence FROM inspections WHERE lot = ?1))",
+            "WHERE released_utc_ms IS NULL "
+            "AND (lot = ?1 OR sequence IN (SELECT sequence FROM inspections WHERE lot = ?1))",
             (name,),
         ).fetchall()
         grower = ask("SELECT grower FROM lots WHERE name = ?", (name,)).fetchone()

@@ -125,7 +125,7 @@ def test_a_backup_that_is_not_whole_is_not_put_back(opened, scenario, inspected,
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(content)
     before = (folder / FILE_NAME).read_bytes()
-    with pytest.raises(DamagedError, match="take another backup|put back a backup"):
+    with pytest.raises(DamagedError, match=r"take another backup|put back a backup"):
         restore_backup(folder, tmp_path / "copy", "ada")
     assert (folder / FILE_NAME).read_bytes() == before
     assert names(folder)

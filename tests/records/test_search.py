@@ -112,7 +112,8 @@ def test_an_inspection_known_by_its_outcome_alone_is_found_by_its_time(opened, s
                 await records.begin(replace(trigger, began_utc_ms=hour * HOUR_MS))
             outcome = await records.conclude(2, passed)
             await records.change(lambda connection: connection.exec_driver_sql("DELETE FROM curve_points"))
-            await records.change(lambda connection: connection.exec_driver_sql("DELETE FROM inspections WHERE sequence=2"))
+            gone = "DELETE FROM inspections WHERE sequence = 2"
+            await records.change(lambda connection: connection.exec_driver_sql(gone))
             early = outcome.model_copy(update={"began_utc_ms": 3 * HOUR_MS})
             await records.change(lambda connection: publish(connection, early, 3, "boot"))
 
