@@ -16,10 +16,11 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from reliability.clock import CannotDoError
 from reliability.play import Row, play
 from reliability.report import markdown
-from reliability.rig import CannotDoError, running
-from reliability.scenario import DiskFault, Phase, Scenario, load_scenarios
+from reliability.rig import running
+from reliability.scenario import Phase, Scenario, load_scenarios
 
 from station.errors import BadInputError, StationError
 
@@ -38,7 +39,7 @@ async def run_scenario(
         with tempfile.TemporaryDirectory(prefix="faults-") as name:
             folder = Path(name)
             try:
-                async with running(folder, next(numbers), own_disk=isinstance(scenario.fault, DiskFault)) as rig:
+                async with running(folder, next(numbers), scenario.fault) as rig:
                     while left:
                         rows.append(await play(rig, scenario, left.pop(0)))
                         print(told(rows[-1]), flush=True)

@@ -10,7 +10,8 @@ from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.reading import read_inspection
 
-from .rig import CannotDoError, Rig
+from .clock import CannotDoError
+from .rig import Rig
 from .scenario import Phase, Scenario
 from .wire import Shown
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from .play import Row
-from .scenario import DeviceFault, DiskFault, Phase, ProcessFault, Scenario
+from .scenario import ClockFault, DeviceFault, DiskFault, NestFault, Phase, ProcessFault, Scenario
 
 _ELSEWHERE = re.compile(r"/tmp/[^/ ]+/")
 _HEAD = """# What becomes of the fruit when something fails
@@ -57,9 +57,7 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
         "",
         "## Not played",
         "",
-        "- Clock steps of an hour: they need a machine whose clock may be set, or a library that fakes it.",
-        *_unplayed(rows, scenarios),
-        "- The twin's faults `garbage`, `wrong`, `slow`, `delayed` and `intermittent`.",
+        *(_unplayed(rows, scenarios) or ["Nothing of the scenarios."]),
         "",
     ]
     remarks = [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]
@@ -78,13 +76,16 @@ def _line(row: Row, scenario: Scenario) -> str:
 def _named(scenario: Scenario) -> str:
     fault = scenario.fault
     if isinstance(fault, DeviceFault):
-        return f"{fault.device} `{fault.fault}`, {scenario.lasts_s:g} s"
+        amount = "" if fault.amount == 1.0 else f" {fault.amount:g}"
+        return f"{fault.device} `{fault.fault}`{amount}, {scenario.lasts_s:g} s"
     if isinstance(fault, ProcessFault):
         stood = f", {scenario.lasts_s:g} s" if fault.signal == "SIGSTOP" else ""
         return f"{fault.signal} to {fault.process}{stood}"
     if isinstance(fault, DiskFault):
         return f"records' disk {fault.disk.replace('_', '-')}, {scenario.lasts_s:g} s"
-    return "none"
+    if isinstance(fault, ClockFault):
+        return f"clock {fault.step_s:+g} s, {scenario.lasts_s:g} s"
+    return "the fruit falls out" if isinstance(fault, NestFault) else "none"
 
 
 def _unplayed(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> list[str]:

@@ -21,14 +21,14 @@ from plc_interface.client import StationClient
 from plc_interface.client_errors import ClientError
 from plc_interface.codec import WordOrder
 from plc_interface.line.scan import Scanner
-from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 from station.twin.console import ask
 
-from .scenario import DeviceFault, DiskFault, Phase, ProcessFault
+from .clock import CannotDoError, ShiftedClock
+from .scenario import ClockFault, DeviceFault, DiskFault, Fault, NestFault, Phase, ProcessFault
 from .wire import Wire
 
 LOOPBACK = "127.0.0.1"
@@ -45,10 +45,6 @@ _JAWS_OPEN_MM = 50.0
 _START_S = 120.0
 
 
-class CannotDoError(StationError):
-    """What a scenario asks cannot be done on this machine."""
-
-
 class Rig:
     """One running station.
 
@@ -62,6 +58,7 @@ class Rig:
         self.configuration, self.records = configuration, configuration.home / "records"
         self._file, self._console = file, console_port
         self._ballast = self.records / "ballast"
+        self.clock = ShiftedClock(file.parent)
         self._stopped: list[psutil.Process] = []
         self.recipe = load_recipes(configuration.recipes_folder)[FRUIT]
         modbus = configuration.modbus
@@ -119,7 +116,7 @@ class Rig:
             return (await self.twin(do="state"))["closing_mm"] > _DEFORMED_MM
         return phase is not Phase.RELEASING or self.wire.result_valid
 
-    async def begin(self, fault: DeviceFault | ProcessFault | DiskFault) -> None:
+    async def begin(self, fault: Fault) -> None:
         """Switch a fault on.
 
         Raises:
@@ -132,6 +129,10 @@ class Rig:
             process.send_signal(signal.Signals[fault.signal])
             if fault.signal == "SIGSTOP":
                 self._stopped.append(process)
+        elif isinstance(fault, ClockFault):
+            self.clock.step(fault.step_s)
+        elif isinstance(fault, NestFault):
+            await self.twin(do="remove")
         elif fault.disk == "full":
             with contextlib.suppress(OSError), self._ballast.open("wb", buffering=0) as ballast:
                 while True:
@@ -140,7 +141,7 @@ class Rig:
             self._process("service").kill()
             await self._mount("-o", "remount,ro", str(self.records))
 
-    async def end(self, fault: DeviceFault | ProcessFault | DiskFault) -> None:
+    async def end(self, fault: Fault) -> None:
         """Take a fault back. Idempotent."""
         if isinstance(fault, DeviceFault):
             await self.twin(do="clear", device=fault.device, fault=fault.fault)
@@ -149,6 +150,10 @@ class Rig:
                 with contextlib.suppress(psutil.NoSuchProcess):
                     process.resume()
             self._stopped.clear()
+        elif isinstance(fault, ClockFault):
+            self.clock.step(0)
+        elif isinstance(fault, NestFault):
+            return
         elif fault.disk == "full":
             self._ballast.unlink(missing_ok=True)
         else:
@@ -248,16 +253,16 @@ def _quick_recipes(folder: Path) -> Path:
 
 
 @contextlib.asynccontextmanager
-async def running(folder: Path, number: int, *, own_disk: bool = False) -> AsyncIterator[Rig]:
+async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterator[Rig]:
     """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
 
     Args:
         folder: an empty one.
         number: another one for each station that this process starts.
-        own_disk: the records get a small disk.
+        fault: what will be played; for some the station is prepared.
 
     Raises:
-        CannotDoError: the disk cannot be had.
+        CannotDoError: the fault's disk or clock cannot be had.
         StationError: a process does not start.
     """
     modbus, metrics, camera, console = _free_ports(4)
@@ -280,10 +285,12 @@ async def running(folder: Path, number: int, *, own_disk: bool = False) -> Async
     logs.mkdir()
     rig = Rig(configuration, file, console)
     environment = {**os.environ, "STATION_HOME": str(folder / "home"), "OMP_NUM_THREADS": "1"}
+    if isinstance(fault, ClockFault):
+        environment |= rig.clock.build()
     programs = [twin_program(file, console, 1, logs), *station_programs(file, logs)]
     supervisor = Supervisor([replace(each, start_limit_s=_START_S) for each in programs], environment)
     ended, ready = asyncio.Event(), asyncio.Event()
-    if own_disk:
+    if isinstance(fault, DiskFault):
         await rig.mount_records()
     supervising = asyncio.create_task(supervisor.run(ready.set, ended), name="supervisor")
     waiting = asyncio.create_task(ready.wait())

@@ -55,6 +55,22 @@ class DiskFault(_Checked):
     """`read_only` kills the service first, as a file system with open files cannot be made so."""
 
 
+class ClockFault(_Checked):
+    """The machine's clock is set, as its processes see it; taking it back sets it again."""
+
+    kind: Literal["clock"] = "clock"
+    step_s: float
+
+
+class NestFault(_Checked):
+    """The fruit is gone from between the jaws, and does not come back."""
+
+    kind: Literal["nest"] = "nest"
+
+
+Fault = DeviceFault | ProcessFault | DiskFault | ClockFault | NestFault
+
+
 class Expected(_Checked):
     """What has to come of the fruit."""
 
@@ -67,7 +83,7 @@ class Scenario(_Checked):
     """One fault, in some phases of the cycle, a fruit each."""
 
     name: str
-    fault: DeviceFault | ProcessFault | DiskFault | None
+    fault: Fault | None
     """None for a fruit that nothing happens to."""
     lasts_s: float = 3.0
     """Then it is taken back."""

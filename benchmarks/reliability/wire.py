@@ -8,7 +8,7 @@ from typing import NamedTuple
 from plc_interface.line.program import LineProgram, Outputs, Passage, Stage, Values
 from plc_interface.line.scan import Scanner
 from plc_interface.register_map import BY_NAME
-from station.inspection.alarm_table import AlarmId
+from station.inspection.alarm_table import ALARMS, AlarmId
 
 _SCAN_S = 0.02
 _RESET_SEQUENCES = 1000
@@ -140,8 +140,8 @@ class Wire:
         accepted = int(inputs["accepted_trigger_id"])
         if accepted and (not self.accepted or self.accepted[-1] != accepted):
             self.accepted.append(accepted)
-        for number, alarm in enumerate(AlarmId):
-            if int(inputs["alarms"]) >> number & 1:
+        for alarm, row in ALARMS.items():
+            if int(inputs["alarms"]) >> (row.number - 1) & 1:
                 self.alarms.add(alarm)
         sequence = int(inputs["result_sequence"])
         if self.result_valid and sequence and sequence == inputs["result_sequence_again"]:

@@ -55,7 +55,6 @@ class AlarmId(StrEnum):
     MANY_NO_RESULT = "many_no_result"
     REJECT_RATE = "reject_rate"
     DEADLINE_MISSED = "deadline_missed"
-    HMI_LOST = "hmi_lost"
 
 
 class Provocation(NamedTuple):
@@ -116,9 +115,9 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.FRUIT_HELD: AlarmRow(
         4,
         Priority.HIGH,
-        "Arm or gripper failed on the way to a fruit's place.",
-        "A judged fruit is still between the jaws; triggers are refused.",
-        "Take the fruit out and put it where it belongs, mend the other alarms, then confirm at the panel.",
+        "Arm or gripper failed before a judged fruit was let go.",
+        "The fruit may still be between the jaws; triggers are refused.",
+        "Take the fruit out if it is, put it where it belongs, mend the other alarms, then confirm at the panel.",
         (P("arm", "link_cut"), P("gripper", "off")),
         latched=True,
     ),
@@ -180,19 +179,19 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     ),
     AlarmId.CAMERA_LED_DEAD: AlarmRow(
         12,
-        Priority.LOW,
-        "One colour of the sensor's light is missing.",
-        "Areas are less certain; more fruit becomes NO_RESULT.",
-        "Change the sensor at the next pause.",
+        Priority.MEDIUM,
+        "The light of the untouched gel is not the golden reference's: a colour of it is missing.",
+        "The inspection became NO_RESULT, and so will the next.",
+        "Change the sensor; after a change remove the golden reference from the home folder.",
         (P("camera", "led_dead"),),
     ),
     AlarmId.CAMERA_DIRTY: AlarmRow(
         13,
-        Priority.LOW,
-        "The untouched gel differs from its golden reference in small places.",
-        "Dirt may be taken for contact, or spoil the gel.",
-        "Clean the gel with a soft cloth and alcohol.",
-        (P("camera", "dirt"),),
+        Priority.MEDIUM,
+        "The untouched gel's picture is less sharp than the golden reference's: something fogs or smears it.",
+        "The inspection became NO_RESULT, and so will the next.",
+        "Clean the lens and the gel with a soft cloth and alcohol.",
+        (P("camera", "lens_fogged"),),
     ),
     AlarmId.CAMERA_SATURATED: AlarmRow(
         14,
@@ -205,16 +204,16 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.REFERENCE_BAD: AlarmRow(
         15,
         Priority.MEDIUM,
-        "A reference is not sharp, or not like the golden one: something touches the gel, or the gel is torn.",
+        "A reference shows what the golden one does not: something touches the gel, or it is dirty or torn.",
         "The inspection became NO_RESULT, and so will the next.",
-        "See that nothing touches the gel; look at the gel, and change it if it is torn.",
-        (P("camera", "gel_torn"), P("camera", "lens_fogged")),
+        "See that nothing touches the gel; wipe it with a soft cloth and alcohol, and change it if it is torn.",
+        (P("camera", "gel_torn"), P("camera", "dirt")),
     ),
     AlarmId.REFERENCE_DRIFTING: AlarmRow(
         16,
         Priority.LOW,
-        "References move away from the golden one.",
-        "Areas become less certain.",
+        "The light of the untouched gel moves away from the golden reference's: halfway to where it is refused.",
+        "Areas become less certain; further away the reference is refused.",
         "Take a new golden reference at the next pause, on a clean gel.",
         (P("camera", "lens_fogged"),),
     ),
@@ -301,9 +300,9 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.PROCESS_RESTARTS: AlarmRow(
         27,
         Priority.HIGH,
-        "A process of the station ended too often in a short time.",
-        "It is not started again.",
-        "Read its log for why it ends, mend that, then start the station again.",
+        "A process of the station ended three times within a minute.",
+        "What it does is missing meanwhile; after the sixth time it is not started again.",
+        "Read its log for why it ends and mend that; if it was given up, start the station again.",
         (P("process", "crash_loop"),),
     ),
     AlarmId.MANY_NO_RESULT: AlarmRow(
@@ -329,14 +328,6 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         "Its outcome is NO_RESULT, and the line diverts the fruit.",
         "Look at which phase was slow; check the load of the machine and the arm's speed slider.",
         (P("arm", "slow"), P("gripper", "delayed")),
-    ),
-    AlarmId.HMI_LOST: AlarmRow(
-        31,
-        Priority.LOW,
-        "The panel's process does not answer.",
-        "Nobody sees the station's pages; inspections go on.",
-        "Wait for its restart; if it stays away, read its log.",
-        (P("process", "hmi"),),
     ),
 }
 """Every alarm, in the order of its number."""

@@ -72,6 +72,22 @@ class Evidence:
         before = [point for point in self.judged if point.closing_mm < last_mm]
         return self.judged[: len(before) + 1]
 
+    @cached_property
+    def excused(self) -> list[Measured]:
+        """Needed points of too little confidence that a PASS does without.
+
+        The area rises with the closing: where the last needed point is trusted and within every limit, so is what lies
+        before it, whatever an image there shows. What such a point may spoil, the onset, is asked of the others too.
+        """
+        if not self.needed:
+            return []
+        last, thresholds = self.needed[-1], self._recipe.damage.area
+        reached = last.closing_mm >= thresholds[-1].closing_mm
+        kept = last.area_mm2 + last.area_uncertainty_mm2 <= min(threshold.area_mm2 for threshold in thresholds)
+        if not reached or not kept or self.doubts(last) or last in self.falling:
+            return []
+        return [point for point in self.needed if self.doubts(point) == {Flag.LOW_CONFIDENCE}]
+
     def bounds(self, point: Measured) -> bool:
         """Whether the area is surely no smaller: a contact that the border cuts is larger still."""
         return self.doubts(point) <= {Flag.CUT_BY_BORDER} and point not in self.falling
@@ -131,12 +147,16 @@ class Evidence:
 
     @property
     def begins_at_mm(self) -> float | None:
-        """Where the needed points' own line starts from no area; None where they show none."""
-        steps = _slopes(self.needed)
-        slope = median(steps) if steps else 0.0
-        if slope <= 0:
-            return None
-        return median(point.closing_mm - point.area_mm2 / slope for point in self.needed)
+        """Where the needed points' own line starts from no area; None where they show none.
+
+        Where points are excused, the trusted ones have to show it too, with the first beyond the needed ones: the later
+        of both begins.
+        """
+        begins = [_begins_at_mm(self.needed)]
+        if self.excused:
+            beyond = [point for point in self.judged if point not in self.needed and self.bounds(point)]
+            begins.append(_begins_at_mm([*(point for point in self.needed if self.bounds(point)), *beyond[:1]]))
+        return None if None in begins else max(begin for begin in begins if begin is not None)
 
     def _growth(self, window: Sequence[Measured]) -> Growth:
         """Theil and Sen's slope; its uncertainty is that of a fitted line through points equally uncertain.
@@ -149,6 +169,12 @@ class Evidence:
         uncertainty = max(point.area_uncertainty_mm2 for point in window) / spread_mm
         trusted = all(self.bounds(point) for point in window)
         return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, trusted)
+
+
+def _begins_at_mm(points: Sequence[Measured]) -> float | None:
+    steps = _slopes(points)
+    slope = median(steps) if steps else 0.0
+    return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
 
 
 def _in_order(points: Sequence[Measured]) -> list[Measured]:

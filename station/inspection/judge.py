@@ -166,7 +166,9 @@ def _hopeless(evidence: Evidence, recipe: Recipe, place: str) -> Finding | None:
     area = evidence.area_at(threshold.closing_mm)
     if last.closing_mm < threshold.closing_mm or area is None:
         return None
-    if area[0] - area[1] >= threshold.least_area_mm2 and all(evidence.bounds(point) for point in evidence.needed):
+    if area[0] - area[1] >= threshold.least_area_mm2 and all(
+        evidence.bounds(point) or point in evidence.excused for point in evidence.needed
+    ):
         return None
     sentence = f"{place}: what was measured by then cannot be trusted, so the fruit cannot pass any more."
     return Finding(Reason.EARLY_STOP, sentence, area[0], threshold.least_area_mm2, threshold.closing_mm)
@@ -230,7 +232,8 @@ def _area(evidence: Evidence, threshold: AreaThreshold) -> Iterator[Finding]:
 def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:
     """What a PASS would need and does not have."""
     for flag, (reason, what) in _DOUBTS.items():
-        doubtful = [point for point in evidence.needed if flag in evidence.doubts(point)]
+        asked = [point for point in evidence.needed if point not in evidence.excused]
+        doubtful = [point for point in asked if flag in evidence.doubts(point)]
         if doubtful:
             worst = min(doubtful, key=lambda point: point.confidence or 0.0)
             places = ", ".join(f"{point.closing_mm:.1f}" for point in doubtful)

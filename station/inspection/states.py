@@ -133,8 +133,8 @@ STATES: dict[State, StateFacts] = {
     State.CARRIED: StateFacts(
         PackmlState.HELD,
         Refusal.NOT_READY,
-        "A judged fruit is still between the jaws, away from its place: take it out, mend what the alarms say, then "
-        "confirm at the panel.",
+        "A judged fruit may still be between the jaws: take it out, mend what the alarms say, then confirm at the "
+        "panel.",
         needs_person=True,
         may_exit=True,
     ),

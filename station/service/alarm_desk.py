@@ -5,7 +5,7 @@ import logging
 import time
 
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.camera.interface import CameraError
+from station.devices.camera.interface import CameraError, FrameFault
 from station.devices.gripper.errors import (
     GripperLinkLostError,
     GripperProtocolError,
@@ -20,6 +20,7 @@ from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
 from station.service.crew import ARM, CAMERA, GRIPPER
+from station.service.grip import FramesError
 from station.service.inspection import utc_ms
 from station.service.metrics import Metrics
 
@@ -38,7 +39,7 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
     GRIPPER: frozenset({AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
     CAMERA: frozenset({AlarmId.CAMERA_LOST, AlarmId.CAMERA_STALE}),
 }
-"""What can be told of a device; all of it is cleared once the device is well."""
+"""What only a device's watch tells; all of it is cleared once the device is well."""
 
 _MOST_UNSAVED = 1000
 _ARM = {
@@ -49,6 +50,12 @@ _ARM = {
     ArmCause.PROGRAM_STOPPED: AlarmId.ARM_NOT_REMOTE,
     ArmCause.REGISTERS_IN_USE: AlarmId.ARM_NOT_REMOTE,
 }
+_FRAMES = (
+    (frozenset({FrameFault.WRONG_SIZE}), AlarmId.CAMERA_LOST),
+    (frozenset({FrameFault.STALE, FrameFault.REPEATED}), AlarmId.CAMERA_STALE),
+    (frozenset(FrameFault), AlarmId.CAMERA_SATURATED),
+)
+"""The alarm of bad frames, by the first of these that any of them had."""
 _GRIPPER_LINK = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
 
 
@@ -60,6 +67,8 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
         fault: what is wrong with it.
     """
     match fault:
+        case FramesError():
+            return next((alarm for faults, alarm in _FRAMES if fault.faults & faults), AlarmId.CAMERA_STALE)
         case ArmFault():
             return _ARM.get(fault.cause, AlarmId.ARM_LINK_LOST)
         case GripperTimeoutError():
@@ -68,7 +77,7 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
             return AlarmId.GRIPPER_LINK_LOST
         case CameraError():
             return AlarmId.CAMERA_LOST
-    return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_STALE}[device]
+    return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_LOST}[device]
 
 
 class AlarmDesk:
@@ -82,6 +91,8 @@ class AlarmDesk:
         self._alarms = Alarms()
         self._metrics = metrics
         self._present: set[AlarmId] = set()
+        self._told: dict[str, AlarmId | None] = {}
+        """By device, what its watch told last; a reference may tell the same of a camera."""
         self._unsaved: list[AlarmEntry] = []
         self._changed = asyncio.Event()
 
@@ -131,8 +142,12 @@ class AlarmDesk:
             fault: None where nothing is.
         """
         told = None if fault is None else alarm_of(device, fault)
-        for alarm in OF_DEVICE[device]:
-            self.show(alarm, str(fault) if alarm is told else "")
+        before, self._told[device] = self._told.get(device), told
+        for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
+            if alarm is not told:
+                self.clear(alarm)
+        if told is not None:
+            self.raise_(told, str(fault))
 
     def acknowledge_returned(self) -> None:
         """Acknowledge every alarm whose cause is gone: what the PLC's command does."""

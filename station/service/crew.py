@@ -199,6 +199,15 @@ class Crew:
             await self._arm.upload_again()
             self.watches[ARM].look_again()
 
+    @property
+    def program_to_play_again(self) -> bool:
+        """Whether the arm stands only because this station was too slow for the controller's watchdog.
+
+        That stop is the station's own, as after a lost link: with the station healthy again nothing asks for a person.
+        """
+        fault = self.watches[ARM].fault if ARM in self.watches else None
+        return isinstance(fault, ArmFault) and fault.cause is ArmCause.WATCHDOG
+
     async def activate_if_safe(self) -> None:
         """Activate a gripper that lost its activation, unless a fruit may be between the jaws, which it would crush.
 
@@ -244,7 +253,8 @@ class Crew:
         if self._bad_frames >= _BAD_FRAMES:
             raise FramesError(
                 f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
-                "and its light, then `station devices check`"
+                "and its light, then `station devices check`",
+                frame.faults,
             )
 
     async def _look_at_gripper(self) -> None:

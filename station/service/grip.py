@@ -2,11 +2,11 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from dataclasses import dataclass
 
 from station.devices.arm.arm import Arm
-from station.devices.camera.interface import Camera, Frame, Image
+from station.devices.camera.interface import Camera, Frame, FrameFault, Image
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
 from station.settings.arm import PoseName
@@ -25,6 +25,11 @@ class GripError(StationError):
 
 class FramesError(GripError):
     """The camera gives frames, and none that can be measured."""
+
+    def __init__(self, text: str, faults: Collection[FrameFault]) -> None:
+        super().__init__(text)
+        self.faults = frozenset(faults)
+        """What was wrong with them."""
 
 
 class NothingTouchedError(GripError):
@@ -174,8 +179,12 @@ class Grip:
         step = await self._glance(width_mm)
         while width_mm >= expected.smallest_mm - self._recipe.steps.step_mm:
             judging = asyncio.ensure_future(touches(step))
+            ahead = None
             try:
-                ahead = await self._glance(width_mm - stride_mm) if one_ahead else None
+                if one_ahead:
+                    move = await self.close_to(width_mm - stride_mm)
+                    if not judging.done() or not judging.result():  # else no picture of it is needed
+                        ahead = GripStep(-1, move, await self.sound_frames(1))
             finally:
                 touched = await judging
             held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
@@ -214,7 +223,7 @@ class Grip:
         return None
 
     async def _sound_frame(self, newer_than_s: float) -> Frame:
-        faults: set[str] = set()
+        faults: set[FrameFault] = set()
         for _ in range(_MOST_FAULTY_FRAMES):
             frame = await self._cell.camera.frame(newer_than_s, self._frame_deadline_s)
             self._on_frame(frame)
@@ -224,5 +233,6 @@ class Grip:
             newer_than_s = frame.captured_s
         raise FramesError(
             f"the camera gave {_MOST_FAULTY_FRAMES} bad frames in a row ({', '.join(sorted(faults))}); "
-            "see `station devices check`"
+            "see `station devices check`",
+            faults,
         )

@@ -4,6 +4,7 @@ import asyncio
 
 from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import MoveResult, ObjectState
+from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, Event
 from station.inspection.judge import early_stop, judge
 from station.records.model import Image
@@ -89,8 +90,11 @@ class Inspector:
         now.reference_image = Image("reference", None, image)
         for alarm in ALARMS:
             self._alarms.clear(alarm)
-        self._metrics.reference(0.0, looks.drift_levels)
-        now.measures["reference_drift_levels"] = round(looks.drift_levels, 2)
+        drift, most = looks.drift_levels, self._settings.reference.most_drift_levels
+        halfway = f"the light differs from the golden reference's by {drift:.0f} grey levels; {most:g} are too many"
+        self._alarms.show(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else "")
+        self._metrics.reference(0.0, drift)
+        now.measures["reference_drift_levels"] = round(drift, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
         return True
 

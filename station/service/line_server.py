@@ -56,18 +56,18 @@ class LineServer:
         return await self._service.begin(request, self._gate.refusal()[0])
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:
-        return await self._service.outcome(request.sequence)
+        return await self._service.ledger.outcome(request.sequence)
 
     async def _published(self, request: Published) -> Noted:
         await self._service.published(request.outcome)
         return Noted()
 
     async def _acknowledged(self, request: Acknowledged) -> Noted:
-        await self._service.records.acknowledged(request.sequence)
+        await self._service.ledger.records.acknowledged(request.sequence)
         return Noted()
 
     async def _resume(self, _request: Resume) -> Open:
-        return await self._service.open()
+        return await self._service.ledger.open()
 
     async def _line(self, request: Line) -> StationState:
         self._orders.line(request)

@@ -10,7 +10,6 @@ from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, Event
-from station.inspection.deadlines import deadlines
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
 from station.service.metrics import Metrics
@@ -128,7 +127,7 @@ class Orders:
         if found.recipe.expected_width.smallest_mm >= widest_mm:
             return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
         try:
-            deadlines(found.recipe, self._service.pace())
+            self._service.pacing.expected(found.recipe)
         except BadInputError as error:
             return str(error)
         self.recipe_changing = True

@@ -7,7 +7,7 @@ from station.service.health import Dependency, Liveness, Readiness
 from station.service.orders import Orders
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-from station.vocabulary import Refusal
+from station.vocabulary import PackmlState, Refusal
 
 PRODUCTION = 1
 _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
@@ -65,7 +65,7 @@ class Gate:
             healthy=not self._liveness.stuck(),
             ready=refusal is None,
             why_not_ready=why,
-            packml_state=STATES[service.state].packml,
+            packml_state=self._packml(),
             mode=self._orders.mode,
             recipe_number=0 if snapshot is None else snapshot.number,
             recipe_checksum=0 if snapshot is None else snapshot.checksum,
@@ -73,6 +73,11 @@ class Gate:
             alarms=service.alarms.alarms.word,
             simulated=self._crew.simulated,
         )
+
+    def _packml(self) -> PackmlState | None:
+        """The state's own; on the way to an end that was asked for it is stopping, whatever is still done."""
+        facts = STATES[self._service.state]
+        return PackmlState.STOPPING if self._service.stop_asked and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
         """The same for supervisors, with every dependency's age."""
@@ -90,7 +95,7 @@ class Gate:
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
     def _records(self) -> Dependency:
-        fault, status = self._service.records_fault, self._service.records.status()
+        fault, status = self._service.ledger.fault, self._service.ledger.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
         return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
@@ -108,5 +113,5 @@ class Gate:
     def _trouble(self) -> str:
         if self._service.state not in _DEVICES_DECIDE:
             return ""
-        faults = [*self._crew.faults.values(), *([self._service.records_fault] if self._service.records_fault else [])]
+        faults = [*self._crew.faults.values(), *([self._service.ledger.fault] if self._service.ledger.fault else [])]
         return str(faults[0]) if faults else ""

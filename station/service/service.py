@@ -1,23 +1,18 @@
 """The station's service: carries the cycle's actions out, and answers whoever asks for inspections."""
 
 import asyncio
-import logging
+import contextlib
 import time
-from collections import deque
-from collections.abc import Awaitable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from functools import partial
-from itertools import combinations
 
-from station.channel.line import Begin, Begun, Open, Outcome
-from station.devices.arm.ur import POSES
+from station.channel.line import Begin, Begun, Outcome
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, UNJUDGED, Action, Event, Raise
-from station.inspection.deadlines import LONGEST_S, Deadlines, Pace, deadlines, late
 from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
-from station.records.model import InspectionRecord, Trigger
+from station.records.model import Trigger
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
 from station.service.conductor import Conductor, Happened, Work, event_of
@@ -25,23 +20,17 @@ from station.service.crew import Crew
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
 from station.service.inspector import Inspector
-from station.service.logs import fruit_line, inspecting
+from station.service.ledger import Ledger
 from station.service.metrics import Metrics
+from station.service.outcome_watch import OutcomeWatch
+from station.service.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.service.recipe_book import Active
 from station.service.triggers import Pending, Triggers
-from station.settings.arm import ArmSettings
 from station.settings.configuration import Configuration
-from station.vocabulary import OutcomeName, Reason, Refusal
-
-log = logging.getLogger(__name__)
+from station.vocabulary import Refusal
 
 CYCLE = "cycle"
 _LEASE_S = 2.0
-_LAST_OUTCOMES = 20
-_MANY = 5
-_MEASURE_S = 0.3
-_FRAMES_PER_S = 30.0
-_RECORD_NO_RESULT_S = 1.0
 
 
 class Service:
@@ -69,12 +58,13 @@ class Service:
         liveness: Liveness,
         versions: Mapping[str, str],
     ) -> None:
-        self._settings, self._configuration = configuration.service, configuration
-        self.records, self._crew, self._inspector = records, crew, inspector
+        self._settings, self._mm_per_px = configuration.service, configuration.camera.mm_per_px
+        self._crew, self._inspector = crew, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
-        self._versions = versions
         self.conductor = Conductor(self)
         self.triggers = Triggers()
+        self.ledger = Ledger(records, self.triggers, crew, versions)
+        self.pacing = Pacing(configuration, crew.cell)
         self.active: Active | None = None
         """The recipe that the next fruit is inspected with."""
         self.reset_wanted = self._settings.automatic_reset
@@ -82,24 +72,15 @@ class Service:
         self.stop_asked = False
         self._pending: Pending | None = None
         self._now: Inspection | None = None
-        self._unrecorded: list[Inspection] = []
-        self.records_fault: RecordsError | None = None
-        """Why the records are not to be relied on, until they were opened again."""
-        self._beginning, self._closing = asyncio.Lock(), asyncio.Lock()
-        self._background: set[asyncio.Future[Event | None]] = set()
+        self._beginning = asyncio.Lock()
+        self._background: set[asyncio.Task[None]] = set()
         self._told_late: State | None = None
-        self._last_outcomes: deque[OutcomeName] = deque(maxlen=_LAST_OUTCOMES)
+        self._outcomes = OutcomeWatch(alarms)
 
     @property
     def state(self) -> State:
         """Where the cycle is."""
         return self.conductor.state
-
-    @property
-    def running(self) -> Inspection | None:
-        """The inspection without a durable outcome, if there is one."""
-        unfinished = [now for now in (self._now, *self._unrecorded) if now is not None and now.standing is None]
-        return unfinished[0] if unfinished else None
 
     # What the line asks.
 
@@ -123,22 +104,10 @@ class Service:
                 self.active.snapshot,
                 self._crew.simulated,
             )
-            now = Inspection(trigger, self.active, self._limits(self.active), self._configuration.camera.mm_per_px)
+            now = Inspection(trigger, self.active, self.pacing.limits(self.active.recipe), self._mm_per_px)
             self._pending = Pending(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()
-
-    async def outcome(self, sequence: int) -> Outcome:
-        """Wait for an inspection's outcome; of an earlier start of the station it is there at once.
-
-        Args:
-            sequence: its number.
-        """
-        if self.triggers.inspection(sequence) is None:
-            for outcome in (await self.records.open_inspections()).ended:
-                if outcome.sequence == sequence:
-                    return outcome
-        return await self.triggers.outcome(sequence)
 
     async def published(self, outcome: Outcome) -> None:
         """Note durably what the PLC was told, and count it, once; a fruit that is still inspected is called off by it.
@@ -146,22 +115,16 @@ class Service:
         Args:
             outcome: what stands from now on.
         """
-        first = await self.records.published(outcome)
+        first = await self.ledger.records.published(outcome)
         self.triggers.published(outcome)
         if first:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
-            self._watch_outcomes(outcome)
-        if self.running is not None and self.running.sequence == outcome.sequence and self.state in UNJUDGED:
+            self._outcomes.saw(outcome)
+        running = self.ledger.running
+        if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
-
-    async def open(self) -> Open:
-        """What was begun and not acknowledged."""
-        held = await self.records.open_inspections()
-        now = self.running
-        running = None if now is None or now.sequence is None else (now.sequence, now.trigger.trigger_id)
-        return Open(running=running, outcomes=held.ended)
 
     # What the cycle asks: see `Performer`.
 
@@ -175,7 +138,7 @@ class Service:
             case Action.CHECK_DEVICES:
                 return self._check
             case Action.CLOSE_UNFINISHED:
-                return self._close_unfinished
+                return self.ledger.close_unfinished
             case Action.RECOVER_ARM:
                 return self._recover_arm
             case Action.RECORD_TRIGGER:
@@ -198,9 +161,9 @@ class Service:
                 self._inspector.close_as_no_result(now, because.event, because.why)
                 return None
             case Action.RECORD:
-                return partial(self._record, now)
+                return partial(self.ledger.conclude, now)
             case Action.PUBLISH:
-                self._publish(now)
+                self.ledger.tell(now)
                 return None
             case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
                 return partial(self._inspector.place, now)
@@ -264,7 +227,7 @@ class Service:
     async def _check(self) -> Event:
         if self.stop_asked:
             return Event.STOP
-        for fault in (*self._crew.faults.values(), self.records_fault):
+        for fault in (*self._crew.faults.values(), self.ledger.fault):
             if fault is not None:
                 raise fault
         return Event.READY
@@ -277,11 +240,9 @@ class Service:
         pending = self._pending
         if pending is None:
             raise RuntimeError("no trigger is waiting")
-        pending.recording = asyncio.ensure_future(self.records.begin(pending.inspection.trigger))
         try:
-            pending.inspection.sequence = await pending.recording
-        except RecordsError as error:
-            self.records_fault = error
+            await self.ledger.begin(pending)
+        except RecordsError:
             pending.answer(self._refused(Refusal.RECORDS_FULL))
             raise
         return Event.TRIGGER_RECORDED
@@ -290,10 +251,8 @@ class Service:
         pending, self._pending = self._pending, None
         if pending is None:
             raise RuntimeError("no trigger is waiting")
-        self._now = now = pending.inspection
-        now.accepted_s = time.monotonic()
-        self.triggers.accepted(pending.request, now)
-        pending.answer(self._begun(now))
+        self._now = pending.inspection
+        self._take_on(pending)
 
     def _refuse(self, because: Happened) -> None:
         """Nothing comes of the trigger: refused where it is not durable yet, else accepted and closed."""
@@ -307,45 +266,23 @@ class Service:
             if not pending.is_answered:
                 pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
             return
+        self._take_on(pending)
+        now.interrupt(REASONS[because.event], because.why)
+        closing = asyncio.create_task(self._close_refused(), name="closing a refused trigger")
+        self._background.add(closing)
+        closing.add_done_callback(self._background.discard)
+
+    def _take_on(self, pending: Pending) -> None:
+        now = pending.inspection
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
+        self.ledger.accepted(now)
         pending.answer(self._begun(now))
-        now.interrupt(REASONS[because.event], because.why)
-        self._unrecorded.append(now)
-        self._in_background(self._close_unfinished())
-
-    async def _record(self, now: Inspection) -> Event:
-        if now.sequence is None:
-            raise RuntimeError("an inspection without a sequence is recorded")
-        try:
-            now.standing = await self.records.conclude(now.sequence, self._signed(now.record()))
-        except RecordsError as error:
-            self.records_fault = error
-            raise
-        return Event.RECORDED
-
-    def _publish(self, now: Inspection) -> None:
-        if now.standing is not None:
-            self.triggers.ended(now.standing)
-            areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
-            with inspecting(now.standing.sequence):
-                log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))
-
-    async def _close_unfinished(self) -> Event:
-        async with self._closing:
-            while (now := self.running) is not None:
-                now.outcome_name = "NO_RESULT"
-                if not now.interruptions:
-                    now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
-                await self._record(now)
-                self._publish(now)
-            self._unrecorded.clear()
-        return Event.UNFINISHED_CLOSED
 
     # Small parts.
 
     def _begun(self, now: Inspection) -> Begun:
-        left_s = now.limits.inspection_s + _RECORD_NO_RESULT_S
+        left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
         if now.accepted_s is not None:
             left_s -= time.monotonic() - now.accepted_s
         return Begun(sequence=now.sequence, deadline_s=max(0.0, left_s))
@@ -354,61 +291,16 @@ class Service:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
 
-    def _watch_outcomes(self, outcome: Outcome) -> None:
-        self._last_outcomes.append(outcome.outcome)
-        last = list(self._last_outcomes)
-        unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
-        self.alarms.show(AlarmId.MANY_NO_RESULT, f"the last {_MANY} fruit could not be judged" if unjudged else "")
-        failed = len(last) == _LAST_OUTCOMES and last.count("FAIL") > _LAST_OUTCOMES / 2
-        told = f"{last.count('FAIL')} of the last {_LAST_OUTCOMES} fruit failed" if failed else ""
-        self.alarms.show(AlarmId.REJECT_RATE, told)
-
-    def _limits(self, active: Active) -> Deadlines:
-        limits, patience = deadlines(active.recipe, self.pace()), self._settings.patience
-        whole_s = min(patience * limits.inspection_s, LONGEST_S - _RECORD_NO_RESULT_S)
-        return Deadlines(
-            {state: patience * limit_s for state, limit_s in limits.phases_s.items()},
-            min(whole_s, self._settings.inspection_deadline_s or whole_s),
-        )
-
-    def pace(self) -> Pace:
-        """What the deadlines follow from on this cell."""
-        cell = self._crew.cell
-        return Pace(
-            frames_per_s=cell.camera.description.frames_per_s or _FRAMES_PER_S,
-            arm_move_s=0.0 if cell.arm is None else longest_move_s(self._configuration.arm),
-            stroke_mm=cell.gripper.max_width_mm,
-            record_s=self._configuration.records.deadline_s,
-            measure_s=_MEASURE_S,
-        )
-
-    def _signed(self, record: InspectionRecord) -> InspectionRecord:
-        return replace(record, devices=self._crew.names, versions=self._versions)
-
     def _tell_late(self) -> None:
-        now = self._now
-        if now is None or now.accepted_s is None or self._told_late is self.state:
+        if self._now is None or self._told_late is self.state:
             return
-        since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
-        found = late(now.limits, self.state, self.conductor.in_state_s, since_s)
+        found = late_now(self._now, self.state, self.conductor.in_state_s)
         if found is not None:
             self._told_late = self.state
             what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
             why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
             self.conductor.post(found.event, why)
 
-    def _in_background(self, work: Awaitable[Event | None]) -> None:
-        task = asyncio.ensure_future(work)
-        self._background.add(task)
-        task.add_done_callback(self._background.discard)
-
-
-def longest_move_s(arm: ArmSettings) -> float:
-    """The longest way between two of the arm's places: its leading joint speeds up, travels and brakes.
-
-    Args:
-        arm: poses, speed and acceleration.
-    """
-    places = [arm.poses.joints_rad(pose) for pose in POSES]
-    ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in combinations(places, 2)]
-    return max(ways_rad) / arm.joint_speed_rad_s + arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2
+    async def _close_refused(self) -> None:
+        with contextlib.suppress(RecordsError):  # which the ledger keeps, and the next clearing tries again
+            await self.ledger.close_unfinished()

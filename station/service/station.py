@@ -98,7 +98,7 @@ class Station:
             await records.reopen()
             await alarms.recall(records)
         except RecordsError as error:
-            service.records_fault = error
+            service.ledger.fault = error
         book = RecipeBook(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
         service.active = book.last_active()

@@ -17,11 +17,13 @@ from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
+from station.supervision import restarts
 
 UPKEEP = "upkeep"
 PERIOD_S = 0.2
 _ALARMS_EVERY_S = 1.0
 _CLOCK_STEP_S = 2.0
+_MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
 _MB = 1_000_000
 _AWAY = {State.UNKNOWN, State.HELD}
 
@@ -63,6 +65,7 @@ class Upkeep:
         self._alarms_at_s = 0.0
         self._clock_offset_s = time.time() - time.monotonic()
         self._pause_s, self._again_s = PERIOD_S, 0.0
+        self._restarts_counted: dict[str, int] = {}
 
     async def run(self) -> None:
         """Look after everything until cancelled."""
@@ -79,19 +82,27 @@ class Upkeep:
             await asyncio.sleep(PERIOD_S)
 
     async def _bring_back(self) -> None:
-        service, now_s = self._service, time.monotonic()
-        activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
-        if now_s >= self._again_s and (service.records_fault is not None or activate):
-            self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
-            await self._open_records_again()
-            if activate:
-                with contextlib.suppress(StationError):  # the gripper's watch says why it could not be
-                    await self._crew.activate_if_safe()
-            self._again_s = time.monotonic() + self._pause_s
+        service = self._service
+        await self._mend()
         entered_s = service.conductor.entered_s
-        if service.records_fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
+        if service.ledger.fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
             self._told_ready_s = time.monotonic()
             service.conductor.post(Event.READY)
+
+    async def _mend(self) -> None:
+        """Try what may bring something back, with growing pauses; who watches it says why it could not be."""
+        activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
+        play = self._crew.program_to_play_again and not self._liveness.stuck()
+        if time.monotonic() < self._again_s or not (activate or play or self._service.ledger.fault is not None):
+            return
+        self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
+        await self._open_records_again()
+        with contextlib.suppress(StationError):
+            if activate:
+                await self._crew.activate_if_safe()
+            elif play:
+                await self._crew.play_again()
+        self._again_s = time.monotonic() + self._pause_s
 
     @property
     def _activation_is_lost(self) -> bool:
@@ -99,24 +110,24 @@ class Upkeep:
 
     async def _open_records_again(self) -> None:
         service = self._service
-        if service.records_fault is None:
+        if service.ledger.fault is None:
             return
         try:
-            await service.records.reopen()
-            free_mb = service.records.status().free_bytes / _MB
+            await service.ledger.records.reopen()
+            free_mb = service.ledger.records.status().free_bytes / _MB
             if free_mb >= self._reserve_mb:
-                service.records_fault = None
+                service.ledger.fault = None
         except RecordsError as error:
-            service.records_fault = error
+            service.ledger.fault = error
 
     def _show_conditions(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
         for name, watch in self._crew.watches.items():
             alarms.device(name, watch.told_fault)
-        fault = service.records_fault
+        fault = service.ledger.fault
         alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
-        free_mb = service.records.status().free_bytes / _MB
+        free_mb = service.ledger.records.status().free_bytes / _MB
         alarms.show(
             AlarmId.DISK_LOW,
             f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
@@ -129,6 +140,24 @@ class Upkeep:
             AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
         )
         self._orders.show_line()
+        self._show_restarts()
+        self._show_clock()
+
+    def _show_restarts(self) -> None:
+        many: list[str] = []
+        for name, program in restarts.told().items():
+            for _ in range(program.total - self._restarts_counted.get(name, 0)):
+                self._metrics.restarted(name)
+            self._restarts_counted[name] = program.total
+            lately = program.within(_MANY_WITHIN_S)
+            if program.given_up:
+                many.append(f"the process {name} ended again and again and is not started any more")
+            elif lately >= _MANY_RESTARTS:
+                many.append(f"the process {name} was started again {lately} times within {_MANY_WITHIN_S:g} s")
+        self._service.alarms.show(AlarmId.PROCESS_RESTARTS, "; ".join(many))
+
+    def _show_clock(self) -> None:
+        alarms = self._service.alarms
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
             step_s = offset_s - self._clock_offset_s

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from station.errors import StationError
 from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE
+from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, tell
 
 RESTARTS = 5
 RESTARTS_WITHIN_S = 60.0
@@ -52,6 +53,7 @@ class _Child:
     def __init__(self, program: Program, folder: Path, environment: Mapping[str, str]) -> None:
         self.program = program
         self.restarts: deque[float] = deque()
+        self.restarts_in_all = 0
         self.process: asyncio.subprocess.Process | None = None
         self._address = folder / f"{program.name}.sock"
         self._environment = environment
@@ -144,6 +146,7 @@ class Supervisor:
         self._programs = programs
         self._environment = dict(os.environ if environment is None else environment)
         self._children: list[_Child] = []
+        self._restarts_file = Path()
 
     @property
     def restarts(self) -> dict[str, int]:
@@ -170,7 +173,10 @@ class Supervisor:
                 has ended.
         """
         with tempfile.TemporaryDirectory(prefix="station-") as folder:
-            self._children = [_Child(program, Path(folder), self._environment) for program in self._programs]
+            self._restarts_file = Path(folder) / "restarts.json"
+            environment = {**self._environment, RESTARTS_VARIABLE: str(self._restarts_file)}
+            self._children = [_Child(program, Path(folder), environment) for program in self._programs]
+            self._tell_restarts()
             try:
                 for child in self._children:
                     await child.start()
@@ -216,6 +222,7 @@ class Supervisor:
         await child.stop(0.0)
         if len(child.restarts) >= RESTARTS:
             child.given_up = True
+            self._tell_restarts()
             log.critical(
                 "the process %s %s, after %d restarts within %g s: it is given up; mend the cause and start again",
                 child.program.name, trouble, RESTARTS, RESTARTS_WITHIN_S,
@@ -223,7 +230,13 @@ class Supervisor:
             return
         log.error("the process %s %s: it is started again", child.program.name, trouble)
         child.restarts.append(now_s)
+        child.restarts_in_all += 1
+        self._tell_restarts()
         await child.start()
+
+    def _tell_restarts(self) -> None:
+        told = {c.program.name: Restarts(c.restarts_in_all, tuple(c.restarts), c.given_up) for c in self._children}
+        tell(self._restarts_file, told)
 
     async def _stop(self) -> None:
         for child in reversed(self._children):

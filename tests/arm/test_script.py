@@ -159,6 +159,19 @@ def test_the_watchdog_hears_every_write_and_stops_a_program_that_it_does_not_hea
     assert not played.body.moving
 
 
+def test_a_controller_that_stood_still_itself_does_not_blame_the_station():
+    played = Played()
+    played.write(35, (5.0,))
+    played.clear()
+    played.run(0.15)
+    played.clock.advance(1.0)
+    played.script.stood_still(played.clock.now_s())
+    played.run(0.15)
+    assert played.script.runtime_state is RuntimeState.PLAYING
+    played.run(0.1)
+    assert played.script.ended_because == "the RTDE watchdog expired"
+
+
 def test_local_control_takes_no_program():
     played = Played()
     played.safety.remote = False

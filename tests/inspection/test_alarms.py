@@ -189,8 +189,8 @@ def test_what_was_remembered_by_another_version_is_left_out():
         *good.to_data(),
         {"id": "no_such_alarm", "state": "unacknowledged"},
         {"id": "protective_stop", "state": "shelved"},
-        {"id": "hmi_lost", "state": "normal", "since_s": float("nan")},
-        {"id": "hmi_lost", "state": "normal", "colour": "red"},
+        {"id": "reject_rate", "state": "normal", "since_s": float("nan")},
+        {"id": "reject_rate", "state": "normal", "colour": "red"},
         "rubbish",
     ]
     assert Alarms.from_data(rows) == good

@@ -128,7 +128,6 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, outcome):
         (Flag.UNDECIDED, Reason.LOW_CONFIDENCE),
         (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER),
         (Flag.SATURATED, Reason.SATURATED),
-        (Flag.LOW_CONFIDENCE, Reason.LOW_CONFIDENCE),
         (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD),
     ],
 )
@@ -139,6 +138,26 @@ def test_a_step_that_is_not_trusted_is_no_pass(flag, reason):
     # Beyond the last damage threshold, and on a light touch, it is no criterion.
     for closing in (1.0, 9.0):
         assert judge(spoilt(pressed(15), closing, flag), STRAWBERRY).outcome == "PASS"
+
+
+def test_a_sound_step_beyond_the_last_threshold_speaks_for_an_uncertain_one_before_it():
+    for closing in (2.0, 3.0):
+        assert judge(spoilt(pressed(20), closing, Flag.LOW_CONFIDENCE), STRAWBERRY).outcome == "PASS"
+    both = spoilt(spoilt(pressed(20), 2.0, confidence=0.1), 3.0, confidence=0.1)
+    assert judge(both, STRAWBERRY).outcome == "PASS"
+    assert judge(spoilt(both, 4.0, confidence=0.1), STRAWBERRY).reasons == (Reason.LOW_CONFIDENCE,)
+    alone = replace(both, points=both.points[:5])
+    assert judge(alone, STRAWBERRY).outcome == "NO_RESULT", "one trusted point shows no onset"
+
+
+def test_it_does_not_where_it_may_be_over_the_limit_itself_or_the_onset_was_too_soon():
+    over = Press(35.0, 0.0, tuple(point(c, 34.0 * c) for c in (0.0, 1.0, 2.0, 3.4, 4.9, 6.0)))
+    assert judge(over, STRAWBERRY).outcome == "PASS"
+    assert judge(spoilt(over, 3.4, confidence=0.1), STRAWBERRY).reasons == (Reason.LOW_CONFIDENCE,)
+    hidden = Press(35.0, 0.4, tuple(point(float(c), max(2.0, 35.0 * (c - 1.5))) for c in range(6)))
+    shown = spoilt(spoilt(hidden, 2.0, area_mm2=60.0, confidence=0.1), 3.0, area_mm2=75.0, confidence=0.1)
+    assert Reason.AREA_NOT_RISING in judge(hidden, STRAWBERRY).reasons
+    assert judge(shown, STRAWBERRY).outcome == "NO_RESULT", "what hides the late onset is not believed"
 
 
 @pytest.mark.parametrize("confidence", [None, 0.49])

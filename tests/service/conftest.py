@@ -212,7 +212,7 @@ def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.Abstra
         configuration = load_configuration(file or settings_file(**service), {})
         twin = Twin(
             TwinOptions(
-                bench=True,
+                bench=configuration.service.bench,
                 arm=configuration.arm,
                 gripper=configuration.gripper,
                 camera=configuration.camera.twin,

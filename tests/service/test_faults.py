@@ -11,7 +11,7 @@ from station.vocabulary import Reason
 FAULTS = [
     ("camera", "off", State.REFERENCE, Reason.CAMERA_FAULT, AlarmId.CAMERA_LOST),
     ("camera", "stuck", State.CLOSING_TO_ONSET, Reason.CAMERA_FAULT, AlarmId.CAMERA_STALE),
-    ("camera", "frame_torn", State.SETTLING, Reason.CAMERA_FAULT, AlarmId.CAMERA_STALE),
+    ("camera", "frame_torn", State.SETTLING, Reason.CAMERA_FAULT, AlarmId.CAMERA_SATURATED),
     ("gripper", "off", State.CLOSING_TO_ONSET, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_LINK_LOST),
     ("gripper", "garbage", State.MOVING, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_LINK_LOST),
     ("gripper", "stuck", State.SETTLING, Reason.GRIPPER_FAULT, AlarmId.GRIPPER_JAM),

@@ -123,7 +123,9 @@ def test_late_is_no_result(bench):
     async def scenario():
         async with bench(inspection_deadline_s=1.0) as cell:
             await cell.choose("strawberry")
-            return await cell.line.inspect()
+            outcome = await cell.line.inspect()
+            assert AlarmId.DEADLINE_MISSED in {alarm.id for alarm in cell.station.service.alarms.alarms.active}
+            return outcome
 
     outcome = asyncio.run(scenario())
     assert (outcome.outcome, outcome.reasons[0], outcome.late) == ("NO_RESULT", Reason.LATE, True)
@@ -140,10 +142,14 @@ def test_an_order_to_end_gives_the_outcome_first_and_opens_the_jaws(bench):
             await asyncio.sleep(0)
             cell.station.stop()
             cell.station.stop()
-            outcome = await asked
+            told = set()
+            while not asked.done():
+                told.add((await cell.line.state()).packml_state)
+            told.add((await cell.line.state()).packml_state)
             await cell.running
-            return outcome, cell.twin.world.opening_mm()
+            return asked.result(), told, cell.twin.world.opening_mm()
 
-    outcome, opening_mm = asyncio.run(scenario())
+    outcome, told, opening_mm = asyncio.run(scenario())
+    assert told - {PackmlState.EXECUTE} == {PackmlState.STOPPING}
     assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
     assert opening_mm == pytest.approx(85, abs=1)

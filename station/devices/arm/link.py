@@ -299,6 +299,10 @@ class ArmLink:
         if not outcome.done:
             self._face(await self._explain(outcome.words))
         else:
+            # The lease that the process knew may have run out while the connection was made: renew it before the
+            # watchdog that has just been set up looks for a kick. Whether it answers is the next beat's matter.
+            with contextlib.suppress(ArmFault):
+                await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
 
     async def _explain(self, words: str) -> ArmFault:
@@ -308,7 +312,7 @@ class ArmLink:
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
         snapshot = await self._process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy)
+        return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, words: str) -> ArmFault:
         """The cause why a command was not done, which is then the link's fault.

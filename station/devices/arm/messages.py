@@ -84,3 +84,5 @@ class Snapshot(Message):
     """Whether the connection that commands stands."""
     underway: bool
     """Whether the control program reports a motion."""
+    kicks_late: bool = False
+    """Whether the controller's watchdog was left without a kick for longer than its limit since the program began."""

@@ -49,6 +49,8 @@ class UrRtdeProcess:
         self._commander = ThreadPoolExecutor(max_workers=1)
         self._healthy_until_s = 0.0
         self._kicking: asyncio.Task[None] | None = None
+        self._kicked_s = 0.0
+        self._kicks_late = self._played = False
 
     async def watch(self, _request: Watch) -> Outcome:
         """Make the receiving connection; this holds the interpreter's lock until it stands."""
@@ -92,6 +94,7 @@ class UrRtdeProcess:
             runtime_state=receive.getRuntimeState(),
             commanding=self._control is not None,
             underway=progress is not None and progress.isAsyncOperationRunning(),
+            kicks_late=self._kicks_late,
         )
 
     async def move(self, request: Move) -> Outcome:
@@ -132,18 +135,26 @@ class UrRtdeProcess:
         """Keep the controller's watchdog quiet as long as the station says that it is healthy."""
         while True:
             await asyncio.sleep(period_s)
-            control = self._control
-            if control is not None and time.monotonic() < self._healthy_until_s and self._playing():
+            control, playing = self._control, self._playing()
+            if control is None:
+                continue
+            if self._played:  # until now: what stopped since may have been stopped for want of a kick
+                self._kicks_late |= time.monotonic() - self._kicked_s > KICKS_PER_LIMIT * period_s
+            self._played = playing
+            if playing and time.monotonic() < self._healthy_until_s:
                 await self._on_arm(control.kickWatchdog)
+                self._kicked_s = time.monotonic()
 
     def _prepare(self) -> bool:
         control, wanted = self._commanding(), self._set_up
         centre_m = [value / 1000 for value in wanted.payload_centre_mm]
-        return (
+        prepared = (
             control.setTcp(self._tool())
             and control.setPayload(wanted.payload_kg, centre_m)
             and control.setWatchdog(wanted.watchdog_hz)
         )
+        self._kicked_s, self._kicks_late, self._played = time.monotonic(), False, True
+        return prepared
 
     def _tool(self) -> list[float]:
         # Never all zeros: for those ur-rtde's getForwardKinematics leaves the offset's registers as they were.

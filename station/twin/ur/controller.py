@@ -18,6 +18,8 @@ from station.twin.ur.safety import Safety
 from station.twin.ur.script import ControlScript
 
 CYCLE_S = 1.0 / FREQUENCY_HZ
+_STOOD_STILL_S = 0.1
+"""A real controller is never so late; this one is, on a busy machine."""
 LATE_CYCLES = 10
 START_POSE_RAD: Joints = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
@@ -177,8 +179,11 @@ class UrController:
     def _cycle(self) -> None:
         loop = asyncio.get_running_loop()
         self._due_s += CYCLE_S
-        if loop.time() - self._due_s > LATE_CYCLES * CYCLE_S:
+        late_s = loop.time() - self._due_s
+        if late_s > LATE_CYCLES * CYCLE_S:
             self._due_s = loop.time()
+        if late_s > _STOOD_STILL_S:
+            self.script.stood_still(self.clock.now_s())
         self._timer = loop.call_at(self._due_s, self._cycle)
         now_s = self.clock.now_s()
         self._apply_faults(now_s)

@@ -102,6 +102,14 @@ class ControlScript:
         self._watchdog_s = None
         self._body.brake(SAFETY_BRAKE_RAD_S2)
 
+    def stood_still(self, now_s: float) -> None:
+        """The controller itself did nothing for a while: what it has not read yet is no silence of the station.
+
+        Args:
+            now_s: the twin's time.
+        """
+        self._watched_since_s = max(self._watched_since_s, now_s)
+
     def step(self, now_s: float) -> None:
         """One cycle of the controller."""
         self._now_s = now_s

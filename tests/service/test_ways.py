@@ -1,0 +1,136 @@
+"""What a site may choose: fruit placed by the arm, no reset by itself; and a disk that refuses in mid inspection."""
+
+import asyncio
+import resource
+
+import pytest
+
+from station.channel.line import CommandName, PackmlState
+from station.inspection.alarm_table import AlarmId
+from station.inspection.states import State
+from station.twin.ur.controller import UrController
+from station.vocabulary import Reason
+
+REACHED_RAD = 0.02
+
+
+def active(cell):
+    return {alarm.id for alarm in cell.station.service.alarms.alarms.active}
+
+
+@pytest.mark.timeout(240)
+def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_for_its_own_stop(bench):
+    async def scenario():
+        async with bench(bench=False, placing="arm") as cell:
+            [arm] = [server for server in cell.twin._servers if isinstance(server, UrController)]
+            poses, line = cell.configuration.arm.poses, cell.line
+
+            def stands_at():
+                places = {name: poses.joints_rad(name) for name in ("nest", "accept", "reject", "home")}
+                return [
+                    name
+                    for name, joints in places.items()
+                    if all(abs(a - b) < REACHED_RAD for a, b in zip(joints, arm.joints_rad, strict=True))
+                ]
+
+            assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
+            async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated at home
+                while cell.phase is not State.IDLE:
+                    await asyncio.sleep(0.1)
+            for bruised, pose in ((False, "accept"), (True, "reject")):
+                await line.ready()
+                cell.lay("blueberry", 1, bruised=bruised)
+                let_go = []
+                cell.at(State.RETREATING, lambda let_go=let_go: let_go.extend(stands_at()))
+                outcome = await line.inspect()
+                await line.ready()
+                assert (outcome.outcome == "PASS") == (pose == "accept"), outcome
+                assert let_go == [pose]
+
+            cell.lay("blueberry", 1)
+            cell.at(State.PLACING_ACCEPT, lambda: cell.twin.boards["gripper"].set("off"))
+            kept = await line.inspect()
+            assert kept.outcome == "PASS"
+            async with asyncio.timeout(60):
+                while cell.phase is not State.CARRIED or AlarmId.FRUIT_HELD not in active(cell):
+                    await asyncio.sleep(0.05)
+            state = await line.state()
+            assert (state.ready, state.packml_state) == (False, PackmlState.HELD)
+            assert "take it out" in state.why_not_ready
+            cell.twin.boards["gripper"].clear()
+            cell.twin.world.remove()
+            await asyncio.sleep(1.0)
+            assert cell.phase is State.CARRIED, "only a person's reset leads on"
+            done = await line.order(CommandName.RESET)
+            assert done.done, done.why
+            await line.ready()
+            assert AlarmId.FRUIT_HELD not in active(cell)
+            assert stands_at() == ["home"]
+
+            crew = cell.station.service._crew
+            renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
+            async with asyncio.timeout(60):
+                while not crew.program_to_play_again:
+                    await asyncio.sleep(0.05)
+            assert AlarmId.ARM_LINK_LOST in active(cell)
+            assert not (await line.state()).ready
+            crew.renew_health = renew
+            await line.ready()
+
+    asyncio.run(scenario())
+
+
+def test_without_automatic_reset_a_station_waits_for_an_order_after_every_fault(bench):
+    async def scenario():
+        async with bench(automatic_reset=False) as cell:
+            line = cell.line
+            await cell.choose("blueberry")
+            await line.inspect()
+            await line.ready()
+            cell.twin.boards["gripper"].set("off")
+            await cell.reach(State.HELD)
+            cell.twin.boards["gripper"].clear()
+            await cell.reach(State.STOPPED)
+            await asyncio.sleep(1.0)
+            state = await line.state()
+            assert (state.ready, state.packml_state) == (False, PackmlState.STOPPED)
+            assert "reset it" in state.why_not_ready
+            done = await line.order(CommandName.RESET)
+            assert done.done, done.why
+            assert (await line.ready()).packml_state is PackmlState.IDLE
+
+    asyncio.run(scenario())
+
+
+def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once_it_takes_again(bench):
+    async def scenario():
+        async with bench() as cell:
+            line = cell.line
+            await cell.choose("blueberry")
+            await line.ready()
+            before = resource.getrlimit(resource.RLIMIT_FSIZE)
+            cell.at(State.JUDGING, lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1])))
+            try:
+                begun = await line.begin()
+                asked = asyncio.create_task(line.outcome(begun.sequence))
+                async with asyncio.timeout(60):
+                    while cell.phase is not State.HELD or AlarmId.RECORDS_NOT_WRITABLE not in active(cell):
+                        await asyncio.sleep(0.05)
+                state = await line.state()
+                assert not state.ready
+                assert "records" in state.why_not_ready
+                assert not asked.done(), "what is not durable is not told"
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, before)
+            outcome = await asked
+            assert (outcome.sequence, outcome.outcome) == (begun.sequence, "NO_RESULT")
+            assert set(outcome.reasons) <= {Reason.RECORDS_FAULT, Reason.STATION_LOST}
+            await line.publish(outcome)
+            await line.ready()
+            assert AlarmId.RECORDS_NOT_WRITABLE not in active(cell)
+            assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
+            again = await line.inspect()
+            assert again.sequence == begun.sequence + 1
+            assert again.area_mm2 is not None
+
+    asyncio.run(scenario())
