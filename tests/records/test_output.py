@@ -1,9 +1,9 @@
 """What is handed on: the same in CSV, Parquet and a lot's report as in the records."""
 
+import contextlib
 import csv
 import json
 import re
-import resource
 import subprocess
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from station.cli import cli
 from station.records import export as exporting
-from station.records.errors import RecordsError
+from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
 from station.records.search import Query
 
@@ -66,18 +66,16 @@ def test_an_export_holds_what_was_asked_for(history, ask, tmp_path):
     assert ask("export", tmp_path / "some.xlsx").exit_code == 2
 
 
-def test_an_export_that_does_not_fit_leaves_the_file_as_it_was(history, folder, tmp_path):
-    target = tmp_path / "all.csv"
+def test_an_export_that_does_not_fit_leaves_the_file_as_it_was(history, folder, small_disk):
+    target = small_disk / "all.csv"
     target.write_text("the last one")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, before[1]))
-    try:
-        with pytest.raises(RecordsError, match="the disk is full"):
-            export(folder, Query(), target)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with contextlib.suppress(OSError), (small_disk / "filler").open("wb", buffering=0) as filler:
+        while True:
+            filler.write(bytes(4096))
+    with pytest.raises(DiskFullError, match="the disk is full"):
+        export(folder, Query(), target)
     assert target.read_text() == "the last one"
-    assert list(tmp_path.glob(".*")) == []
+    assert list(small_disk.glob(".*")) == []
 
 
 def test_a_lots_report_needs_no_other_file_and_escapes_what_comes_from_outside(history, ask, tmp_path):

@@ -58,7 +58,7 @@ def wanted(inspected, query):
 
 
 @given(inspected=st.lists(st.tuples(LOTS, HOURS, ENDS), max_size=40), queries=st.lists(QUERIES, min_size=1, max_size=8))
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, queries, trigger, passed):
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
