@@ -151,8 +151,8 @@ def main() -> int:
         text = (
             "# How fast other systems are told\n\n"
             f"`./run bench outbox` writes this page. {STATIONS} stations, {rows} inspections with 4 curve points "
-            f"each, one PostgreSQL. Half of\nthem are written while they are told; meanwhile the server is disturbed at "
-            f"random moments.\n\n"
+            f"each, one PostgreSQL. Half of\nthem are written while they are told; meanwhile the server is disturbed "
+            f"at random moments.\n\n"
             f"| done to the server | times |\n| --- | --- |\n| connections cut | {done['cut']} |\n"
             f"| crashed (stopped with `immediate`) | {done['crashed']} |\n| stopped orderly | {done['stopped']} |\n\n"
             "| found afterwards | inspections |\n| --- | --- |\n"

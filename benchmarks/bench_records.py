@@ -286,8 +286,8 @@ def main() -> int:
         )
         + f"\n\n{INSPECTIONS} inspections each; one sync of 4 KiB took {synced_ms:.2f} ms (median).\n\n## To find\n\n"
         f"Pages of 50 among {arguments.rows:,} inspections ({size_gb:.1f} GB, generated in {filled_s:.0f} s), read "
-        "with their curves,\nup to 20 pages of each question. Bare sqlite3 gets the same question in plain SQL on the same "
-        "tables and indexes, for the\nnumbers of the first page alone, and is given up after "
+        "with their curves,\nup to 20 pages of each question. Bare sqlite3 gets the same question in plain SQL on "
+        "the same tables and indexes, for the\nnumbers of the first page alone, and is given up after "
         f"{PATIENCE_S:g} s; the answers are the same.\n\n"
         + markdown(["asked for", "found", "first page, ms", "slowest page, ms", "bare sqlite3, ms"], found)
         + "\n\n## To export\n\nWith curves and recipes, in constant memory.\n\n"
