@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Literal
 
 from archive.many import fill
 from archive.postgres import PORT, Server, programs, throwaway
@@ -41,7 +42,8 @@ def total(server: Server) -> int:
 async def trouble(server: Server) -> dict[str, int]:
     """Disturb the server so often; it runs at the end."""
     done = {"cut": 0, "crashed": 0, "stopped": 0}
-    for how, name in (("immediate", "crashed"), ("fast", "stopped")) * TROUBLES:
+    ways: tuple[tuple[Literal["fast", "immediate"], str], ...] = (("immediate", "crashed"), ("fast", "stopped"))
+    for how, name in ways * TROUBLES:
         for _ in range(3):
             await asyncio.sleep(random.uniform(0.2, 1.5))
             done["cut"] += await asyncio.to_thread(server.cut)
@@ -73,7 +75,9 @@ async def tell(server: Server, home: Path, rows: int) -> tuple[float, dict[str, 
     running = [asyncio.create_task(teller.run()) for teller in tellers]
     try:
         writing = [asyncio.to_thread(fill, home / name, each // 2 + 1, each, 4) for name in names]
-        *_, done = await asyncio.gather(*writing, trouble(server))
+        troubled = asyncio.create_task(trouble(server))
+        await asyncio.gather(*writing, troubled)
+        done = troubled.result()
         await arrival(server, each * STATIONS)
     finally:
         for task in running:

@@ -21,17 +21,20 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
+    "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
-    "recipes": Entry("station.commands.recipes:recipes", "Check recipe files."),
     "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
+    "recipes": Entry("station.commands.recipes:recipes", "Look after recipes, their revisions and approvals."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
+    "thresholds": Entry("station.commands.thresholds:thresholds", "Propose damage thresholds from marked fruit."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
+    "whatif": Entry("station.commands.whatif:whatif", "Judge stored inspections again by a draft of a recipe."),
 }
 
 

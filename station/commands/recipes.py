@@ -1,28 +1,55 @@
-"""`station recipes`: look after recipe files."""
+"""`station recipes`: look after recipes, their revisions and who approves them."""
 
 import os
+from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import click
 
+from station.errors import BadInputError
+from station.recipe_store.difference import differences
+from station.recipe_store.editor import RecipeEditor
+from station.recipe_store.history import Person
+from station.recipe_store.revision import Revision, Status
+from station.recipe_store.standing import Standing
+from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened
 from station.settings.recipe import Recipe, check_recipes, recipe_files
+from station.settings.recipe_form import content_sha256
+from station.settings.scalars import MeaningError, plain_scalar
+
+Command = Callable[..., Any]
+
+_config = click.option(
+    "--config",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The configuration that names the folders. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
+)
+_revision = click.option("--revision", metavar="N", type=click.IntRange(1), help="Which revision.")
+_base = click.option(
+    "--base", default="", metavar="HASH", help="The content hash, or 8 of its digits, of what the change is made to."
+)
+
+
+def _person(command: Command) -> Command:
+    """Ask who acts, in what capacity, and why: it goes into the audit trail."""
+    why = click.option("--reason", required=True, help="Why; for the audit trail.")
+    role = click.option("--role", default="quality", show_default=True, help="In what capacity.")
+    return click.option("--who", required=True, metavar="NAME", help="Who does it.")(role(why(command)))
 
 
 @click.group()
 def recipes() -> None:
-    """Check recipe files."""
+    """Look after recipes: their files, their revisions, and who approves them."""
 
 
 @recipes.command()
 @click.argument("files", metavar="[FILE]...", nargs=-1, type=click.Path(path_type=Path))
-@click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration that names the recipe folder. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
+@_config
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...], config: Path | None) -> None:
     """Check recipe files, and say all that is wrong with them.
@@ -40,6 +67,229 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
         click.echo(str(problem), err=True)
     if checked.problems:
         context.exit(2)
+
+
+@recipes.command("list")
+@_config
+def list_all(config: Path | None) -> None:
+    """List the recipes: the revision in force, what the file says beside it, and what waits for whom."""
+    standings, problems = _store(config).read()
+    for standing in standings:
+        click.echo(_line(standing))
+        if standing.note:
+            click.echo(f"    {standing.note}")
+    for problem in problems:
+        click.echo(problem, err=True)
+
+
+@recipes.command()
+@click.argument("name")
+@_revision
+@_config
+def show(name: str, revision: int | None, config: Path | None) -> None:
+    """Show a recipe's file, or the text of one of its revisions, as it was written."""
+    store = _store(config)
+    click.echo(store.good_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
+
+
+@recipes.command()
+@click.argument("name")
+@_config
+def history(name: str, config: Path | None) -> None:
+    """Show a recipe's revisions: who wrote, approved and retired them, when, why, and what changed."""
+    store = _store(config)
+    store.standing(name)
+    before: Revision | None = None
+    for each in store.history(name):
+        click.echo("\n".join(_told(each, before)))
+        before = each
+
+
+@recipes.command()
+@click.argument("name")
+@click.option("--from", "old", metavar="N", type=click.IntRange(1), help="A revision. [default: the approved one]")
+@click.option("--to", "new", metavar="N", type=click.IntRange(1), help="A revision. [default: the file]")
+@_config
+def diff(name: str, old: int | None, new: int | None, config: Path | None) -> None:
+    """Show every value that differs between two revisions, or between the approved one and the file."""
+    store = _store(config)
+    standing = store.standing(name)
+    if old is not None:
+        before = store.revision(name, old).recipe
+    elif standing.control is not None:
+        before = standing.control.recipe
+    else:
+        raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --from")
+    after = store.good_file(name).recipe if new is None else store.revision(name, new).recipe
+    for difference in differences(before, after):
+        click.echo(str(difference))
+
+
+@recipes.command()
+@_config
+def adopt(config: Path | None) -> None:
+    """Begin the history, as the station's first start does: what is there counts as approved. Idempotent."""
+    store = _store(config)
+    store.begin({})
+    for standing in store.read()[0]:
+        click.echo(_line(standing))
+
+
+@recipes.command()
+@click.argument("name")
+@click.option(
+    "--set", "changes", metavar="PATH=VALUE", multiple=True, required=True, help="As damage.area[0].area_mm2=113."
+)
+@_base
+@_person
+@_config
+def edit(name: str, changes: tuple[str, ...], base: str, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Change values in a recipe's file, its comments kept. It is an unapproved draft then: submit it.
+
+    With --base the change is refused where the file is not what it was made to, and the message says what changed.
+    """
+    values = dict(_change(text) for text in changes)
+    standing = _editor(config).edit(name, values, Person(who, role, reason), base)
+    click.echo(_line(standing))
+
+
+@recipes.command()
+@click.argument("name")
+@_person
+@_config
+def submit(name: str, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Record a recipe's file as a draft, for another person to approve."""
+    made = _store(config).submit(name, Person(who, role, reason))
+    click.echo(f"{name} revision {made.revision} waits for another person's approval: {made.sha256[:12]}")
+
+
+@recipes.command()
+@click.argument("name")
+@_revision
+@_person
+@_config
+def approve(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Put a draft in force: the next lot is inspected by it. Its author cannot do this."""
+    made = _store(config).approve(name, Person(who, role, reason), revision)
+    click.echo(f"{name} revision {made.revision} is in force from the next lot on: {made.sha256[:12]}")
+
+
+@recipes.command()
+@click.argument("name")
+@_revision
+@_person
+@_config
+def retire(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Take a revision out of use, the approved one by default; a draft is rejected by this."""
+    made = _store(config).retire(name, Person(who, role, reason), revision)
+    click.echo(f"{name} revision {made.revision} is retired")
+
+
+@recipes.command()
+@click.argument("name")
+@_revision
+@_person
+@_config
+def revert(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Put the approved revision's text back into the file, or another's; what stood there is kept as a backup."""
+    click.echo(_line(_editor(config).revert(name, Person(who, role, reason), revision)))
+
+
+@recipes.command("export")
+@click.argument("name")
+@_revision
+@click.option("--out", metavar="FILE", type=click.Path(path_type=Path), help="[default: standard output]")
+@_config
+def export_one(name: str, revision: int | None, out: Path | None, config: Path | None) -> None:
+    """Write a recipe with a first line that names what it is, for editing it elsewhere and importing it again."""
+    text = _editor(config).export_text(name, revision)
+    if out is None:
+        click.echo(text, nl=False)
+        return
+    try:
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"--out {out}: cannot be written: {error.strerror}") from error
+
+
+@recipes.command("import")
+@click.argument("file", type=click.Path(path_type=Path))
+@_base
+@_person
+@_config
+def import_one(file: Path, base: str, who: str, role: str, reason: str, config: Path | None) -> None:
+    """Put FILE in the place of the recipe's file. It is an unapproved draft then: submit it.
+
+    Refused where the recipe was changed since FILE was exported; the message says what changed.
+    """
+    check = check_recipes([file])
+    if check.problems:
+        raise BadInputError("\n".join(map(str, check.problems)))
+    text = file.read_text(encoding="utf-8-sig")
+    click.echo(_line(_editor(config).import_text(text, Person(who, role, reason), base)))
+
+
+@recipes.command()
+@_person
+@_config
+def upgrade(who: str, role: str, reason: str, config: Path | None) -> None:
+    """Write files of an earlier form in this program's form, comments kept, with a backup. Idempotent."""
+    done = _editor(config).upgrade(Person(who, role, reason))
+    for path, form in done:
+        click.echo(f"{path}: form {form} upgraded")
+    click.echo(f"{len(done)} files were upgraded")
+
+
+def _store(config: Path | None) -> RecipeStore:
+    configuration = load_configuration(config)
+    return RecipeStore(configuration.home, configuration.recipes_folder)
+
+
+def _editor(config: Path | None) -> RecipeEditor:
+    configuration = load_configuration(config)
+    return RecipeEditor(configuration.home, configuration.recipes_folder)
+
+
+def _change(text: str) -> tuple[str, Any]:
+    path, equals, value = text.partition("=")
+    if not equals:
+        raise BadInputError(f"--set {shortened(text)}: expected PATH=VALUE")
+    try:
+        return path.strip(), plain_scalar(value.strip())
+    except MeaningError as error:
+        raise BadInputError(f"--set {shortened(text)}: {error}") from error
+
+
+def _line(standing: Standing) -> str:
+    """A recipe's standing in one line."""
+    control = standing.control
+    force = "not in force" if control is None else f"revision {control.revision} in force"
+    known = control.recipe if control else standing.file.recipe if standing.file else None
+    what = "" if known is None else f", PLC number {known.plc_number}, {content_sha256(known)[:12]}"
+    waits = (
+        ""
+        if standing.submitted is None
+        else (f"; revision {standing.submitted.revision} of {standing.submitted.author} waits for approval")
+    )
+    return f"{standing.name}: {force}{what}; file: {standing.file_state}{waits}"
+
+
+def _told(each: Revision, before: Revision | None) -> list[str]:
+    """A revision in some lines."""
+    lines = [f"{each.name} revision {each.revision}: {each.status}, {each.origin}, {each.sha256[:12]}"]
+    lines.append(f"    by {each.author} at {_time(each.created_utc_ms)}: {each.reason}")
+    if each.approved_utc_ms is not None:
+        by = each.approver or each.author
+        lines.append(f"    approved by {by} at {_time(each.approved_utc_ms)}: {each.approval_reason}")
+    if each.status is Status.RETIRED and each.retired_utc_ms is not None:
+        lines.append(f"    retired by {each.retired_by} at {_time(each.retired_utc_ms)}: {each.retired_reason}")
+    if before is not None:
+        lines += [f"    {difference}" for difference in differences(before.recipe, each.recipe)]
+    return lines
+
+
+def _time(utc_ms: int) -> str:
+    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def _facts(recipe: Recipe) -> str:

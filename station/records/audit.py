@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from sqlalchemy import Connection, Row, insert, select
@@ -185,9 +185,9 @@ def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, se
         previous_hash=last.hash if last else GENESIS,
         hash="",
     )
-    values = {name: getattr(row, name) for name in row.__slots__} | {"hash": row.true_hash}
-    connection.execute(insert(audit).values(values))
-    return AuditRow(**values)
+    row = replace(row, hash=row.true_hash)
+    connection.execute(insert(audit).values(asdict(row)))
+    return row
 
 
 def _check(entry: AuditEntry) -> None:

@@ -90,7 +90,7 @@ def summarise(folder: Path, name: str) -> LotSummary:
         first, last, began, ended = ask(ends, (name,)).fetchone()
         if first is None:
             raise RecordsError(f"no inspection is of a lot {name!r}", "`station records list` shows the lots' names")
-        outcomes = Counter(dict.fromkeys(("PASS", "FAIL", "NO_RESULT"), 0))
+        outcomes: Counter[str] = Counter({"PASS": 0, "FAIL": 0, "NO_RESULT": 0})
         outcomes.update(
             dict(
                 ask("SELECT outcome, count(*) FROM inspections WHERE lot = ? AND outcome NOT NULL GROUP BY 1", (name,))

@@ -106,7 +106,11 @@ class Inspection:
             duration_ms=round(1000 * (time.monotonic() - self.began_s)),
             curve=tuple(self._point(number, seen, onset_mm) for number, seen in enumerate(self.seen)),
             phases_s=dict(self.phases_s),
-            measures={**self.measures, "onset_mm": onset_mm},
+            measures={
+                **self.measures,
+                "onset_mm": onset_mm,
+                "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
+            },
             images=self._images(),
         )
 

@@ -17,9 +17,11 @@ from station.channel.line import (
 )
 from station.channel.panel import Recover
 from station.channel.server import ChannelServer
+from station.service.lot import LotKeeper
 from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.service import Service
+from station.vocabulary import Refusal
 
 
 class LineServer:
@@ -30,10 +32,11 @@ class LineServer:
         service: the cycle and its outcomes.
         orders: the commands, and what the line says of itself.
         gate: whether a trigger is accepted.
+        lots: freezes the recipe at a lot's first trigger.
     """
 
-    def __init__(self, endpoint: str, service: Service, orders: Orders, gate: Gate) -> None:
-        self._service, self._orders, self._gate = service, orders, gate
+    def __init__(self, endpoint: str, service: Service, orders: Orders, gate: Gate, lots: LotKeeper) -> None:
+        self._service, self._orders, self._gate, self._lots = service, orders, gate, lots
         self._server = ChannelServer(
             endpoint,
             {
@@ -53,7 +56,10 @@ class LineServer:
         await self._server.serve()
 
     async def _begin(self, request: Begin) -> Begun:
-        return await self._service.begin(request, self._gate.refusal()[0])
+        refusal, _ = self._gate.refusal()
+        if refusal is None and not await self._lots.begin(request.lot):
+            refusal = Refusal.NOT_READY
+        return await self._service.begin(request, refusal)
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:
         return await self._service.ledger.outcome(request.sequence)

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from typing import Any
 
 from station.channel.line import Command, CommandDone, CommandName, Line
 from station.channel.panel import Recover
@@ -12,9 +13,11 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, Event
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
+from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
-from station.service.recipe_book import Active, RecipeBook
+from station.service.recipe_book import RecipeBook
 from station.service.service import Service
+from station.service.trail import PANEL, PLC, Trail, alarm_changed, order_of_plc
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
@@ -23,6 +26,7 @@ DEADLINE_S = 25.0
 """Less than the PLC interface's own patience with a command."""
 LINE_SILENT_S = 2.0
 MODES = (1, 2, 3)
+_ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
 class Orders:
@@ -32,11 +36,16 @@ class Orders:
         service: the cycle.
         crew: the devices.
         book: the recipes.
+        lots: told of a recipe that is chosen.
+        trail: told of every command.
         metrics: notes the line's signs of life.
     """
 
-    def __init__(self, service: Service, crew: Crew, book: RecipeBook, metrics: Metrics) -> None:
+    def __init__(
+        self, service: Service, crew: Crew, book: RecipeBook, lots: LotKeeper, trail: Trail, metrics: Metrics
+    ) -> None:
         self._service, self._crew, self._book, self._metrics = service, crew, book, metrics
+        self._lots, self._trail = lots, trail
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
@@ -90,6 +99,7 @@ class Orders:
             command: as it came.
         """
         log.info("the PLC orders %s %s", command.command, command.argument)
+        before, alarms = self._before(command.command), self._service.alarms.alarms
         async with self._turn:
             try:
                 async with asyncio.timeout(DEADLINE_S):
@@ -98,7 +108,25 @@ class Orders:
                 why = f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._sentence()}"
         if why:
             log.warning("%s was not done: %s", command.command, why)
-        return CommandDone(done=not why, why=why)
+        done = CommandDone(done=not why, why=why)
+        self._trail.note(order_of_plc(command, done, before))
+        if command.command in _ON_ALARMS:
+            now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
+            changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
+            self._trail.note(*(alarm_changed(PLC, PLC, change, alarm) for alarm in changed))
+        return done
+
+    def _before(self, command: CommandName) -> dict[str, Any]:
+        """What a command is about to change, for the trail."""
+        active = self._service.active
+        match command:
+            case CommandName.CHANGE_RECIPE:
+                snapshot = None if active is None else active.snapshot
+                return {"recipe": None if snapshot is None else [snapshot.number, snapshot.name, snapshot.revision]}
+            case CommandName.SET_MODE:
+                return {"mode": self.mode}
+            case _:
+                return {"state": str(self._service.state)}
 
     async def _carry_out(self, command: Command) -> str:
         match command.command:
@@ -133,21 +161,13 @@ class Orders:
         self.recipe_changing = True
         try:
             await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
-            self.choose(found)
+            kept = self._lots.chosen(found)
+            log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
         finally:
             self.recipe_changing = False
-        if not self._book.remember(found):
+        if not kept:
             return f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
         return ""
-
-    def choose(self, active: Active) -> None:
-        """Inspect by a recipe from the next fruit on.
-
-        Args:
-            active: the recipe.
-        """
-        self._service.active = active
-        log.info("recipe %s (%d) is active", active.recipe.name, active.recipe.plc_number)
 
     async def recover(self, request: Recover) -> CommandDone:
         """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
@@ -160,9 +180,11 @@ class Orders:
         log.info("a person at the cell asks for: %s", request.what)
         try:
             await self._crew.recover(request.what)
+            why = ""
         except ArmFault as fault:
-            return CommandDone(done=False, why=str(fault))
-        return CommandDone(done=True, why="")
+            why = str(fault)
+        self._trail.command(PANEL, "recover", request.what, why)
+        return CommandDone(done=not why, why=why)
 
     async def _call_off(self) -> str:
         service = self._service

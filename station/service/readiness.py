@@ -4,6 +4,7 @@ from station.channel.line import StationState
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
 from station.service.health import Dependency, Liveness, Readiness
+from station.service.lot import LotKeeper
 from station.service.orders import Orders
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
@@ -22,13 +23,21 @@ class Gate:
         crew: the devices.
         orders: the mode, and a recipe's change under way.
         book: the recipes there are.
+        lots: why a lot could not begin.
         liveness: what has to make progress.
     """
 
     def __init__(
-        self, boot: str, service: Service, crew: Crew, orders: Orders, book: RecipeBook, liveness: Liveness
+        self,
+        boot: str,
+        service: Service,
+        crew: Crew,
+        orders: Orders,
+        book: RecipeBook,
+        lots: LotKeeper,
+        liveness: Liveness,
     ) -> None:
-        self._boot = boot
+        self._boot, self._lots = boot, lots
         self._service, self._crew, self._orders = service, crew, orders
         self._book, self._liveness = book, liveness
 
@@ -50,7 +59,8 @@ class Gate:
             return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
         if service.active is None:
             numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
-            return Refusal.NOT_READY, f"No recipe is active: choose one by its number ({numbers})."
+            why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
+            return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
         if self._orders.mode != PRODUCTION:
             return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
         return None, ""

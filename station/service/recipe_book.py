@@ -1,18 +1,32 @@
-"""The recipes that the station can inspect by, and the one that is active; a broken file's last good form stays."""
+"""The recipes that the station may inspect by: the approved revisions, whatever becomes of files and history."""
 
-from collections.abc import Iterable
+import contextlib
+import json
+import logging
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
+from station.errors import StationError
+from station.recipe_store.difference import in_a_line
+from station.recipe_store.revision import RecipeStoreError
+from station.recipe_store.standing import Control, FileState, Standing
+from station.recipe_store.store import RecipeStore
+from station.records.audit import STATION, AuditEntry
+from station.records.errors import RecordsError
 from station.records.model import RecipeSnapshot
 from station.service.keeping import Kept
 from station.settings.problems import SettingsError
-from station.settings.recipe import Recipe, check_recipes, recipe_files
+from station.settings.recipe import Recipe
+from station.settings.recipe_form import content_sha256
 
 _ACTIVE = "active_recipe.json"
-_GOOD = "recipes"
+_CONTROLS = "control_recipes"
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,103 +37,189 @@ class Active:
     snapshot: RecipeSnapshot
 
     @classmethod
-    def of(cls, recipe: Recipe) -> "Active":
+    def of(cls, recipe: Recipe, revision: str = "") -> "Active":
         """Freeze a recipe.
 
         Args:
             recipe: as read.
+            revision: of it that is in force.
         """
-        return cls(recipe, RecipeSnapshot.of(recipe.model_dump(mode="json")))
+        return cls(recipe, RecipeSnapshot.of(recipe.model_dump(mode="json"), revision))
+
+
+class Remembered(NamedTuple):
+    """What the station inspected by when it ended."""
+
+    active: Active
+    lot: str | None
+    """The lot under way; None where none had begun with it."""
 
 
 class RecipeBook:
-    """The site's recipes.
+    """The site's recipes in force.
 
-    Each good recipe is kept in the home folder. Where its file is broken later, the kept one is used and `problems`
-    says so; a file that was removed takes its recipe with it.
+    Each is kept in the home folder too: where the history cannot be read, the kept one stays in force. A file that was
+    removed takes its recipe with it; one that was edited takes nothing with it, and `problems` says so.
 
     Args:
         folder: the site's recipe files; None for those shipped.
-        kept: where good recipes and the active one are kept.
+        kept: where recipes in force and the active one are kept.
     """
 
     def __init__(self, folder: Path | None, kept: Kept) -> None:
-        self._folder, self._kept = folder, kept
-        self._recipes: dict[int, Recipe] = {}
+        self._store, self._kept = RecipeStore(kept.folder, folder), kept
+        self._controls: dict[int, Control] = {}
+        self._noticed: set[tuple[str, str]] = set()
+        self._signature: Hashable = None
         self.problems: tuple[str, ...] = ()
-        """What is wrong with the files, as of the last reading; one sentence each."""
+        """What is to be told of the files, as of the last reading; one sentence each."""
+        self.noticed: list[AuditEntry] = []
+        """Drafts and gaps that were found and not yet told: who takes them, empties the list."""
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """The PLC's numbers of the recipes that can be chosen."""
-        return tuple(sorted(self._recipes))
+        return tuple(sorted(self._controls))
 
     def read(self) -> None:
-        """Read the files again. Blocks for some milliseconds a file."""
+        """Read files and history again. Blocks for some milliseconds a file."""
+        self._signature = self._store.signature()
+        kept, begun = self._kept_controls(), True
         try:
-            files = recipe_files(self._folder)
-        except SettingsError as error:
-            self.problems = tuple(map(str, error.problems))
-            good = [_parsed(self._kept.read(str(Path(_GOOD, name)))) for name in self._kept_names()]
-            self._take(recipe for recipe in good if recipe is not None)
+            self._store.begin({name: control.recipe for name, control in kept.items()})
+        except (RecordsError, RecipeStoreError, SettingsError) as error:
+            begun = False
+            log.warning("the recipes' history was not continued: %s", error)
+        try:
+            standings, broken = self._store.read()
+        except RecordsError as error:
+            standings, broken = (), (f"the recipes in force are those kept in {_CONTROLS}: {error}",)
+        controls = {each.name: each.control for each in standings if each.control is not None}
+        if not begun and not controls:
+            self.problems = broken
+            self._take(kept.values())
             return
-        checked = check_recipes(files)
-        self.problems = tuple(map(str, checked.problems))
-        recipes = list(checked.recipes.values())
-        for path, recipe in checked.recipes.items():
-            self._kept.write(f"{_GOOD}/{path.stem}.json", _canonical(recipe))
-        for path in set(files) - set(checked.recipes):
-            last_good = _parsed(self._kept.read(f"{_GOOD}/{path.stem}.json"))
-            if last_good is not None:
-                recipes.append(last_good)
-        self._take(recipes)
+        self._notice(standings)
+        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in standings if each.note)]))
+        gone = {each.name for each in standings if each.file_state is FileState.MISSING}
+        self._take(control for name, control in controls.items() if name not in gone)
+        self._keep(controls)
+
+    def refresh(self) -> None:
+        """Read again where a file, its folder or the history has changed since. Blocks for some milliseconds."""
+        if self._store.signature() != self._signature:
+            self.read()
 
     def find(self, number: int) -> Active | None:
-        """A recipe by the PLC's number.
+        """A recipe in force by the PLC's number.
 
         Args:
             number: as in the recipe's `plc_number`.
         """
-        recipe = self._recipes.get(number)
-        return None if recipe is None else Active.of(recipe)
+        control = self._controls.get(number)
+        return None if control is None else Active.of(control.recipe, str(control.revision or ""))
 
-    def last_active(self) -> Active | None:
-        """The recipe that was chosen last, in its present form; None where none was, or it is gone."""
-        recipe = _parsed(self._kept.read(_ACTIVE))
-        found = None if recipe is None else self.find(recipe.plc_number)
-        return found if found is not None and recipe is not None and found.recipe.name == recipe.name else None
-
-    def remember(self, active: Active) -> bool:
-        """Keep the choice over a restart.
+    def current(self, active: Active) -> Active:
+        """What is in force now in the place of what a lot was inspected by.
 
         Args:
-            active: the recipe chosen.
+            active: the recipe frozen before.
+
+        Raises:
+            RecipeStoreError: number, name and content do not belong together any more; the message says how.
+        """
+        name, number = active.recipe.name, active.recipe.plc_number
+        found = self.find(number)
+        if found is not None and found.recipe.name == name:
+            return found
+        moved = next((c.recipe.plc_number for c in self._controls.values() if c.recipe.name == name), None)
+        if moved is not None:
+            what = f"recipe {name} has the PLC's number {moved} now, and no longer {number}"
+        elif found is not None:
+            what = f"the PLC's number {number} is {found.recipe.name} now, and no longer {name}"
+        else:
+            what = f"recipe {name} with the PLC's number {number} is no longer in force"
+        raise RecipeStoreError(f"{what}; choose a recipe again")
+
+    def remembered(self) -> Remembered | None:
+        """What the station inspected by when it ended; None where nothing is in force in its place.
+
+        A lot goes on with the very recipe it began with, if that is still what its revision says.
+        """
+        data = self._kept.read(_ACTIVE)
+        try:
+            told = json.loads(data or b"null")
+            active = Active.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
+            lot, sha256 = told["lot"], told["sha256"]
+        except (ValueError, TypeError, KeyError, ValidationError):
+            return None
+        try:
+            current = self.current(active)
+        except RecipeStoreError:
+            return None
+        whole = active.snapshot.sha256 == sha256 and self._is_revision(active)
+        return Remembered(active, lot) if whole and lot is not None else Remembered(current, None)
+
+    def remember(self, active: Active, lot: str | None) -> bool:
+        """Keep over a restart what is inspected by.
+
+        Args:
+            active: the recipe.
+            lot: the one under way; None where none has begun with it.
 
         Returns:
             Whether it was kept.
         """
-        return self._kept.write(_ACTIVE, _canonical(active.recipe))
+        snapshot = active.snapshot
+        told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
+        return self._kept.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
 
-    def _take(self, recipes: Iterable[Recipe]) -> None:
-        taken: dict[int, Recipe] = {}
-        for recipe in recipes:  # a last good form may clash with a good file; the file wins
-            taken.setdefault(recipe.plc_number, recipe)
-        self._recipes = taken
+    def _is_revision(self, active: Active) -> bool:
+        """Whether the history has this very content as this revision."""
+        with contextlib.suppress(StationError, ValueError):
+            revision = self._store.revision(active.recipe.name, int(active.snapshot.revision))
+            return revision.recipe == active.recipe
+        return False
+
+    def _take(self, controls: Iterable[Control]) -> None:
+        self._controls = {control.recipe.plc_number: control for control in controls}
+
+    def _notice(self, standings: Iterable[Standing]) -> None:
+        """Note what became of files behind the commands' back, once for each content."""
+        for standing in standings:
+            file, control, submitted = standing.file, standing.control, standing.submitted
+            sha256 = str(standing.file_state) if file is None else content_sha256(file.recipe)
+            quiet = standing.file_state is FileState.APPROVED or (file is None and control is None)
+            if quiet or (standing.name, sha256) in self._noticed:
+                continue
+            self._noticed.add((standing.name, sha256))
+            if file is not None and submitted is not None and submitted.recipe == file.recipe:
+                continue
+            changes = in_a_line(control.recipe, file.recipe) if control and file else str(standing.file_state)
+            told = {"state": str(standing.file_state), "sha256": sha256, "changes": changes}
+            entry = AuditEntry(
+                STATION, STATION, "recipe.file_noticed", f"recipe {standing.name}", standing.note[:900], None, told
+            )
+            self.noticed.append(entry)
+
+    def _keep(self, controls: dict[str, Control]) -> None:
+        for name, control in controls.items():
+            told = {"revision": control.revision, "values": control.recipe.model_dump(mode="json")}
+            self._kept.write(f"{_CONTROLS}/{name}.json", json.dumps(told).encode())
+        for name in set(self._kept_names()) - set(controls):
+            with contextlib.suppress(OSError):
+                (self._kept.folder / _CONTROLS / f"{name}.json").unlink()
+
+    def _kept_controls(self) -> dict[str, Control]:
+        found = {}
+        for name in self._kept_names():
+            try:
+                told = json.loads(self._kept.read(f"{_CONTROLS}/{name}.json") or b"null")
+                found[name] = Control(Recipe.model_validate_json(json.dumps(told["values"])), int(told["revision"]))
+            except (ValueError, TypeError, KeyError, ValidationError):
+                continue  # of another form of the program
+        return found
 
     def _kept_names(self) -> list[str]:
-        folder = self._kept.folder / _GOOD
-        return sorted(path.name for path in folder.glob("*.json")) if folder.is_dir() else []
-
-
-def _canonical(recipe: Recipe) -> bytes:
-    return Active.of(recipe).snapshot.text.encode()
-
-
-def _parsed(data: bytes | None) -> Recipe | None:
-    """A kept recipe; None where there is none, or it is of another version of the form."""
-    if data is None:
-        return None
-    try:
-        return Recipe.model_validate_json(data)
-    except ValidationError:
-        return None
+        folder = self._kept.folder / _CONTROLS
+        return sorted(path.stem for path in folder.glob("*.json")) if folder.is_dir() else []

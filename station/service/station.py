@@ -21,12 +21,15 @@ from station.service.health import HealthServer, Liveness
 from station.service.inspector import Inspector
 from station.service.keeping import Kept
 from station.service.line_server import LineServer
+from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
 from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.reference import Golden
 from station.service.service import CYCLE, Service
+from station.service.starting import ended, started
+from station.service.trail import FLUSH_S, Trail
 from station.service.upkeep import UPKEEP, Upkeep
 from station.settings.configuration import Configuration
 from station.settings.plc import line_endpoint
@@ -52,6 +55,8 @@ class Station:
         self._stop = asyncio.Event()
         self.service: Service | None = None
         """The cycle, once `run` has put it together."""
+        self.book: RecipeBook | None = None
+        """The recipes in force, likewise."""
 
     def stop(self) -> None:
         """Ask for an orderly end; asking again changes nothing."""
@@ -82,6 +87,8 @@ class Station:
         stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
+        trail = Trail(records)
+        stack.push_async_callback(self._note_end, trail)
         metrics.watch_records(records.status)
         if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
             metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))
@@ -103,17 +110,20 @@ class Station:
             await alarms.recall(records)
         except RecordsError as error:
             service.ledger.fault = error
-        book = RecipeBook(configuration.recipes_folder, kept)
+        self.book = book = RecipeBook(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
-        service.active = book.last_active()
-        orders = Orders(service, crew, book, metrics)
-        gate = Gate(self.boot, service, crew, orders, book, liveness)
+        lots = LotKeeper(service, book, trail)
+        await asyncio.to_thread(lots.recall)
+        trail.note(*started(self.boot, configuration, kept, versions, self._broken))
+        orders = Orders(service, crew, book, lots, trail, metrics)
+        gate = Gate(self.boot, service, crew, orders, book, lots, liveness)
         upkeep = Upkeep(
             service,
             crew,
             gate,
             orders,
             book,
+            trail,
             metrics,
             liveness,
             broken=self._broken,
@@ -121,7 +131,7 @@ class Station:
             longest_pause_s=settings.retry_longest_s,
         )
         line = LineServer(
-            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate
+            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate, lots
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
         address = configuration.metrics
@@ -132,10 +142,18 @@ class Station:
         await crew.open()
         tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.keep(records), "alarms' records")
+        self._begin(stack, trail.keep(), "audit trail")
         for name in (*crew.watches, CYCLE, UPKEEP):
             liveness.watch(name, settings.progress_s)
         self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
         return tuple(tasks), port
+
+    async def _note_end(self, trail: Trail) -> None:
+        """The trail's last row of this start, as far as it can be written in time."""
+        trail.note(ended(self.boot, asked=self._stop.is_set()))
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(FLUSH_S):
+                await trail.flush()
 
     async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
         """Wait for the order to end; a task that nothing works without and that ended by a bug ends the process."""

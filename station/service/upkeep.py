@@ -17,11 +17,13 @@ from station.service.orders import Orders
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
+from station.service.trail import Trail
 from station.supervision import restarts
 
 UPKEEP = "upkeep"
 PERIOD_S = 0.2
 _ALARMS_EVERY_S = 1.0
+_BOOK_EVERY_S = 2.0
 _CLOCK_STEP_S = 2.0
 _MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
 _MB = 1_000_000
@@ -36,7 +38,8 @@ class Upkeep:
         crew: the devices.
         gate: readiness, for the metrics.
         orders: the line's own alarms.
-        book: the recipes.
+        book: the recipes; read again and again, since people edit and approve them.
+        trail: told of what was found.
         metrics: shows what is ready.
         liveness: fed with this task's progress.
         broken: what was wrong with the configuration at the start; empty for nothing.
@@ -51,6 +54,7 @@ class Upkeep:
         gate: Gate,
         orders: Orders,
         book: RecipeBook,
+        trail: Trail,
         metrics: Metrics,
         liveness: Liveness,
         *,
@@ -59,7 +63,8 @@ class Upkeep:
         longest_pause_s: float,
     ) -> None:
         self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
-        self._metrics, self._liveness = metrics, liveness
+        self._metrics, self._liveness, self._trail = metrics, liveness, trail
+        self._book_at_s = time.monotonic()
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
         self._told_ready_s = 0.0
         self._alarms_at_s = 0.0
@@ -77,9 +82,18 @@ class Upkeep:
             if time.monotonic() - self._alarms_at_s > _ALARMS_EVERY_S:
                 self._alarms_at_s = time.monotonic()
                 self._show_conditions()
+            if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
+                await self._look_into_book()
             self._metrics.ready(ready=self._gate.refusal()[0] is None)
             self._liveness.progress(UPKEEP)
             await asyncio.sleep(PERIOD_S)
+
+    async def _look_into_book(self) -> None:
+        """Notice what people did to the recipes. The lot under way is not touched by it."""
+        await asyncio.to_thread(self._book.refresh)
+        self._book_at_s = time.monotonic()
+        noticed, self._book.noticed = self._book.noticed, []
+        self._trail.note(*noticed)
 
     async def _bring_back(self) -> None:
         service = self._service

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from station.settings.configuration import Configuration
 from station.settings.environment import variable
+from station.settings.recipe import APPROVED_NAME, approved_list
 from station.settings.recipe_model import Recipe
 from station.settings.schema import Leaf, Node, expectation, leaves, resolved, schema_of
 
@@ -27,6 +28,7 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
     recipe_guide, configuration_guide = root / "docs" / "recipes.md", root / "docs" / "configuration.md"
     return {
         root / "recipes" / "recipe.schema.json": json_schema(Recipe, "A recipe of the fruit-inspection station"),
+        root / "recipes" / APPROVED_NAME: approved_list(root / "recipes"),
         root / "deploy" / "station.schema.json": json_schema(Configuration, "station.yaml"),
         root / "deploy" / "station.yaml": example(),
         recipe_guide: _with_table(recipe_guide.read_text(encoding="utf-8"), recipe_table()),

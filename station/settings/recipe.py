@@ -2,19 +2,22 @@
 
 import difflib
 import importlib.resources
+import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.recipe_form import content_sha256, recipe_of
 from station.settings.recipe_model import Recipe
-from station.settings.validation import load_file
 from station.settings.yaml_loader import read_document
 
 __all__ = ["Checked", "Recipe", "check_recipes", "find_recipe", "load_recipe", "load_recipes", "recipe_files"]
 
 SUFFIXES = (".yaml", ".yml")
+APPROVED_NAME = "approved.json"
+"""Beside the shipped recipes: the hashes by which the distribution approves them, so that a change is noticed."""
 
 
 class Checked(NamedTuple):
@@ -34,7 +37,7 @@ def load_recipe(path: Path) -> Recipe:
     Raises:
         SettingsError: all problems of the file.
     """
-    return load_file(Recipe, path)
+    return recipe_of(read_document(path))
 
 
 def load_recipes(folder: Path | None = None) -> dict[str, Recipe]:
@@ -90,7 +93,7 @@ def recipe_files(folder: Path | None = None) -> list[Path]:
     Raises:
         SettingsError: the folder cannot be read or holds no recipe.
     """
-    folder = Path(str(importlib.resources.files("recipes"))) if folder is None else folder
+    folder = shipped_folder() if folder is None else folder
     try:
         files = sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES and path.name[0] != ".")
     except (OSError, ValueError) as error:
@@ -100,6 +103,30 @@ def recipe_files(folder: Path | None = None) -> list[Path]:
     if not files:
         raise SettingsError([Problem(shortened(str(folder), 1000), "folder", "expected recipes (*.yaml), got none")])
     return files
+
+
+def shipped_folder() -> Path:
+    """Where the recipes shipped with the station are."""
+    return Path(str(importlib.resources.files("recipes")))
+
+
+def approved_by_distribution() -> dict[str, str]:
+    """The content hashes of the recipes as they were shipped, by name; empty where the list was taken away."""
+    try:
+        listed = json.loads((shipped_folder() / APPROVED_NAME).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return {str(name): str(sha256) for name, sha256 in listed.items()} if isinstance(listed, dict) else {}
+
+
+def approved_list(folder: Path | None = None) -> str:
+    """What that list has to hold.
+
+    Args:
+        folder: of the recipes; those shipped by default.
+    """
+    hashes = {recipe.name: content_sha256(recipe) for recipe in load_recipes(folder).values()}
+    return json.dumps(hashes, indent=2, sort_keys=True) + "\n"
 
 
 def check_recipes(files: Iterable[Path]) -> Checked:

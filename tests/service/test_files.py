@@ -34,14 +34,14 @@ def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_
     assert book.problems == ()
     blueberry = book.find(2)
     assert blueberry is not None
-    assert book.remember(blueberry)
+    assert book.remember(blueberry, "LOT 1")
     (folder / "blueberry.yaml").write_text("name: [")
     (folder / "raspberry.yaml").unlink()
 
     later = RecipeBook(folder, kept)
     later.read()
     assert later.numbers == (1, 2)
-    assert later.last_active() == blueberry
+    assert later.remembered() == (blueberry, "LOT 1")
     assert any("blueberry.yaml" in problem for problem in later.problems)
 
 

@@ -1,0 +1,102 @@
+"""`station whatif`: what would a draft of a recipe have done with the fruit that were inspected?"""
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+from station.errors import BadInputError, StationError
+from station.recipe_store.difference import differences
+from station.records.database import reading, records_folder
+from station.settings.configuration import load_configuration
+from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe_form import content_sha256
+from station.whatif.outcome_table import Counted, as_csv, counted
+from station.whatif.page import MOST_SHOWN, Page, as_json, render, shown
+from station.whatif.progress_file import ProgressFile
+from station.whatif.replay import Replayed, recipe_of_snapshot
+from station.whatif.runner import batches, run
+from station.whatif.stored import sequences, snapshots
+
+
+@click.command("whatif")
+@click.option("--recipe", "recipe_name", required=True, metavar="DRAFT", help="A recipe's name, or a file's path.")
+@click.option("--lots", multiple=True, metavar="LOT", help="Only these, may be repeated. [default: all]")
+@click.option("--last", type=click.IntRange(1), metavar="N", help="Only the last N inspections.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Where the results go.")
+@click.option("--jobs", type=click.IntRange(1, 512), metavar="N", help="Processes. [default: one for each core]")
+@click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler's address, as tcp://10.0.0.5:8786.")
+@click.option("--config", metavar="FILE", type=click.Path(path_type=Path), help="The station.yaml to use.")
+def whatif(
+    recipe_name: str,
+    lots: tuple[str, ...],
+    last: int | None,
+    out: Path,
+    jobs: int | None,
+    scheduler: str | None,
+    config: Path | None,
+) -> None:
+    """Judge stored inspections again by DRAFT, and show which fruit would have changed sides.
+
+    Writes DIR/whatif.html, changes.csv and summary.json. A run that was ended goes on where it was. What cannot be
+    known, as where a curve was stopped early, is counted apart and never guessed.
+    """
+    site = load_configuration(config)
+    draft, folder = find_recipe(recipe_name, site.recipes_folder), records_folder(site.home)
+    with reading(folder) as connection:
+        wanted, own = sequences(connection, draft.name, lots, last), snapshots(connection, draft.name)
+    if not wanted:
+        raise BadInputError(f"no judged inspection of {draft.name} is in {folder}" + _of(lots))
+    with ProgressFile(out, draft) as progress:
+        missing = [sequence for sequence in wanted if sequence not in progress.done]
+        parts = batches(folder, missing, own, draft)
+        with click.progressbar(length=len(wanted), label="judged again", file=sys.stderr) as bar:
+            bar.update(len(wanted) - len(missing))
+            for results in run(parts, jobs or os.cpu_count() or 1, scheduler):
+                progress.add(results)
+                bar.update(len(results))
+        results = [progress.done[sequence] for sequence in wanted if sequence in progress.done]
+    told = counted(results)
+    page = _page(folder, results, told, own, draft, lots)
+    try:
+        (out / "whatif.html").write_text(page, encoding="utf-8")
+        (out / "changes.csv").write_text(as_csv(results), encoding="utf-8")
+        (out / "summary.json").write_text(as_json(told), encoding="utf-8")
+    except OSError as error:
+        raise StationError(
+            f"--out {out}: {(error.strerror or str(error)).lower()}; free space and try again"
+        ) from error
+    _say(told, out)
+
+
+def _page(
+    folder: Path, results: list[Replayed], told: Counted, own: dict[str, str], draft: Recipe, lots: tuple[str, ...]
+) -> str:
+    known = [recipe for text in own.values() if (recipe := recipe_of_snapshot(text)) is not None]
+    single = known[-1] if known else None
+    changed = [each for each in results if each.changes_side]
+    with reading(folder) as connection:
+        tiles = shown(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
+    facts = [
+        ("draft", f"{draft.title}, {content_sha256(draft)[:12]}"),
+        ("inspections", f"{results[0].sequence} to {results[-1].sequence}{_of(lots)}"),
+        ("recipes of then", ", ".join(sha256[:12] for sha256 in own)),
+    ]
+    changes = () if single is None else differences(single, draft)
+    return render(Page(f"What if: {draft.title}", facts, changes, told, tiles, len(changed)))
+
+
+def _of(lots: tuple[str, ...]) -> str:
+    return f", of lot {', '.join(lots)}" if lots else ""
+
+
+def _say(told: Counted, out: Path) -> None:
+    click.echo(f"{told.total} inspections, {told.decided} decided by the draft")
+    click.echo(f"rejects: {told.rejects_before()} before, {told.rejects_after()} after")
+    click.echo(f"{told.newly_rejected} newly rejected, {told.newly_passed} newly passed")
+    for why, number in told.undecidable.most_common(5):
+        click.echo(f"cannot be known: {number}: {why}")
+    if told.unfaithful:
+        click.echo(f"{told.unfaithful} are not as their own recipe judges them today")
+    click.echo(f"see {out / 'whatif.html'}")

@@ -1,0 +1,52 @@
+"""What differs between two recipes, value by value."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from station.settings.problems import Path, dotted
+from station.settings.recipe_model import Recipe
+
+_ABSENT = "nothing"
+
+
+class Difference(NamedTuple):
+    """One value that differs."""
+
+    path: str
+    old: Any
+    new: Any
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.old} → {self.new}"
+
+
+def differences(old: Recipe, new: Recipe) -> tuple[Difference, ...]:
+    """Every value of two recipes that is not the same, in the order of the file.
+
+    Args:
+        old: the recipe before.
+        new: the recipe after.
+    """
+    return tuple(_walk(old.model_dump(mode="json"), new.model_dump(mode="json"), ()))
+
+
+def in_a_line(old: Recipe, new: Recipe) -> str:
+    """The differences for a message.
+
+    Args:
+        old: the recipe before.
+        new: the recipe after.
+    """
+    return "; ".join(map(str, differences(old, new))) or "no value differs"
+
+
+def _walk(old: Any, new: Any, path: Path) -> Iterator[Difference]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in dict.fromkeys([*old, *new]):
+            yield from _walk(old.get(key, _ABSENT), new.get(key, _ABSENT), (*path, key))
+    elif isinstance(old, list) and isinstance(new, list) and any(isinstance(item, dict) for item in old + new):
+        for place in range(max(len(old), len(new))):
+            before, after = (items[place] if place < len(items) else _ABSENT for items in (old, new))
+            yield from _walk(before, after, (*path, place))
+    elif old != new:
+        yield Difference(dotted(path), old, new)

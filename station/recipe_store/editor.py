@@ -1,0 +1,197 @@
+"""A recipe's file changed by a program: by values, as a whole, back to a revision, to a newer form of the file.
+
+Every change makes an unapproved draft at most; what is in force stays so until a draft is approved.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from station.errors import BadInputError
+from station.recipe_store.difference import in_a_line
+from station.recipe_store.files import locked, read_folder, write_back
+from station.recipe_store.history import Person
+from station.recipe_store.revision import ConflictError, RecipeStoreError, Status
+from station.recipe_store.standing import Found, Standing
+from station.recipe_store.store import RecipeStore
+from station.records.audit import AuditEntry, append_audit
+from station.records.database import records_folder
+from station.records.direct import writing
+from station.settings.recipe import shipped_folder
+from station.settings.recipe_form import content_sha256, parse_recipe
+from station.settings.recipe_model import Recipe
+from station.settings.recipe_text import upgraded_text, with_values
+
+_BASE = re.compile(r"^# base: sha256 ([0-9a-f]{64})\n", re.MULTILINE)
+_SHORTEST_BASE = 8
+
+
+class RecipeEditor:
+    """Writes a site's recipe files. Every verb blocks.
+
+    Args:
+        home: the station's home folder.
+        folder: the site's recipe files; None for those shipped, which cannot be edited in place.
+    """
+
+    def __init__(self, home: Path, folder: Path | None) -> None:
+        self._home, self._folder = home, folder
+        self._store = RecipeStore(home, folder)
+
+    def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> Standing:
+        """Change values in a recipe's file, comments kept: it is an unapproved draft afterwards.
+
+        Args:
+            name: the recipe's.
+            changes: new values by their dotted paths.
+            person: who edits, and why.
+            base: the content hash, or its beginning, of what the editor has looked at; empty for what is there now.
+
+        Raises:
+            BadInputError: the recipe would be bad; the file is as it was.
+            ConflictError: the file is not what the editor has looked at.
+            RecipeStoreError: the file cannot be written.
+        """
+        with self._editing(name) as file:
+            self._check_base(file, base)
+            text, recipe = with_values(file.text, changes, str(file.path))
+            self._put(file, text, recipe, "recipe.edited", person)
+        return self._store.standing(name)
+
+    def import_text(self, text: str, person: Person, base: str = "") -> Standing:
+        """Put a whole recipe in the place of its file: it is an unapproved draft afterwards.
+
+        Args:
+            text: YAML; as exported it names in its first lines what it is based on.
+            person: who imports, and why.
+            base: as for `edit`; empty for what the text names.
+
+        Raises:
+            BadInputError: the recipe is bad, or neither text nor caller names what it is based on.
+            ConflictError: the file was changed since it was exported.
+            RecipeStoreError: the file cannot be written.
+        """
+        recipe = parse_recipe(text, "the recipe to import")
+        named = _BASE.search(text)
+        base = base or (named[1] if named else "")
+        body = _BASE.sub("", text, count=1)
+        with locked(self._home):
+            files = {file.recipe.name: file for file in read_folder(self._sites()).found}
+            file = files.get(recipe.name)
+            if file is None:
+                path = self._sites() / f"{recipe.name}.yaml"
+                if path.exists():
+                    raise RecipeStoreError(
+                        f"{path}: there is a file of that name which is no good recipe; mend it first"
+                    )
+                self._put(Found(path, "", recipe), body, recipe, "recipe.imported", person)
+            else:
+                if not base:
+                    raise BadInputError(
+                        f"recipe {recipe.name}: expected what it is based on: export it first, or give the content "
+                        "hash that `station recipes list` shows"
+                    )
+                self._check_base(file, base)
+                self._put(file, body, recipe, "recipe.imported", person)
+        return self._store.standing(recipe.name)
+
+    def export_text(self, name: str, revision: int | None = None) -> str:
+        """A recipe's file, with a first line that names what it is, so that `import_text` notices changes meanwhile.
+
+        Args:
+            name: the recipe's.
+            revision: one of its revisions; the file as it is where None.
+
+        Raises:
+            BadInputError: there is none.
+        """
+        standing = self._store.standing(name)
+        now = standing.file
+        if revision is not None:
+            text = self._store.revision(name, revision).text
+        elif now is not None:
+            text = now.text
+        else:
+            raise BadInputError(f"recipe {name}: there is no good file of it; give one of its revisions")
+        base = "" if now is None else f"# base: sha256 {content_sha256(now.recipe)}\n"
+        return base + _BASE.sub("", text, count=1)
+
+    def revert(self, name: str, person: Person, revision: int | None = None) -> Standing:
+        """Put a revision's text back into the recipe's file; what stood there is kept as a backup.
+
+        Args:
+            name: the recipe's.
+            person: who does so, and why.
+            revision: which one; the approved one where None.
+
+        Raises:
+            BadInputError: there is none.
+            RecipeStoreError: the file cannot be written.
+        """
+        with locked(self._home):
+            history = self._store.history(name)
+            approved = next((each for each in history if each.status is Status.APPROVED), None)
+            wanted = approved if revision is None else self._store.revision(name, revision)
+            if wanted is None:
+                raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --revision")
+            good = {file.recipe.name: file for file in read_folder(self._sites()).found}
+            path = good[name].path if name in good else self._sites() / f"{name}.yaml"
+            self._put(Found(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
+        return self._store.standing(name)
+
+    def upgrade(self, person: Person) -> list[tuple[Path, int]]:
+        """Write every file of an earlier form in this program's form, comments kept, with a backup.
+
+        Args:
+            person: who does so, and why.
+
+        Returns:
+            The files written, and the forms that they had.
+        """
+        done = []
+        with locked(self._home):
+            for file in read_folder(self._sites()).found:
+                made = upgraded_text(file.text, str(file.path))
+                if made is not None:
+                    self._put(file, made[0], file.recipe, "recipe.upgraded", person)
+                    done.append((file.path, made[1]))
+        return done
+
+    @contextmanager
+    def _editing(self, name: str) -> Iterator[Found]:
+        with locked(self._home):
+            self._sites()
+            yield self._store.good_file(name)
+
+    def _check_base(self, file: Found, base: str) -> None:
+        """The file has to be what the editor has looked at."""
+        now = content_sha256(file.recipe)
+        if not base or (len(base) >= _SHORTEST_BASE and now.startswith(base.lower())):
+            return
+        seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
+        changed = f": {in_a_line(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
+        raise ConflictError(
+            f"recipe {file.recipe.name}: it was changed since {base[:12]} was looked at, to {now[:12]}{changed}; "
+            "look at it as it is now and make the change again"
+        )
+
+    def _put(self, file: Found, text: str, recipe: Recipe, action: str, person: Person) -> None:
+        """Write a file back, with its row of the trail: first noted, then done, so that nothing is done unnoted."""
+        old = content_sha256(parse_recipe(file.text, str(file.path))) if file.text else None
+        new = {"sha256": content_sha256(recipe), "file": file.path.name}
+        with writing(records_folder(self._home)) as connection:
+            entry = AuditEntry(
+                person.who, person.role, action, f"recipe {recipe.name}", person.reason, {"sha256": old}, new
+            )
+            append_audit(connection, entry)
+            write_back(file.path, text, self._home)
+
+    def _sites(self) -> Path:
+        if self._folder is None or self._folder.resolve() == shipped_folder().resolve():
+            raise RecipeStoreError(
+                "the recipes shipped are the software's own: copy them into a folder of the site's, name it as "
+                "recipes_folder in station.yaml, and edit them there"
+            )
+        return self._folder

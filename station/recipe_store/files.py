@@ -1,0 +1,135 @@
+"""The recipe files of a folder: read beside each other, and written back whole or not at all."""
+
+import contextlib
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from station.recipe_store.revision import RecipeStoreError
+from station.recipe_store.standing import Found
+from station.records.sequence_mark import sync_folder
+from station.settings.problems import Problem, SettingsError
+from station.settings.recipe import check_recipes, recipe_files
+from station.settings.recipe_form import parse_recipe
+
+BACKUPS = "recipe_backups"
+_LOCK = "recipes.lock"
+
+
+class Folder(NamedTuple):
+    """What a folder holds."""
+
+    found: tuple[Found, ...]
+    broken: dict[str, list[Problem]]
+    """What is wrong with the files that are not good, by their stems."""
+    problems: tuple[Problem, ...]
+    """All that is wrong, clashes between files included."""
+
+
+def read_folder(folder: Path | None) -> Folder:
+    """Read every recipe of a folder, whatever is wrong with some.
+
+    Args:
+        folder: the site's; None for the recipes shipped.
+
+    Raises:
+        SettingsError: the folder cannot be read or holds no recipe.
+    """
+    files = recipe_files(folder)
+    checked = check_recipes(files)
+    found, problems = [], list(checked.problems)
+    for path in checked.recipes:
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+            found.append(Found(path, text, parse_recipe(text, str(path))))  # as it is now, with its text
+        except (OSError, UnicodeDecodeError) as error:
+            problems.append(Problem(f"{path}:1", "file", f"expected a readable file: {error}"))
+        except SettingsError as error:
+            problems += error.problems
+    good = {file.path.stem for file in found}
+    broken = {
+        path.stem: [problem for problem in problems if problem.place.rpartition(":")[0] == str(path)]
+        for path in files
+        if path.stem not in good
+    }
+    return Folder(tuple(found), broken, tuple(problems))
+
+
+@contextmanager
+def locked(home: Path) -> Iterator[None]:
+    """Keep other commands from changing recipes for as long as the block lasts.
+
+    Args:
+        home: the station's home folder.
+
+    Raises:
+        RecipeStoreError: another one changes them now, or the folder cannot be written.
+    """
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(home / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise _unwritable(home, error) from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise RecipeStoreError("somebody else changes a recipe at this moment; try again") from error
+    finally:
+        os.close(descriptor)
+
+
+def write_back(path: Path, text: str, home: Path) -> Path | None:
+    """Put a text in the place of a recipe's file, whole or not at all; what stood there is kept as a backup.
+
+    Args:
+        path: the recipe's file, there or not.
+        text: the new content.
+        home: the station's home folder, where the backup goes.
+
+    Returns:
+        The backup; None where there was no file.
+
+    Raises:
+        RecipeStoreError: it could not be written; the file is as it was.
+    """
+    backup: Path | None = None
+    try:
+        if path.exists():
+            stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+            backup = home / BACKUPS / f"{path.stem}-{stamp}{path.suffix}"
+            backup.parent.mkdir(parents=True, exist_ok=True)
+            _write(backup, path.read_bytes(), 0o644)
+        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+        _write(path, text.encode(), mode)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    return backup
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(unfinished).chmod(mode)
+        Path(unfinished).replace(path)
+        sync_folder(path.parent)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(unfinished).unlink()
+        raise
+
+
+def _unwritable(path: Path, error: OSError) -> RecipeStoreError:
+    return RecipeStoreError(
+        f"{path}: cannot be written: {(error.strerror or str(error)).lower()}; it is as it was. Free space, or make it "
+        "writable for this user"
+    )

@@ -1,0 +1,215 @@
+"""The history in the records' database: each change is one transaction with its row of the audit trail."""
+
+from dataclasses import asdict, replace
+from typing import Any, NamedTuple
+
+from sqlalchemy import Connection, func, insert, select, update
+
+from station.recipe_store.difference import in_a_line
+from station.recipe_store.revision import ConflictError, Origin, RecipeStoreError, Revision, Status
+from station.records.audit import AuditEntry, append_audit
+from station.records.schema import recipe_revisions
+from station.records.writing import utc_ms
+from station.settings.recipe_form import content_sha256
+from station.settings.recipe_model import Recipe
+
+
+class Person(NamedTuple):
+    """Who acts, and why."""
+
+    who: str
+    role: str
+    reason: str
+
+
+def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
+    """The revisions by name, oldest first.
+
+    Args:
+        connection: any.
+        name: of one recipe; all where empty.
+    """
+    query = select(recipe_revisions).order_by(recipe_revisions.c.name, recipe_revisions.c.revision)
+    if name:
+        query = query.where(recipe_revisions.c.name == name)
+    return [_revision(row) for row in connection.execute(query).mappings()]
+
+
+def submit(connection: Connection, text: str, recipe: Recipe, person: Person) -> Revision:
+    """Record a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
+
+    Args:
+        connection: of a transaction for writing.
+        text: the file's.
+        recipe: what the text says.
+        person: the author.
+
+    Raises:
+        RecipeStoreError: it is what is approved already, or a draft of somebody else's waits.
+    """
+    known = read_revisions(connection, recipe.name)
+    approved, draft = _with(known, Status.APPROVED), _with(known, Status.DRAFT)
+    if approved is not None and approved.recipe == recipe:
+        raise RecipeStoreError(
+            f"recipe {recipe.name}: the file is what revision {approved.revision} says, which is approved already; "
+            "change it first"
+        )
+    if draft is not None and draft.recipe == recipe and draft.author == person.who:
+        return draft
+    if draft is not None and draft.author != person.who:
+        raise ConflictError(
+            f"recipe {recipe.name}: revision {draft.revision} of {draft.author} waits for approval, and differs from "
+            f"this one in {in_a_line(draft.recipe, recipe)}; let it be approved or retired first"
+        )
+    if draft is not None:
+        _retire(connection, draft, person, f"replaced by its author's next draft: {person.reason}")
+    made = _new(known, text, recipe, Origin.SUBMITTED, person)
+    _insert(connection, made)
+    before = None if approved is None else _told(approved)
+    _note(connection, person, "recipe.submitted", made, before, {**_told(made), "text": text})
+    return made
+
+
+def approve(connection: Connection, wanted: Revision, file: Recipe | None, person: Person) -> Revision:
+    """Let fruit be inspected by a draft from the next lot on; the revision approved before is retired.
+
+    Args:
+        connection: of a transaction for writing.
+        wanted: the draft, as the approver has seen it.
+        file: what the recipe's file says now; None where it says nothing good.
+        person: the approver.
+
+    Raises:
+        RecipeStoreError: it is no draft any more, or the approver's own, or its PLC number is another recipe's.
+        ConflictError: the file was changed since the draft was submitted.
+    """
+    place = f"recipe {wanted.name}, revision {wanted.revision}"
+    known = read_revisions(connection, wanted.name)
+    draft = next((each for each in known if each.revision == wanted.revision), None)
+    if draft is None or draft.status is not Status.DRAFT:
+        raise ConflictError(f"{place}: it is {'gone' if draft is None else draft.status}, and only a draft is approved")
+    if draft.author.casefold().split() == person.who.casefold().split():
+        raise RecipeStoreError(f"{place}: {draft.author} is its author; another person has to approve it")
+    if file != draft.recipe:
+        what = "cannot be read" if file is None else f"says otherwise: {in_a_line(draft.recipe, file)}"
+        raise ConflictError(f"{place}: the recipe's file {what}; submit the file again, or put it back with revert")
+    for other in read_revisions(connection):
+        if other.status is Status.APPROVED and other.name != draft.name and other.number == draft.number:
+            raise RecipeStoreError(f"{place}: its PLC number {draft.number} is that of the approved {other.name}")
+    before = _with(known, Status.APPROVED)
+    if before is not None:
+        _retire(connection, before, person, f"revision {draft.revision} took its place: {person.reason}", told=False)
+    made = replace(
+        draft,
+        status=Status.APPROVED,
+        approver=person.who,
+        approval_reason=person.reason,
+        approved_utc_ms=utc_ms(),
+    )
+    _update(connection, made)
+    changes = in_a_line(before.recipe, draft.recipe) if before else "the first revision"
+    old = None if before is None else _told(before)
+    _note(connection, person, "recipe.approved", made, old, {**_told(made), "changes": changes})
+    return made
+
+
+def retire(connection: Connection, wanted: Revision, person: Person) -> Revision:
+    """Take a revision out of use: a draft is rejected; of an approved one no lot begins any more.
+
+    Args:
+        connection: of a transaction for writing.
+        wanted: a draft or an approved one.
+        person: who retires it.
+
+    Raises:
+        RecipeStoreError: it is retired already.
+    """
+    now = next(each for each in read_revisions(connection, wanted.name) if each.revision == wanted.revision)
+    if now.status is Status.RETIRED:
+        raise RecipeStoreError(f"recipe {now.name}, revision {now.revision}: it is retired already")
+    return _retire(connection, now, person, person.reason)
+
+
+def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str) -> Revision:
+    """Record a recipe that is approved by where it comes from, in the place of what was approved before.
+
+    Args:
+        connection: of a transaction for writing.
+        text: its file's.
+        recipe: what the text says.
+        origin: shipped or adopted.
+        who: the distribution, or the station.
+        reason: why it counts as approved.
+    """
+    known, person = read_revisions(connection, recipe.name), Person(who, "station", reason)
+    before = _with(known, Status.APPROVED)
+    if before is not None:
+        _retire(connection, before, person, f"replaced: {reason}", told=False)
+    made = replace(
+        _new(known, text, recipe, origin, person),
+        status=Status.APPROVED,
+        approval_reason=reason,
+        approved_utc_ms=utc_ms(),
+    )
+    _insert(connection, made)
+    old = None if before is None else _told(before)
+    _note(connection, person, f"recipe.{origin}", made, old, {**_told(made), "text": text})
+    return made
+
+
+def _with(known: list[Revision], status: Status) -> Revision | None:
+    return next((each for each in reversed(known) if each.status is status), None)
+
+
+def _new(known: list[Revision], text: str, recipe: Recipe, origin: Origin, person: Person) -> Revision:
+    approved = _with(known, Status.APPROVED)
+    return Revision(
+        name=recipe.name,
+        revision=known[-1].revision + 1 if known else 1,
+        number=recipe.plc_number,
+        sha256=content_sha256(recipe),
+        text=text,
+        status=Status.DRAFT,
+        origin=origin,
+        based_on=None if approved is None else approved.revision,
+        author=person.who,
+        reason=person.reason,
+        created_utc_ms=utc_ms(),
+    )
+
+
+def _retire(connection: Connection, now: Revision, person: Person, reason: str, *, told: bool = True) -> Revision:
+    made = replace(now, status=Status.RETIRED, retired_by=person.who, retired_reason=reason, retired_utc_ms=utc_ms())
+    _update(connection, made)
+    if told:
+        _note(connection, person, "recipe.retired", made, _told(now), _told(made))
+    return made
+
+
+def _insert(connection: Connection, made: Revision) -> None:
+    latest = connection.scalar(
+        select(func.max(recipe_revisions.c.revision)).where(recipe_revisions.c.name == made.name)
+    )
+    if latest is not None and latest >= made.revision:
+        raise ConflictError(f"recipe {made.name}: revision {latest} was recorded meanwhile; look at it first")
+    connection.execute(insert(recipe_revisions).values(asdict(made)))
+
+
+def _update(connection: Connection, made: Revision) -> None:
+    table = recipe_revisions.c
+    connection.execute(
+        update(recipe_revisions).where(table.name == made.name, table.revision == made.revision).values(asdict(made))
+    )
+
+
+def _note(connection: Connection, person: Person, action: str, of: Revision, old: Any, new: Any) -> None:
+    subject = f"recipe {of.name} revision {of.revision}"
+    append_audit(connection, AuditEntry(person.who, person.role, action, subject, person.reason, old, new))
+
+
+def _told(revision: Revision) -> dict[str, Any]:
+    return {"revision": revision.revision, "status": str(revision.status), "sha256": revision.sha256}
+
+
+def _revision(row: Any) -> Revision:
+    return Revision(**{**row, "status": Status(row["status"]), "origin": Origin(row["origin"])})

@@ -1,0 +1,257 @@
+"""The door to a station's recipes: for the command line, the service and the panel alike. Every verb blocks."""
+
+import contextlib
+from collections.abc import Hashable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+from sqlalchemy import Connection
+
+from station.errors import BadInputError
+from station.recipe_store.files import Folder, locked, read_folder
+from station.recipe_store.history import Person, approve, read_revisions, retire, submit, take_up
+from station.recipe_store.revision import Origin, RecipeStoreError, Revision, Status
+from station.recipe_store.standing import Found, Standing, standings
+from station.records.audit import AuditEntry, append_audit
+from station.records.database import FILE_NAME, reading, records_folder
+from station.records.direct import writing
+from station.records.errors import RecordsError
+from station.settings.problems import SettingsError, shortened
+from station.settings.recipe import approved_by_distribution, shipped_folder
+from station.settings.recipe_form import content_sha256
+from station.settings.recipe_model import Recipe
+
+BEGAN = "recipe.history_began"
+
+
+class RecipeStore:
+    """One station's recipes: the files that people edit, and the history of what was approved.
+
+    Args:
+        home: the station's home folder.
+        folder: the site's recipe files; None for those shipped, which cannot be edited in place.
+    """
+
+    def __init__(self, home: Path, folder: Path | None) -> None:
+        self._home, self._folder, self._records = home, folder, records_folder(home)
+
+    def read(self) -> tuple[tuple[Standing, ...], tuple[str, ...]]:
+        """How each recipe stands, and what is wrong with the files by themselves or with their folder.
+
+        Raises:
+            RecordsError: the history cannot be read.
+        """
+        try:
+            folder = read_folder(self._folder)
+        except SettingsError as error:
+            folder = Folder((), {"": list(error.problems)}, error.problems)
+        return standings(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
+
+    def signature(self) -> Hashable:
+        """Another value whenever a file or the history has changed; it tells nothing else."""
+        folder = self._folder or shipped_folder()
+        files = []
+        with contextlib.suppress(OSError):
+            for path in sorted(folder.iterdir()):
+                with contextlib.suppress(OSError):
+                    stat = path.stat()
+                    files.append((path.name, stat.st_mtime_ns, stat.st_size, stat.st_ino))
+        try:
+            history = [(each.name, each.revision, each.status) for each in self.history()]
+        except RecordsError as error:
+            return tuple(files), str(error)
+        return tuple(files), tuple(history)
+
+    def history(self, name: str = "") -> list[Revision]:
+        """The revisions, oldest first; none before the history began.
+
+        Args:
+            name: of one recipe; all where empty.
+
+        Raises:
+            RecordsError: they cannot be read.
+        """
+        if not (self._records / FILE_NAME).exists():
+            return []
+        with reading(self._records) as connection:
+            return read_revisions(connection, name)
+
+    def begin(self, last_good: Mapping[str, Recipe]) -> None:
+        """Take up what needs no person's approval; again and again, as at each start.
+
+        What the distribution ships counts as approved by it. When the history begins, what the station inspected by
+        until then, or else what is there, is adopted: whoever installed it answers for it.
+
+        Args:
+            last_good: recipes that the station was last seen to inspect by, where it remembers them.
+
+        Raises:
+            SettingsError: the folder cannot be read, or holds no recipe at all.
+            RecordsError: the history cannot be written.
+        """
+        found = {file.recipe.name: file for file in read_folder(self._folder).found}
+        if self._is_begun() and not self._to_ship(list(found.values()), self.history()):
+            return
+        with locked(self._home), writing(self._records) as connection:
+            _adopt(connection, found, last_good)
+            for file in self._to_ship(list(found.values()), read_revisions(connection)):
+                who = f"fruit-station {version('fruit-station')}"
+                take_up(connection, file.text, file.recipe, Origin.SHIPPED, who, "shipped with the station's software")
+
+    def submit(self, name: str, person: Person) -> Revision:
+        """Record the recipe's file as a draft for another person to approve.
+
+        Args:
+            name: the recipe's.
+            person: its author.
+
+        Raises:
+            BadInputError: there is no good file of that recipe.
+            RecipeStoreError: it is approved already, or another person's draft waits.
+        """
+        with locked(self._home):
+            file = self.good_file(name)
+            self._begun()
+            with writing(self._records) as connection:
+                return submit(connection, file.text, file.recipe, person)
+
+    def approve(self, name: str, person: Person, revision: int | None = None) -> Revision:
+        """Let fruit be inspected by a draft from the next lot on.
+
+        Args:
+            name: the recipe's.
+            person: another one than the author.
+            revision: the draft that the approver has seen; the one that waits where None.
+
+        Raises:
+            BadInputError: no draft waits.
+            RecipeStoreError: it is the approver's own, or the file was changed since.
+        """
+        with locked(self._home):
+            standing = self.standing(name)
+            wanted = standing.submitted if revision is None else self.revision(name, revision)
+            if wanted is None:
+                raise BadInputError(f"recipe {name}: no draft waits for approval; submit one first")
+            file = None if standing.file is None else standing.file.recipe
+            with writing(self._records) as connection:
+                return approve(connection, wanted, file, person)
+
+    def retire(self, name: str, person: Person, revision: int | None = None) -> Revision:
+        """Take a revision out of use: no lot begins with it any more.
+
+        Args:
+            name: the recipe's.
+            person: who retires it, and why.
+            revision: which one; the approved one where None.
+
+        Raises:
+            BadInputError: there is none.
+            RecipeStoreError: it is retired already.
+        """
+        with locked(self._home):
+            self._begun()
+            history = self.history(name)
+            if revision is not None:
+                wanted = self.revision(name, revision)
+            else:
+                approved = [each for each in history if each.status is Status.APPROVED]
+                if not approved:
+                    raise BadInputError(f"recipe {name}: none of its revisions is approved; name one to retire")
+                wanted = approved[0]
+            with writing(self._records) as connection:
+                return retire(connection, wanted, person)
+
+    def standing(self, name: str) -> Standing:
+        """How one recipe stands.
+
+        Args:
+            name: the recipe's.
+
+        Raises:
+            BadInputError: there is none of this name.
+        """
+        every, _ = self.read()
+        for standing in every:
+            if standing.name == name:
+                return standing
+        known = ", ".join(standing.name for standing in every)
+        raise BadInputError(f"recipe {shortened(name)}: expected one of {known}")
+
+    def revision(self, name: str, revision: int) -> Revision:
+        """One revision.
+
+        Args:
+            name: the recipe's.
+            revision: its number.
+
+        Raises:
+            BadInputError: there is none.
+        """
+        history = self.history(name)
+        for each in history:
+            if each.revision == revision:
+                return each
+        known = ", ".join(str(each.revision) for each in history) or "none yet"
+        raise BadInputError(f"recipe {shortened(name)}: revision {revision}: expected one of {known}")
+
+    def good_file(self, name: str) -> Found:
+        """A recipe's file.
+
+        Args:
+            name: the recipe's.
+
+        Raises:
+            BadInputError: there is none, or it is broken.
+        """
+        standing = self.standing(name)
+        if standing.file is None:
+            raise BadInputError(f"recipe {name}: {standing.note or 'its file is gone'}")
+        return standing.file
+
+    def _to_ship(self, found: list[Found], history: list[Revision]) -> list[Found]:
+        """The files that are as the distribution ships them, where no person has decided otherwise."""
+        shipped, wanted = approved_by_distribution(), []
+        for file in found:
+            if shipped.get(file.recipe.name) != content_sha256(file.recipe):
+                continue
+            own = [each for each in history if each.name == file.recipe.name]
+            last = next((each for each in reversed(own) if each.status is not Status.DRAFT), None)
+            if last is None or (
+                last.status is Status.APPROVED and last.origin is Origin.SHIPPED and last.recipe != file.recipe
+            ):
+                wanted.append(file)
+        return wanted
+
+    def _is_begun(self) -> bool:
+        if not (self._records / FILE_NAME).exists():
+            return False
+        with reading(self._records) as connection:
+            return _has_begun(connection)
+
+    def _begun(self) -> None:
+        """Before a person's first change: adopt what was there before, unless this is it."""
+        if not self._is_begun():
+            raise RecipeStoreError(
+                "the recipes' history has not begun: `station recipes adopt`, or the station's first start, takes up "
+                "what is there"
+            )
+
+
+def _has_begun(connection: Connection) -> bool:
+    return connection.exec_driver_sql("SELECT 1 FROM audit WHERE action = ? LIMIT 1", (BEGAN,)).first() is not None
+
+
+def _adopt(connection: Connection, found: Mapping[str, Found], last_good: Mapping[str, Recipe]) -> None:
+    """Begin the history, once."""
+    if _has_begun(connection):
+        return
+    shipped = approved_by_distribution()
+    reason = "it was there when the recipes' history began"
+    append_audit(connection, AuditEntry("station", "station", BEGAN, "recipes", reason))
+    for name in sorted({*found, *last_good}):
+        file, good = found.get(name), last_good.get(name)
+        if good is not None and (file is None or file.recipe != good):
+            text = good.model_dump_json(indent=2) + "\n"
+            take_up(connection, text, good, Origin.ADOPTED, "station", "the station inspected by it until now")
+        elif file is not None and shipped.get(name) != content_sha256(file.recipe):
+            take_up(connection, file.text, file.recipe, Origin.ADOPTED, "station", reason)

@@ -1,0 +1,59 @@
+"""Rows of the audit trail, chosen, and as text for a terminal."""
+
+import json
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from station.records.audit import AuditRow, row_of
+from station.records.schema import audit
+from station.records.wording import printable
+
+_LONGEST_VALUE = 300
+
+
+def read_audit(connection: Connection, number: int, action: str = "", subject: str = "") -> list[AuditRow]:
+    """The last rows, oldest first.
+
+    Args:
+        connection: any.
+        number: at most so many.
+        action: rows of this action, or of all that begin so; all where empty.
+        subject: rows with this text in their subject; all where empty.
+    """
+    query = select(audit).order_by(audit.c.seq.desc()).limit(number)
+    if action:
+        query = query.where(audit.c.action.startswith(action, autoescape=True))
+    if subject:
+        query = query.where(audit.c.subject.contains(subject, autoescape=True))
+    return [row_of(found) for found in connection.execute(query)][::-1]
+
+
+def told(rows: Sequence[AuditRow]) -> str:
+    """Rows for a person, some lines each.
+
+    Args:
+        rows: in the order of the lines.
+    """
+    return printable("\n".join(line for row in rows for line in _lines(row)))
+
+
+def _lines(row: AuditRow) -> Iterator[str]:
+    when = datetime.fromtimestamp(row.utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    who = row.who if row.who == row.role else f"{row.who} ({row.role})"
+    yield f"{row.seq:6}  {when}  {row.action}  {row.subject}  by {who}"
+    if row.reason:
+        yield f"{'':8}{row.reason}"
+    for name, text in (("old", row.old), ("new", row.new)):
+        if text is not None:
+            yield f"{'':8}{name}: {_short(json.loads(text))}"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, dict):
+        value = ", ".join(f"{name} {_short(inner)}" for name, inner in value.items())
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    text = text.replace("\n", " ")
+    return text if len(text) <= _LONGEST_VALUE else text[:_LONGEST_VALUE] + "…"

@@ -1,0 +1,67 @@
+"""Writing to the records from another process than the station's: short transactions of a person's commands.
+
+SQLite keeps two writers apart; each waits for the other's transaction, the station some milliseconds at most.
+"""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import Connection
+from sqlalchemy.exc import DBAPIError
+
+from station.records.audit import continue_audit, newer_head
+from station.records.audit_head import keep_head, read_head
+from station.records.database import FILE_NAME, check, migrate, open_engine
+from station.records.errors import LockedError
+from station.records.failures import in_words
+from station.records.opening import lock_folder
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[Connection]:
+    """A transaction: durable when the block has ended, undone where it raised.
+
+    Where no station has the folder, a missing database is begun, and one of an older form is brought up to date.
+
+    Args:
+        folder: the records' folder.
+
+    Raises:
+        RecordsError: they cannot be written; nothing was changed.
+    """
+    path = folder / FILE_NAME
+    try:
+        _make_ready(folder)
+        head = read_head(folder)
+        engine = open_engine(path, "rw")
+        with engine.connect() as connection:
+            with connection.begin():
+                continue_audit(connection, head)
+                yield connection
+                ahead = newer_head(connection, head)
+            if ahead is not None:
+                keep_head(folder, ahead)
+    except (DBAPIError, sqlite3.Error, OSError) as error:
+        raise in_words(error, str(path)) from error
+
+
+def _make_ready(folder: Path) -> None:
+    """Bring the database to this program's form, unless a station has it open, which has done so."""
+    try:
+        lock = lock_folder(folder)
+    except LockedError:
+        return
+    try:
+        path = folder / FILE_NAME
+        if path.exists() and path.stat().st_size:
+            check(path)
+        engine = open_engine(path, "rwc")
+        try:
+            migrate(engine, folder)
+        finally:
+            engine.dispose()
+    finally:
+        os.close(lock)

@@ -1,0 +1,93 @@
+"""The lot under way, and the control recipe that is frozen for it."""
+
+import asyncio
+import logging
+
+from station.errors import StationError
+from station.records.audit import STATION, AuditEntry
+from station.service.recipe_book import Active, RecipeBook
+from station.service.service import Service
+from station.service.trail import PLC, Trail
+
+log = logging.getLogger(__name__)
+
+
+class LotKeeper:
+    """Freezes the recipe when a lot begins: what is approved, edited or retired meanwhile concerns the next lot.
+
+    Args:
+        service: inspects by the recipe.
+        book: what is in force.
+        trail: told of every lot.
+    """
+
+    def __init__(self, service: Service, book: RecipeBook, trail: Trail) -> None:
+        self._service, self._book, self._trail = service, book, trail
+        self._turn = asyncio.Lock()
+        self.lot: str | None = None
+        """The lot under way; None before the first fruit of one."""
+        self.mismatch = ""
+        """Why the last lot could not begin: PLC number, name and content of the recipe do not belong together."""
+
+    def recall(self) -> None:
+        """Go on with the lot and the recipe of the start before. Blocks for some milliseconds."""
+        remembered = self._book.remembered()
+        if remembered is not None:
+            self._service.active, self.lot = remembered
+
+    def chosen(self, active: Active) -> bool:
+        """A recipe was chosen for what comes next; the lot under way, if there is one, goes on by it.
+
+        Args:
+            active: the recipe.
+
+        Returns:
+            Whether it is kept over a restart.
+        """
+        self.mismatch = ""
+        self._service.active = active
+        return self._book.remember(active, self.lot)
+
+    async def begin(self, lot: str) -> bool:
+        """A fruit of a lot has come. The first of another lot freezes what is in force of the active recipe.
+
+        Args:
+            lot: its name, as the PLC gives it.
+
+        Returns:
+            Whether it may be inspected; `mismatch` says why not.
+        """
+        async with self._turn:
+            active = self._service.active
+            if active is None or lot == self.lot:
+                return active is not None
+            try:
+                now = self._book.current(active)
+                self._service.pacing.expected(now.recipe)
+            except StationError as error:
+                self.mismatch = f"Lot {lot or 'without a name'} cannot begin: {error}."
+                self._service.active, self.lot = None, None
+                log.warning("%s", self.mismatch)
+                self._trail.note(
+                    AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _told(active), {"why": str(error)})
+                )
+                return False
+            before, self.lot, self.mismatch = self.lot, lot, ""
+            self._service.active = now
+            if now.snapshot != active.snapshot:
+                log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)
+            self._trail.note(
+                AuditEntry(PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_told(active)}, _told(now))
+            )
+            await asyncio.to_thread(self._book.remember, now, lot)
+            return True
+
+
+def _told(active: Active) -> dict[str, str | int]:
+    snapshot = active.snapshot
+    return {
+        "recipe": snapshot.name,
+        "number": snapshot.number,
+        "revision": snapshot.revision,
+        "sha256": snapshot.sha256,
+    }

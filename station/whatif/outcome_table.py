@@ -1,0 +1,99 @@
+"""What a draft would have changed, counted."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from station.whatif.replay import Replayed
+
+BEFORE = ("PASS", "FAIL", "NO_RESULT")
+AFTER = (*BEFORE, "UNDECIDABLE")
+
+
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """All results of one draft."""
+
+    pairs: Counter[tuple[str, str]]
+    """How many had this outcome before and have that after."""
+    undecidable: Counter[str]
+    """Why, without its figures."""
+    unfaithful: int
+    """Those whose stored outcome is not that of their own recipe judged again: of an older judge, or of a fault."""
+    newly_rejected: int
+    newly_passed: int
+
+    @property
+    def total(self) -> int:
+        """How many were judged again."""
+        return self.pairs.total()
+
+    @property
+    def decided(self) -> int:
+        """How many of them have a verdict by the draft."""
+        return self.total - sum(self.pairs[before, "UNDECIDABLE"] for before in BEFORE)
+
+    def rejects_before(self) -> int:
+        """Of those decided, how many were not passed then."""
+        return sum(number for (before, after), number in self.pairs.items() if before != "PASS" and after in BEFORE)
+
+    def rejects_after(self) -> int:
+        """Of those decided, how many would not be passed by the draft."""
+        return sum(number for (_, after), number in self.pairs.items() if after in {"FAIL", "NO_RESULT"})
+
+    def summary(self) -> dict[str, Any]:
+        """The figures by name."""
+        return {
+            "inspections": self.total,
+            "decided": self.decided,
+            "undecidable": self.total - self.decided,
+            "undecidable_because": dict(self.undecidable.most_common()),
+            "rejects_before": self.rejects_before(),
+            "rejects_after": self.rejects_after(),
+            "newly_rejected": self.newly_rejected,
+            "newly_passed": self.newly_passed,
+            "not_reproduced": self.unfaithful,
+            "outcomes": {f"{before} to {after}": self.pairs[before, after] for before in BEFORE for after in AFTER},
+        }
+
+
+def counted(results: Iterable[Replayed]) -> Counted:
+    """Count results.
+
+    Args:
+        results: in any order.
+    """
+    pairs: Counter[tuple[str, str]] = Counter()
+    why: Counter[str] = Counter()
+    sides: Counter[str] = Counter()
+    unfaithful = 0
+    for each in results:
+        pairs[each.before, each.after] += 1
+        sides[each.changes_side] += 1
+        unfaithful += not each.faithful
+        if each.after == "UNDECIDABLE":
+            why[_without_figures(each.why)] += 1
+    return Counted(pairs, why, unfaithful, sides["rejected"], sides["passes"])
+
+
+def as_csv(results: Sequence[Replayed]) -> str:
+    """Every result that is not the same as before, as a table.
+
+    Args:
+        results: in the order of the rows.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["sequence", "lot", "before", "after", "changes_side", "why"])
+    for each in results:
+        if each.before != each.after:
+            table.writerow([each.sequence, each.lot, each.before, each.after, each.changes_side, each.why])
+    return text.getvalue()
+
+
+def _without_figures(text: str) -> str:
+    words = text.split(" ")
+    return " ".join("…" if word.replace(".", "", 1).replace("-", "", 1).isdigit() else word for word in words)

@@ -1,0 +1,137 @@
+"""The what-if's page: one HTML file with its pictures inside, to be read without network and without the station."""
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import jinja2
+import numpy as np
+from sqlalchemy import Connection
+
+from station.recipe_store.difference import Difference
+from station.records.images import image_path
+from station.settings.recipe_model import Recipe
+from station.whatif.outcome_table import AFTER, BEFORE, Counted
+from station.whatif.replay import Replayed
+
+MOST_SHOWN = 60
+_WIDE, _HIGH, _EDGE = 260, 130, 22
+_PICTURE_PX = 150
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One fruit on the page."""
+
+    result: Replayed
+    curve: str
+    """An SVG picture's points: x,y x,y …"""
+    limits: tuple[tuple[float, float, str], ...]
+    """x, y and `own` or `draft` of every area limit."""
+    picture: str
+    """A data URI of its last image; empty where none was kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """All that the page shows."""
+
+    title: str
+    facts: Sequence[tuple[str, str]]
+    changes: Sequence[Difference]
+    counted: Counted
+    shown: Sequence[Shown]
+    changed: int
+    """How many change sides, shown or not."""
+
+
+def render(page: Page) -> str:
+    """Make the HTML document.
+
+    Args:
+        page: what it shows.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("station.whatif", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    template = environment.get_template("whatif.html.j2")
+    return template.render(page=page, before=BEFORE, after=AFTER, wide=_WIDE, high=_HIGH, edge=_EDGE)
+
+
+def shown(
+    connection: Connection, folder: Path, results: Sequence[Replayed], own: Recipe | None, draft: Recipe
+) -> list[Shown]:
+    """Look up what the page shows of some fruit.
+
+    Args:
+        connection: of the records.
+        folder: the records' folder.
+        results: the fruit, in the page's order.
+        own: the recipe of then, for its limits; None where they had several.
+        draft: the recipe that was tried.
+    """
+    return [_shown(connection, folder, result, own, draft) for result in results]
+
+
+def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> Shown:
+    rows = connection.exec_driver_sql(
+        "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm IS NOT NULL "
+        "AND area_mm2 IS NOT NULL ORDER BY step",
+        (result.sequence,),
+    ).all()
+    limits = [(each.closing_mm, each.area_mm2, "draft") for each in draft.damage.area]
+    limits += [(each.closing_mm, each.area_mm2, "own") for each in own.damage.area] if own else []
+    most_x = max([row[0] for row in rows] + [limit[0] for limit in limits])
+    most_y = max([row[1] for row in rows] + [limit[1] for limit in limits])
+
+    def place(closing_mm: float, area_mm2: float) -> tuple[float, float]:
+        x = _EDGE + max(0.0, closing_mm) / most_x * (_WIDE - 2 * _EDGE)
+        return round(x, 1), round(_HIGH - _EDGE - area_mm2 / most_y * (_HIGH - 2 * _EDGE), 1)
+
+    curve = " ".join("{},{}".format(*place(*row)) for row in rows)
+    placed = tuple((*place(closing_mm, area_mm2), whose) for closing_mm, area_mm2, whose in limits)
+    return Shown(result, curve, placed, _picture(connection, folder, result.sequence))
+
+
+def _picture(connection: Connection, folder: Path, sequence: int) -> str:
+    """The last step's image, with its stored outline where the mask was kept."""
+    rows = connection.exec_driver_sql(
+        "SELECT kind, step, sha256 FROM images WHERE sequence = ? AND kind IN ('step', 'mask') ORDER BY step, id",
+        (sequence,),
+    ).all()
+    step = max((row[1] for row in rows if row[0] == "step"), default=None)
+    found = {kind: _image(folder, sha256) for kind, of_step, sha256 in rows if of_step == step}
+    image, mask = found.get("step"), found.get("mask")
+    if image is None:
+        return ""
+    if mask is not None and mask.shape[:2] == image.shape[:2]:
+        outlines, _ = cv2.findContours(mask[:, :, 0], cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(image, outlines, -1, (255, 255, 255), 2)
+    scale = _PICTURE_PX / image.shape[0]
+    small = cv2.resize(image, (round(scale * image.shape[1]), _PICTURE_PX), interpolation=cv2.INTER_AREA)
+    data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, 85))[1].tobytes()
+    return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+
+
+def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
+    try:
+        data = image_path(folder, sha256).read_bytes()
+    except OSError:
+        return None
+    return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+
+
+def as_json(counted: Counted) -> str:
+    """The figures as a file.
+
+    Args:
+        counted: all results.
+    """
+    return json.dumps(counted.summary(), indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,101 @@
+"""What was judged already, in a file that grows: a run that was ended goes on, and a second one costs little."""
+
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from station.errors import BadInputError, StationError
+from station.settings.recipe_form import content_sha256
+from station.settings.recipe_model import Recipe
+from station.whatif.replay import Replayed
+
+FILE_NAME = "replayed.jsonl"
+
+
+class ProgressFile:
+    """One draft's results, a line each; the first line says whose. Open it with `with`.
+
+    Args:
+        folder: made where missing.
+        draft: the recipe that is tried.
+    """
+
+    def __init__(self, folder: Path, draft: Recipe) -> None:
+        self._path = folder / FILE_NAME
+        self._header = {
+            "draft": draft.name,
+            "draft_sha256": content_sha256(draft),
+            "fruit-station": version("fruit-station"),
+        }
+        self.done: dict[int, Replayed] = {}
+        """By sequence."""
+        self._descriptor = -1
+
+    def __enter__(self) -> Self:
+        """Read what is there.
+
+        Raises:
+            BadInputError: the file is of another draft or program, or cannot be written.
+        """
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            with open(self._descriptor, "rb", closefd=False) as file:
+                content = file.read()
+        except OSError as error:
+            raise BadInputError(f"--out {self._path.parent}: cannot be written: {error.strerror}") from error
+        whole = content[: content.rfind(b"\n") + 1]  # a line that a crash cut short is done again
+        lines = whole.splitlines()
+        if lines and _parsed(lines[0]) != self._header:
+            self.__exit__(None, None, None)
+            raise BadInputError(
+                f"--out {self._path.parent}: it holds the results of another draft or version; give another folder"
+            )
+        os.ftruncate(self._descriptor, len(whole))
+        os.lseek(self._descriptor, 0, os.SEEK_END)
+        for line in lines[1:]:
+            values = _parsed(line)
+            if values is not None:
+                self.done[values["sequence"]] = Replayed(**values)
+        if not lines:
+            self._append([self._header])
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        os.close(self._descriptor)
+
+    def add(self, results: Iterable[Replayed]) -> None:
+        """Append results.
+
+        Raises:
+            StationError: the disk does not take them; what was appended before stays.
+        """
+        fresh = list(results)
+        self._append([asdict(each) for each in fresh])
+        self.done.update((each.sequence, each) for each in fresh)
+
+    def _append(self, values: Iterable[dict[str, Any]]) -> None:
+        data = "".join(json.dumps(each, ensure_ascii=False) + "\n" for each in values).encode()
+        try:
+            while data:
+                data = data[os.write(self._descriptor, data) :]
+        except OSError as error:
+            raise StationError(
+                f"{self._path}: {(error.strerror or str(error)).lower()}; free space, and the same command goes on"
+            ) from error
+
+
+def _parsed(line: bytes) -> dict[str, Any] | None:
+    try:
+        values = json.loads(line)
+    except ValueError:
+        return None
+    return values if isinstance(values, dict) else None

@@ -1,0 +1,159 @@
+"""One stored inspection judged by a draft, as the station would have done; where that cannot be known, it says so.
+
+A stored curve ends where the recipe of then ended it. A draft that would have pressed on has no verdict but what is
+proven by then: a proof of damage stands, whatever would have come, since no further point can make such a fruit pass.
+"""
+
+import json
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from pydantic import ValidationError
+
+from station.inspection.judge import Verdict, early_stop, judge
+from station.inspection.press import Press
+from station.settings.recipe_form import upgrade
+from station.settings.recipe_model import Recipe
+from station.vocabulary import OutcomeName
+from station.whatif.remeasure import CannotRemeasureError, remeasured
+from station.whatif.stored import StoredPress
+
+After = Literal["PASS", "FAIL", "NO_RESULT", "UNDECIDABLE"]
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What the draft makes of one inspection."""
+
+    sequence: int
+    lot: str
+    before: OutcomeName
+    after: After
+    why: str
+    """The draft's reasons in sentences, or why nothing can be known; empty for PASS."""
+    faithful: bool
+    """Judged again by its own recipe, the inspection has the outcome that is stored."""
+
+    @property
+    def changes_side(self) -> Literal["", "passes", "rejected"]:
+        """Whether the fruit goes another way: to the good ones, or away from them."""
+        if self.after == "UNDECIDABLE" or (self.before == "PASS") == (self.after == "PASS"):
+            return ""
+        return "passes" if self.after == "PASS" else "rejected"
+
+
+def recipe_of_snapshot(text: str) -> Recipe | None:
+    """A recipe as it was stored with an inspection; None where this program does not take it any more.
+
+    Args:
+        text: canonical JSON of any released form.
+    """
+    values = json.loads(text)
+    try:
+        upgrade(values)
+        return Recipe.model_validate_json(json.dumps(values))
+    except (ValidationError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
+    """Judge one stored inspection by a draft.
+
+    Args:
+        stored: as read; with images where the draft finds contacts otherwise than `own`.
+        own: the recipe that it was inspected by; None where that is not known any more.
+        draft: the recipe to try.
+    """
+    if own is None:
+        return _undecidable(stored, "its own recipe is of a form that this program does not take", faithful=False)
+    then = judge(stored.press, own)
+    faithful, stopped = then.outcome == stored.before, then.stopped is not None
+    if why := pressed_otherwise(own, draft):
+        return _undecidable(stored, why, faithful=faithful)
+    press = stored.press
+    try:
+        if press.onset_mm is not None and measured_otherwise(own, draft):
+            press = remeasured(press, stored.images, own.segmentation, draft.segmentation)
+    except CannotRemeasureError as error:
+        return _undecidable(stored, str(error), faithful=faithful)
+    return _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
+
+
+def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
+    """Why no curve taken by one recipe tells of the other; empty where it does.
+
+    Args:
+        own: the recipe that the fruit was pressed by.
+        draft: the recipe to try.
+    """
+    pairs = {
+        "gripper": (own.gripper, draft.gripper),
+        "imaging": (own.imaging, draft.imaging),
+        "steps.start": (own.steps.start, draft.steps.start),
+        "steps.start_width_mm": (own.steps.start_width_mm, draft.steps.start_width_mm),
+        "steps.step_mm": (own.steps.step_mm, draft.steps.step_mm),
+    }
+    other = [name for name, (before, after) in pairs.items() if before != after]
+    return f"the draft presses otherwise ({', '.join(other)})" if other else ""
+
+
+def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
+    """Whether the areas have to be measured again: the method, or a parameter of the one in use, is another.
+
+    Args:
+        own: the recipe that the areas were measured by.
+        draft: the recipe to try.
+    """
+    before, after = own.segmentation, draft.segmentation
+    if before.method != after.method:
+        return True
+    if before.method == "paper":
+        return before.paper != after.paper
+    loose = {"least_confidence": 0.0}  # the judge's own, also of a stored confidence
+    return before.robust.model_copy(update=loose) != after.robust.model_copy(update=loose)
+
+
+def _judged(
+    stored: StoredPress, whole: Press, own: Recipe, draft: Recipe, *, faithful: bool, stopped: bool
+) -> Replayed:
+    if whole.onset_mm is None:
+        sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
+        if sooner or whole.interruptions:
+            return _decided(stored, judge(whole, draft), faithful=faithful)
+        return _undecidable(stored, "nothing was touched, and the draft would have closed further", faithful=faithful)
+    press = _until_stop(whole, draft)
+    verdict = judge(press, draft)
+    proven = verdict.outcome == "FAIL"
+    void = bool(press.interruptions) or not _fits(press.onset_mm, draft)
+    ended = len(press.points) > draft.steps.number or (
+        not stopped and draft.steps.number == own.steps.number and len(press.points) == len(whole.points)
+    )
+    if proven or void or ended or verdict.stopped is not None:
+        return _decided(stored, verdict, faithful=faithful)
+    reached_mm = press.points[-1].closing_mm if press.points else 0.0
+    cut = ", where it was stopped early" if stopped else ""
+    why = f"the curve ends at {reached_mm:.1f} mm of closing{cut}, and the draft would have pressed on"
+    return _undecidable(stored, why, faithful=faithful)
+
+
+def _until_stop(press: Press, draft: Recipe) -> Press:
+    """The points that the draft would have taken of those there are."""
+    points = press.points[: draft.steps.number + 1]
+    for number in range(1, len(points)):
+        if early_stop(replace(press, points=points[:number]), draft) is not None:
+            return replace(press, points=points[:number])
+    return replace(press, points=points)
+
+
+def _fits(onset_mm: float | None, draft: Recipe) -> bool:
+    expected = draft.expected_width
+    return onset_mm is not None and expected.smallest_mm <= onset_mm <= expected.largest_mm
+
+
+def _decided(stored: StoredPress, verdict: Verdict, *, faithful: bool) -> Replayed:
+    why = " ".join(finding.sentence for finding in verdict.findings)
+    return Replayed(stored.sequence, stored.lot, stored.before, verdict.outcome, why, faithful)
+
+
+def _undecidable(stored: StoredPress, why: str, *, faithful: bool) -> Replayed:
+    return Replayed(stored.sequence, stored.lot, stored.before, "UNDECIDABLE", why, faithful)

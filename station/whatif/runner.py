@@ -1,0 +1,145 @@
+"""Many inspections judged again: on all cores, or on a Dask cluster, with what is done already kept."""
+
+import importlib
+import multiprocessing
+import socket
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import ExitStack, closing, contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import urlsplit
+
+import cv2
+
+from station.errors import BadInputError, StationError
+from station.records.database import reading
+from station.settings.recipe_model import Recipe
+from station.whatif.replay import Replayed, measured_otherwise, recipe_of_snapshot, replay
+from station.whatif.stored import StoredPress, read_stored
+
+CHUNK = 200
+_WITH_IMAGES = 8
+_REACH_S = 10.0
+_AHEAD = 3
+"""Chunks that wait for each worker: so many that none is idle, so few that memory stays small."""
+
+
+class Batch(NamedTuple):
+    """What a worker gets: plain values, so that it needs neither the database nor its disk."""
+
+    stored: list[StoredPress]
+    own: dict[str, str]
+    """The recipes' canonical JSON, by their hash."""
+    draft: str
+    """The draft's canonical JSON."""
+
+
+def replay_batch(batch: Batch) -> list[Replayed]:
+    """Judge a batch: what a worker does, in whatever process.
+
+    Args:
+        batch: self-contained.
+    """
+    cv2.setNumThreads(1)
+    draft = Recipe.model_validate_json(batch.draft)
+    own = {sha256: recipe_of_snapshot(text) for sha256, text in batch.own.items()}
+    return [replay(stored, own.get(stored.recipe_sha256), draft) for stored in batch.stored]
+
+
+def batches(folder: Path, wanted: Sequence[int], own: dict[str, str], draft: Recipe) -> Iterator[Batch]:
+    """Read what is to be judged, part by part.
+
+    Args:
+        folder: the records' folder.
+        wanted: the inspections' sequences, ascending.
+        own: the stored recipes, canonical JSON by hash.
+        draft: the recipe to try.
+
+    Raises:
+        RecordsError: the records cannot be read.
+    """
+    known = [recipe for text in own.values() if (recipe := recipe_of_snapshot(text)) is not None]
+    with_images = any(measured_otherwise(recipe, draft) for recipe in known)
+    rest, size, text = iter(wanted), _WITH_IMAGES if with_images else CHUNK, draft.model_dump_json()
+    with reading(folder) as connection:
+        while part := list(islice(rest, size)):
+            stored = read_stored(connection, part, folder, with_images=with_images)
+            needed = {each.recipe_sha256: own[each.recipe_sha256] for each in stored}
+            yield Batch(stored, needed, text)
+
+
+def run(parts: Iterable[Batch], jobs: int, scheduler: str | None) -> Iterator[list[Replayed]]:
+    """Judge batches, in any order of completion.
+
+    Args:
+        parts: read as they are needed.
+        jobs: processes on this machine; 1 works in this one.
+        scheduler: a Dask scheduler's address, in place of this machine's processes.
+
+    Raises:
+        BadInputError: the address is none, or the extra `cluster` is not installed.
+        StationError: a worker was lost.
+    """
+    if scheduler is None and jobs == 1:
+        yield from map(replay_batch, parts)
+        return
+    with ExitStack() as stack:
+        submit, width = stack.enter_context(_cluster(scheduler) if scheduler else _processes(jobs))
+        yield from _flow(parts, submit, width * _AHEAD)
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[tuple[Callable[[Batch], Any], int]]:
+    """Processes of this machine. Spawned, since OpenCV's threads do not survive a fork."""
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        yield lambda batch: pool.submit(replay_batch, batch), jobs
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
+    """Workers of a Dask cluster; they need this program installed, and nothing of this machine's disk."""
+    try:
+        distributed = importlib.import_module("distributed")
+    except ImportError as error:
+        raise BadInputError("--scheduler: install the extra first: pip install fruit-station[cluster]") from error
+    _reach(address)
+    try:
+        client = distributed.Client(address, timeout=f"{_REACH_S:g}s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
+    with closing(client):
+        width = sum(client.nthreads().values())
+        if not width:
+            raise StationError(f"--scheduler {address}: it has no workers; start some with `dask worker {address}`")
+        executor = client.get_executor(pure=False)
+        yield lambda batch: executor.submit(replay_batch, batch), width
+
+
+def _reach(address: str) -> None:
+    """Dask's own client leaves threads and tracebacks behind where nobody answers."""
+    try:
+        parts = urlsplit(address)
+        if parts.scheme not in {"tcp", "tls"} or parts.hostname is None or parts.port is None:
+            raise BadInputError(f"--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT")
+        socket.create_connection((parts.hostname, parts.port), _REACH_S).close()
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
+
+
+def _flow(parts: Iterable[Batch], submit: Callable[[Batch], Any], most: int) -> Iterator[list[Replayed]]:
+    """Keep so many batches on their way."""
+    source, under_way = iter(parts), set[Future[list[Replayed]]]()
+    try:
+        while True:
+            for part in islice(source, most - len(under_way)):
+                under_way.add(submit(part))
+            if not under_way:
+                return
+            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    finally:
+        for future in under_way:
+            future.cancel()

@@ -1,0 +1,154 @@
+"""Stored inspections as plain values that another process, or another machine, can judge again."""
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection
+
+from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.records.images import image_path
+from station.vocabulary import OutcomeName, Reason
+
+USUAL_ONSET_UNCERTAINTY_MM = 0.4
+"""A count of the gripper, by which the onset is searched; for records that do not have their own."""
+_FLAGS = {flag.value for flag in Flag}
+_INTERRUPTIONS = frozenset(
+    {
+        Reason.IMAGE_STALE,
+        Reason.LATE,
+        Reason.CALLED_OFF,
+        Reason.ARM_FAULT,
+        Reason.GRIPPER_FAULT,
+        Reason.CAMERA_FAULT,
+        Reason.RECORDS_FAULT,
+        Reason.STATION_LOST,
+    }
+)
+_STEPS_ENDED = "The steps ended at"
+"""How the judge's own sentence for `INTERNAL_FAULT` begins, which tells it from a fault of the program."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredPress:
+    """One inspection as it was stored."""
+
+    sequence: int
+    lot: str
+    before: OutcomeName
+    """As the station judged it then."""
+    recipe_sha256: str
+    press: Press
+    """With its points in the order of the steps."""
+    images: tuple[tuple[int | None, bytes], ...] = ()
+    """PNG by step, None for the reference; only where they were asked for and kept."""
+
+
+def sequences(connection: Connection, name: str, lots: Sequence[str], last: int | None) -> list[int]:
+    """The judged inspections of a recipe, in order.
+
+    Args:
+        connection: any.
+        name: the recipe's.
+        lots: their names; all where empty.
+        last: at most so many, the latest; all where None.
+    """
+    marks = ", ".join("?" * len(lots))
+    chosen = f"AND i.lot IN ({marks})" if lots else ""
+    query = (
+        "SELECT i.sequence FROM inspections i JOIN recipe_snapshots r ON r.sha256 = i.recipe_sha256 "  # noqa: S608 (marks)
+        f"WHERE r.name = ? AND i.judged IS NOT NULL {chosen} ORDER BY i.sequence DESC LIMIT ?"
+    )
+    found = connection.exec_driver_sql(query, (name, *lots, -1 if last is None else last))
+    return [row[0] for row in found][::-1]
+
+
+def snapshots(connection: Connection, name: str) -> dict[str, str]:
+    """The recipe's stored forms, canonical JSON by their hash.
+
+    Args:
+        connection: any.
+        name: the recipe's.
+    """
+    found = connection.exec_driver_sql("SELECT sha256, text FROM recipe_snapshots WHERE name = ?", (name,))
+    return dict(tuple(row) for row in found)
+
+
+def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, with_images: bool) -> list[StoredPress]:
+    """Read some inspections with their curves.
+
+    Args:
+        connection: any.
+        wanted: their sequences, ascending, some hundreds at most.
+        folder: the records' folder, for the images.
+        with_images: read their images too, where they were kept.
+    """
+    marks = ", ".join("?" * len(wanted))
+    rows = connection.exec_driver_sql(
+        f"SELECT sequence, lot, judged, reasons, explanation, recipe_sha256, measures FROM inspections "  # noqa: S608 (marks)
+        f"WHERE sequence IN ({marks}) ORDER BY sequence",
+        tuple(wanted),
+    ).all()
+    points = connection.exec_driver_sql(
+        f"SELECT sequence, closing_mm, area_mm2, area_px, confidence, flags FROM curve_points "  # noqa: S608 (marks)
+        f"WHERE sequence IN ({marks}) ORDER BY sequence, step",
+        tuple(wanted),
+    ).all()
+    curves = {sequence: list(curve) for sequence, curve in groupby(points, key=lambda point: point[0])}
+    images = _images(connection, wanted, folder) if with_images else {}
+    return [_stored(row, curves.get(row[0], []), images.get(row[0], ())) for row in rows]
+
+
+def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, bytes], ...]) -> StoredPress:
+    sequence, lot, judged, reasons, explanation, recipe_sha256, measures = row
+    found = {Reason(reason) for reason in json.loads(reasons or "[]")}
+    measured: dict[str, Any] = json.loads(measures or "{}")
+    points = tuple(_points(curve))
+    onset_mm = measured.get("onset_mm")
+    uncertainty_mm = measured.get("onset_uncertainty_mm", USUAL_ONSET_UNCERTAINTY_MM)
+    told = json.loads(explanation or "[]")
+    interruptions = tuple(_interruptions(found, points, told))
+    press = Press(onset_mm, uncertainty_mm if onset_mm is not None else 0.0, points, interruptions)
+    return StoredPress(sequence, lot, judged, recipe_sha256, press, images)
+
+
+def _points(curve: Iterable[Any]) -> Iterator[Measured]:
+    for _, closing_mm, area_mm2, area_px, confidence, flags in curve:
+        if closing_mm is not None and area_mm2 is not None:
+            known = frozenset(Flag(flag) for flag in json.loads(flags) if flag in _FLAGS) if flags != "[]" else _NONE
+            yield Measured(closing_mm, area_mm2, area_px or 0, usual_uncertainty_mm2(area_mm2), confidence, known)
+
+
+_NONE: frozenset[Flag] = frozenset()
+
+
+def _interruptions(found: set[Reason], points: Sequence[Measured], told: Sequence[str]) -> Iterator[Reason]:
+    """Which reasons came from outside the measurement: the judge gives some of them itself."""
+    yield from (reason for reason in Reason if reason in found & _INTERRUPTIONS)
+    mismatch = any(Flag.REFERENCE_MISMATCH in point.flags for point in points)
+    if Reason.REFERENCE_BAD in found and not mismatch:
+        yield Reason.REFERENCE_BAD
+    if Reason.INTERNAL_FAULT in found and not any(sentence.startswith(_STEPS_ENDED) for sentence in told):
+        yield Reason.INTERNAL_FAULT
+
+
+def _images(
+    connection: Connection, wanted: Sequence[int], folder: Path
+) -> dict[int, tuple[tuple[int | None, bytes], ...]]:
+    marks = ", ".join("?" * len(wanted))
+    rows = connection.exec_driver_sql(
+        f"SELECT sequence, kind, step, sha256 FROM images WHERE sequence IN ({marks}) "  # noqa: S608 (marks)
+        "AND kind IN ('reference', 'step') ORDER BY sequence, id",
+        tuple(wanted),
+    ).all()
+    found: dict[int, list[tuple[int | None, bytes]]] = {}
+    for sequence, kind, step, sha256 in rows:
+        try:
+            data = image_path(folder, sha256).read_bytes()
+        except OSError:
+            continue
+        found.setdefault(sequence, []).append((None if kind == "reference" else step, data))
+    return {sequence: tuple(images) for sequence, images in found.items()}

@@ -1,0 +1,63 @@
+"""An audit trail in a folder of the test's own, and the command line that looks at it."""
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from station.cli import cli
+from station.errors import BadInputError, StationError
+from station.records.audit import AuditEntry, append_audit
+from station.records.direct import writing
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "home" / "records"
+
+
+@pytest.fixture
+def trail(folder: Path) -> Callable[..., None]:
+    """Append some rows, each in a transaction of its own."""
+
+    def write(number: int = 5, **of_entry: Any) -> None:
+        for place in range(number):
+            values = {"who": "Ida", "role": "quality", "action": "test.done", "subject": f"thing {place}", **of_entry}
+            with writing(folder) as connection:
+                append_audit(connection, AuditEntry(**values))
+
+    return write
+
+
+@pytest.fixture
+def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
+    """Call the command line: its exit code, and what it said."""
+    monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
+
+    def call(*arguments: str) -> tuple[int, str]:
+        done = CliRunner().invoke(cli, arguments)
+        if isinstance(done.exception, StationError):
+            return (2 if isinstance(done.exception, BadInputError) else 1), str(done.exception)
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        return done.exit_code, done.output
+
+    return call
+
+
+@pytest.fixture
+def meddle(folder: Path) -> Callable[[str], None]:
+    """Change the database behind the trail's back, its triggers taken away, as one with the file in hand can."""
+
+    def change(statement: str) -> None:
+        connection = sqlite3.connect(folder / "records.sqlite3")
+        for name in ("audit_no_update", "audit_no_delete", "audit_only_after"):
+            connection.execute(f"DROP TRIGGER IF EXISTS {name}")
+        connection.execute(statement)
+        connection.commit()
+        connection.close()
+
+    return change

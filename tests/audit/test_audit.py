@@ -1,0 +1,174 @@
+"""The audit trail: it only grows, and whatever was done to it behind its back is found."""
+
+import asyncio
+import sqlite3
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.records.audit import AuditEntry, AuditRow, append_audit
+from station.records.audit_head import Head, read_head, save_head
+from station.records.database import reading
+from station.records.direct import writing
+from station.records.errors import BadRecordError
+from station.records.records import Records
+from station.settings.records import RecordsSettings
+
+
+def test_a_whole_trail_is_whole_and_can_be_read(trail, station):
+    trail(5, reason="because", old={"limit": 112.0}, new={"limit": 118.5})
+    code, told = station("audit", "verify")
+    assert code == 0
+    assert told.startswith("OK 5 rows, the last one is 5:")
+    code, told = station("audit", "show", "--last", "2", "--action", "test")
+    assert code == 0
+    assert "thing 3" in told
+    assert "thing 2" not in told
+    assert "by Ida (quality)" in told
+    assert "because" in told
+    assert "old: limit 112.0" in told
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE audit SET reason = 'another' WHERE seq = 3",
+        "DELETE FROM audit WHERE seq = 3",
+        "INSERT OR REPLACE INTO audit SELECT 3, 0, who, role, action, '', '', old, new, hash, hash FROM audit LIMIT 1",
+        "DELETE FROM audit",
+    ],
+)
+def test_the_database_itself_refuses_to_change_a_row(trail, folder, station, statement):
+    trail(5)
+    connection = sqlite3.connect(folder / "records.sqlite3")
+    with pytest.raises(sqlite3.IntegrityError, match="the audit trail only grows"):
+        connection.execute(statement)
+    connection.close()
+    assert station("audit", "verify")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("statement", "told"),
+    [
+        ("UPDATE audit SET who = 'Eve' WHERE seq = 3", "BROKEN row 3: it was changed"),
+        ("UPDATE audit SET new = '1' WHERE seq = 2", "BROKEN row 2: it was changed"),
+        ("DELETE FROM audit WHERE seq = 3", "BROKEN row 4: rows 3 to 3 before it are missing"),
+        ("DELETE FROM audit WHERE seq < 3", "BROKEN row 3: it is the first here, and rows 1 to 2 are missing"),
+        ("DELETE FROM audit WHERE seq > 3", "BROKEN row 5: it is missing, and the head kept beside"),
+        ("DELETE FROM audit", "BROKEN row 5: it is missing, and the head kept beside"),
+    ],
+)
+def test_the_first_broken_row_is_named(trail, station, meddle, statement, told):
+    trail(5)
+    meddle(statement)
+    code, said = station("audit", "verify")
+    assert code == 1
+    assert said.startswith(told)
+
+
+def test_a_row_forged_with_its_hash_is_found_by_the_next(trail, folder, station, meddle):
+    trail(3)
+    with reading(folder) as connection:
+        row = AuditRow(*connection.exec_driver_sql("SELECT * FROM audit WHERE seq = 2").one())
+    forged = AuditRow(*row_values(row, who="Eve"))
+    meddle(f"UPDATE audit SET who = 'Eve', hash = '{forged.true_hash}' WHERE seq = 2")
+    code, told = station("audit", "verify")
+    assert code == 1
+    assert told.startswith("BROKEN row 3: it was not written behind row 2 as that is now")
+
+
+def row_values(row, **changed):
+    return [changed.get(name, getattr(row, name)) for name in row.__slots__]
+
+
+def test_rows_cut_off_are_told_by_the_next_start_too_and_by_an_anchor(trail, folder, station, meddle):
+    trail(5)
+    anchor = station("audit", "verify")[1].split()[-1]
+    meddle("DELETE FROM audit WHERE seq > 3")
+    (folder / "audit_head").unlink()
+    code, told = station("audit", "verify", "--anchor", anchor)
+    assert code == 1
+    assert "row 5: it is missing, and the anchor names it" in told
+    assert "the head kept beside the database is missing" in told
+    trail(1)
+    with reading(folder) as connection:
+        last = connection.exec_driver_sql("SELECT seq, action FROM audit WHERE seq > 3 ORDER BY seq").all()
+    assert last[0].action == "audit.continued"
+    assert last[0].seq > 5, "no number is given twice"
+    code, told = station("audit", "verify")
+    assert code == 1
+    assert f"row {last[0].seq}: rows before it are missing: a start found up to row 3 here" in told
+    assert station("audit", "verify", "--since", str(last[1].seq))[0] == 0
+
+
+def test_the_trail_goes_on_where_the_database_was_lost(trail, folder, station):
+    trail(4)
+    for file in folder.glob("records.sqlite3*"):
+        file.unlink()
+    trail(1)
+    code, told = station("audit", "verify")
+    assert code == 1
+    assert "a start found no rows here, and row 4 was known to be the last" in told
+
+
+def test_the_station_writes_to_the_same_trail_as_a_command_beside_it(trail, folder, station):
+    async def steps():
+        records = await Records.open(folder, RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")
+        try:
+            (first,) = await records.audit(AuditEntry("Ida", "quality", "test.done", "a"))
+            await asyncio.to_thread(trail, 1)
+            second, third = await records.audit(
+                AuditEntry("plc", "plc", "test.done", "b"), AuditEntry("plc", "plc", "test.done", "c")
+            )
+            assert (first.seq, second.seq, third.seq) == (1, 3, 4)
+            with pytest.raises(BadRecordError, match="who: expected one printable line"):
+                await records.audit(AuditEntry(" ", "plc", "test.done", "d"))
+        finally:
+            await records.close()
+
+    asyncio.run(steps())
+    head = read_head(folder)
+    assert head is not None
+    assert head.seq == 4
+    assert station("audit", "verify")[1].startswith("OK 4 rows")
+
+
+def test_what_is_undone_leaves_no_row(folder, trail, station):
+    trail(1)
+
+    def fail():
+        with writing(folder) as connection:
+            append_audit(connection, AuditEntry("Ida", "quality", "test.done", "x"))
+            raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        fail()
+    assert station("audit", "verify")[1].startswith("OK 1 rows")
+
+
+@pytest.mark.parametrize("anchor", ["5", "x:y", "5:abc", "\u0665:" + "0" * 64])
+def test_an_anchor_that_is_none_is_bad_input(trail, station, anchor):
+    trail(1)
+    assert station("audit", "verify", "--anchor", anchor)[0] == 2
+
+
+@pytest.mark.parametrize("values", [{"who": "a\nb"}, {"role": ""}, {"action": "x" * 65}, {"reason": "\x1b[2J"}])
+def test_a_malformed_entry_is_refused(trail, station, values):
+    with pytest.raises(BadRecordError, match="audit:"):
+        trail(1, **values)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
+@given(st.lists(st.integers(1, 2**31), min_size=1, max_size=8), st.integers(0, 200), st.integers(0, 255))
+def test_a_torn_line_of_the_head_leaves_the_one_before(tmp_path, numbers, place, byte):
+    """Whatever single byte of the file is spoilt, the head is one of the last two, or the last."""
+    (tmp_path / "audit_head").unlink(missing_ok=True)
+    heads = [Head(number, f"{number:064x}") for number in sorted(set(numbers))]
+    for head in heads:
+        save_head(tmp_path, head)
+    assert read_head(tmp_path) == heads[-1]
+    content = bytearray((tmp_path / "audit_head").read_bytes())
+    content[place % len(content)] = byte
+    (tmp_path / "audit_head").write_bytes(content)
+    assert read_head(tmp_path) in heads[-2:]

@@ -1,0 +1,61 @@
+"""A site's recipes in a folder of the test's own, and the command line that looks after them."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from station.cli import cli
+from station.errors import BadInputError, StationError
+from station.settings.recipe import recipe_files
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    """The shipped recipes, copied as a site does."""
+    folder = tmp_path / "recipes"
+    folder.mkdir()
+    for file in recipe_files():
+        shutil.copy(file, folder)
+    return folder
+
+
+@pytest.fixture
+def station(site: Path, home: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
+    """Call the command line: its exit code, and what it said."""
+    monkeypatch.setenv("STATION_HOME", str(home))
+    monkeypatch.setenv("STATION_RECIPES_FOLDER", str(site))
+
+    def call(*arguments: object) -> tuple[int, str]:
+        done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+        if isinstance(done.exception, StationError):
+            return (2 if isinstance(done.exception, BadInputError) else 1), str(done.exception)
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        return done.exit_code, done.output
+
+    return call
+
+
+@pytest.fixture
+def does(station: Callable[..., tuple[int, str]]) -> Callable[..., str]:
+    """Let a person do something with a recipe, and expect that it is done."""
+
+    def do(who: str, *arguments: object, why: str = "a test") -> str:
+        code, told = station("recipes", *arguments, "--who", who, "--reason", why)
+        assert code == 0, told
+        return told
+
+    return do
+
+
+@pytest.fixture
+def begun(station: Callable[..., tuple[int, str]]) -> None:
+    assert station("recipes", "adopt")[0] == 0

@@ -1,0 +1,247 @@
+"""A recipe's way from a person's edit to the line: what another person has not approved is never in force."""
+
+import json
+import os
+import shutil
+import subprocess
+
+import pytest
+
+from station.recipe_store.revision import RecipeStoreError
+from station.records.model import RecipeSnapshot
+from station.service.keeping import Kept
+from station.service.recipe_book import RecipeBook
+from station.settings.recipe import APPROVED_NAME, approved_list, load_recipe, shipped_folder
+from station.settings.recipe_form import canonical_text, content_sha256
+
+LIMIT = "damage.area[0].area_mm2"
+
+
+def book_of(site, home):
+    book = RecipeBook(site, Kept(home))
+    book.read()
+    return book
+
+
+def limit(book):
+    active = book.find(1)
+    return None if active is None else (active.recipe.damage.area[0].area_mm2, active.snapshot.revision)
+
+
+def test_what_is_shipped_is_in_force_out_of_the_box(home):
+    book = book_of(None, home)
+    assert book.numbers == (1, 2, 3, 100)
+    assert book.problems == ()
+    assert (shipped_folder() / APPROVED_NAME).read_text() == approved_list()
+
+
+def test_a_draft_is_in_force_once_another_person_approves_it(begun, station, does, site, home):
+    comments = [line for line in (site / "strawberry.yaml").read_text().splitlines() if "#" in line]
+    does("Ida", "edit", "strawberry", "--set", f"{LIMIT}=113.5", why="riper fruit in August")
+    assert [line for line in (site / "strawberry.yaml").read_text().splitlines() if "#" in line] == comments
+    assert limit(book_of(site, home)) == (112.0, "1")
+    assert "revision 2 waits" in does("Ida", "submit", "strawberry")
+    code, told = station("recipes", "approve", "strawberry", "--who", " ida", "--reason", "x")
+    assert code == 1
+    assert "Ida is its author; another person has to approve it" in told
+    assert limit(book_of(site, home)) == (112.0, "1")
+    does("Bo", "approve", "strawberry", why="compared with lot 17")
+    assert limit(book_of(site, home)) == (113.5, "2")
+    told = station("recipes", "history", "strawberry")[1]
+    assert f"{LIMIT}: 112.0 → 113.5" in told
+    assert "approved by Bo" in told
+    assert "compared with lot 17" in told
+    does("Bo", "retire", "strawberry", why="the season is over")
+    assert limit(book_of(site, home)) is None
+    told = station("audit", "show", "--action", "recipe.", "--subject", "strawberry")[1]
+    for action in ("recipe.shipped", "recipe.edited", "recipe.submitted", "recipe.approved", "recipe.retired"):
+        assert action in told
+    assert station("audit", "verify")[0] == 0
+
+
+def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
+    book = book_of(site, home)
+    file = site / "strawberry.yaml"
+    file.write_text(file.read_text().replace("area_mm2: 112\n", "area_mm2: 117\n"))
+    book.refresh()
+    assert limit(book) == (112.0, "1")
+    (problem,) = book.problems
+    assert f"strawberry.yaml is an unapproved draft ({LIMIT}: 112.0 → 117.0); revision 1 stays in force" in problem
+    assert [entry.action for entry in book.noticed] == ["recipe.file_noticed"]
+    assert "strawberry: revision 1 in force" in station("recipes", "list")[1]
+    assert station("recipes", "diff", "strawberry")[1] == f"{LIMIT}: 112.0 → 117.0\n"
+    file.write_text("name: [")
+    book.refresh()
+    assert limit(book) == (112.0, "1")
+    assert "strawberry.yaml:1: file: expected valid YAML" in "".join(book.problems)
+
+
+def test_a_bad_edit_leaves_the_file_as_it_was(begun, station, site):
+    before = (site / "strawberry.yaml").read_bytes()
+    for change, told in {
+        f"{LIMIT}=300": "expected a number above 0 and at most 260 mm²",
+        f"{LIMIT}=NO": "write",
+        "early_stop.area_mm2=5": "no less than the largest damage threshold",
+        "damage.area[7].area_mm2=5": "expected the path of a value",
+        "nonsense": "expected PATH=VALUE",
+    }.items():
+        code, said = station("recipes", "edit", "strawberry", "--set", change, "--who", "Ida", "--reason", "x")
+        assert code == 2
+        assert told in said
+    assert (site / "strawberry.yaml").read_bytes() == before
+
+
+def test_of_two_people_the_second_is_told_what_the_first_has_changed(begun, station, does, site, tmp_path):
+    ours, theirs = tmp_path / "ida.yaml", tmp_path / "bo.yaml"
+    for file in (ours, theirs):
+        assert station("recipes", "export", "strawberry", "--out", file)[0] == 0
+    ours.write_text(ours.read_text().replace("area_mm2: 112\n", "area_mm2: 113\n"))
+    theirs.write_text(theirs.read_text().replace("area_mm2: 112\n", "area_mm2: 110\n"))
+    does("Ida", "import", ours)
+    after_ida = (site / "strawberry.yaml").read_bytes()
+    assert b"# base" not in after_ida
+    code, told = station("recipes", "import", theirs, "--who", "Bo", "--reason", "x")
+    assert code == 1
+    assert f"it was changed since 743531fc6cb8 was looked at, to 9986814c3e22: {LIMIT}: 112.0 → 113.0" in told
+    assert (site / "strawberry.yaml").read_bytes() == after_ida
+    base = content_sha256(load_recipe(site / "strawberry.yaml"))[:12]
+    does("Bo", "edit", "strawberry", "--set", f"{LIMIT}=114", "--base", base)
+    code, told = station(
+        "recipes", "edit", "strawberry", "--set", f"{LIMIT}=115", "--base", base, "--who", "Ida", "--reason", "x"
+    )
+    assert code == 1
+    does("Bo", "submit", "strawberry")
+    does("Cy", "edit", "strawberry", "--set", f"{LIMIT}=116")
+    code, told = station("recipes", "submit", "strawberry", "--who", "Cy", "--reason", "x")
+    assert code == 1
+    assert f"revision 2 of Bo waits for approval, and differs from this one in {LIMIT}: 114.0 → 116.0" in told
+    code, told = station("recipes", "approve", "strawberry", "--who", "Ida", "--reason", "x")
+    assert code == 1
+    assert f"the recipe's file says otherwise: {LIMIT}: 114.0 → 116.0" in told
+
+
+def test_revert_puts_the_approved_text_back_and_keeps_what_stood_there(begun, station, does, site, home):
+    approved = (site / "strawberry.yaml").read_bytes()
+    (site / "strawberry.yaml").write_text("what a mess")
+    does("Ida", "revert", "strawberry")
+    assert (site / "strawberry.yaml").read_bytes() == approved
+    (backup,) = (home / "recipe_backups").iterdir()
+    assert backup.read_text() == "what a mess"
+    assert "file: approved" in station("recipes", "list")[1]
+
+
+def test_two_recipes_never_share_the_plcs_number(begun, station, does, site):
+    (site / "raspberry.yaml").unlink()
+    does("Ida", "edit", "blueberry", "--set", "plc_number=3")
+    does("Ida", "submit", "blueberry")
+    code, told = station("recipes", "approve", "blueberry", "--who", "Bo", "--reason", "x")
+    assert code == 1
+    assert "its PLC number 3 is that of the approved raspberry" in told
+
+
+def test_number_name_and_content_have_to_belong_together(begun, does, site, home):
+    book = book_of(site, home)
+    strawberry = book.find(1)
+    assert strawberry is not None
+    assert book.current(strawberry) == strawberry
+    does("Ida", "edit", "strawberry", "--set", "plc_number=9")
+    does("Ida", "submit", "strawberry")
+    does("Bo", "approve", "strawberry")
+    book.refresh()
+    with pytest.raises(RecipeStoreError, match="recipe strawberry has the PLC's number 9 now, and no longer 1"):
+        book.current(strawberry)
+    does("Bo", "retire", "strawberry")
+    book.refresh()
+    with pytest.raises(RecipeStoreError, match="recipe strawberry with the PLC's number 1 is no longer in force"):
+        book.current(strawberry)
+
+
+def test_a_lot_goes_on_over_a_restart_only_with_what_its_revision_says(begun, does, site, home):
+    book = book_of(site, home)
+    first = book.find(1)
+    assert first is not None
+    assert book.remember(first, "A-17")
+    does("Ida", "edit", "strawberry", "--set", f"{LIMIT}=113")
+    does("Ida", "submit", "strawberry")
+    does("Bo", "approve", "strawberry")
+    assert book_of(site, home).remembered() == (first, "A-17"), "the lot began with revision 1"
+    kept = home / "active_recipe.json"
+    kept.write_text(kept.read_text().replace("112.0", "117.0"))
+    remembered = book_of(site, home).remembered()
+    assert remembered is not None
+    assert (remembered.lot, remembered.active.snapshot.revision) == (None, "2"), "what was tampered with is not used"
+
+
+def test_what_was_in_force_stays_so_without_the_database(begun, does, site, home):
+    assert limit(book_of(site, home)) == (112.0, "1")
+    file = site / "strawberry.yaml"
+    file.write_text(file.read_text().replace("area_mm2: 112\n", "area_mm2: 117\n"))
+    (home / "records" / "records.sqlite3").write_bytes(b"no database at all" * 1000)
+    assert limit(book_of(site, home)) == (112.0, "1"), "a damaged one"
+    shutil.rmtree(home / "records")
+    book = book_of(site, home)
+    assert limit(book) == (112.0, "1"), "a lost one: the hand edit does not slip in"
+    assert any("unapproved draft" in problem for problem in book.problems)
+
+
+def test_a_full_or_read_only_disk_changes_nothing(begun, station, does, tmp_path, site, home, monkeypatch):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    done = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk], capture_output=True, check=False)
+    if done.returncode:
+        pytest.skip("this user may not mount a small disk")
+    try:
+        folder = disk / "recipes"
+        shutil.copytree(site, folder)
+        monkeypatch.setenv("STATION_RECIPES_FOLDER", str(folder))
+        before, edit = (folder / "strawberry.yaml").read_bytes(), ("edit", "strawberry", "--set", f"{LIMIT}=113")
+        with (disk / "filler").open("wb", buffering=0) as filler:
+            try:
+                while True:
+                    filler.write(bytes(1024))
+            except OSError:
+                pass
+        code, told = station("recipes", *edit, "--who", "Ida", "--reason", "x")
+        assert code == 1
+        assert "cannot be written: no space left on device; it is as it was" in told
+        (disk / "filler").unlink()
+        subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+        code, told = station("recipes", *edit, "--who", "Ida", "--reason", "x")
+        assert code == 1
+        assert "read-only file system; it is as it was" in told
+        assert (folder / "strawberry.yaml").read_bytes() == before
+        assert sorted(os.listdir(folder)) == sorted(os.listdir(site)), "no unfinished file is left"  # noqa: PTH208
+        assert "recipe.edited" not in station("audit", "show")[1]
+        assert limit(book_of(folder, home)) == (112.0, "1")
+    finally:
+        subprocess.run(["umount", "--lazy", disk], check=True)
+
+
+def test_the_shipped_files_are_not_edited_in_place(begun, station, monkeypatch):
+    monkeypatch.delenv("STATION_RECIPES_FOLDER")
+    code, told = station("recipes", "edit", "strawberry", "--set", f"{LIMIT}=1", "--who", "Ida", "--reason", "x")
+    assert code == 1
+    assert "copy them into a folder of the site's" in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "exit_code", "told"),
+    [
+        (("submit", "cherry"), 2, "expected one of blueberry"),
+        (("submit", "strawberry"), 1, "revision 1 says, which is approved already"),
+        (("approve", "strawberry"), 2, "no draft waits"),
+        (("retire", "strawberry", "--revision", "9"), 2, "revision 9: expected one of 1"),
+        (("import", "none.yaml"), 2, "expected a readable file"),
+    ],
+)
+def test_what_cannot_be_done_is_told(begun, station, arguments, exit_code, told):
+    code, said = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
+    assert code == exit_code
+    assert told in said
+
+
+def test_the_hash_is_the_snapshots(site):
+    recipe = load_recipe(site / "strawberry.yaml")
+    snapshot = RecipeSnapshot.of(recipe.model_dump(mode="json"))
+    assert (canonical_text(recipe), content_sha256(recipe)) == (snapshot.text, snapshot.sha256)
+    assert json.loads(canonical_text(recipe)) == recipe.model_dump(mode="json")

@@ -1,0 +1,70 @@
+"""A lot keeps the recipe that it began with, whatever people do to the recipes meanwhile; all of it is in the trail."""
+
+import asyncio
+
+from station.channel.line import Begin, Begun, CommandName
+from station.recipe_store.editor import RecipeEditor
+from station.recipe_store.history import Person
+from station.recipe_store.store import RecipeStore
+from station.records.audit_check import check_audit
+from station.records.audit_head import read_head
+from station.records.audit_report import read_audit
+from station.records.database import reading, records_folder
+from station.vocabulary import Refusal
+
+IDA, BO = Person("Ida", "quality", "riper"), Person("Bo", "quality", "looked at lot 17")
+
+
+def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
+    async def scenario():
+        async with bench() as cell:
+            home, folder = cell.configuration.home, cell.configuration.recipes_folder
+            editor, store = RecipeEditor(home, folder), RecipeStore(home, folder)
+
+            def set_limit(value):
+                editor.edit("blueberry", {"damage.growth_mm2_per_mm": value}, IDA)
+
+            def put_in_force():
+                store.submit("blueberry", IDA)
+                store.approve("blueberry", BO)
+
+            await cell.choose("blueberry")
+            first = await cell.line.inspect()
+            await asyncio.to_thread(set_limit, 55.0)
+            cell.lay("blueberry")
+            assert (await cell.line.inspect()).recipe_checksum == first.recipe_checksum, "a draft is not live"
+            await asyncio.to_thread(put_in_force)
+            cell.lay("blueberry", 2)
+            assert (await cell.line.inspect()).recipe_checksum == first.recipe_checksum, "the lot goes on"
+            await asyncio.to_thread(cell.station.book.refresh)
+
+            begun = await begin(cell, 900, "LOT 2")
+            assert begun.refusal is None
+            second = await cell.line.outcome(begun.sequence)
+            await cell.line.publish(second)
+            assert second.recipe_checksum != first.recipe_checksum
+            record = await cell.station.service.ledger.records.inspection(second.sequence)
+            assert record.trigger.recipe.revision == "2"
+
+            await asyncio.to_thread(store.retire, "blueberry", BO)
+            await asyncio.to_thread(cell.station.book.refresh)
+            await cell.line.ready()
+            assert (await begin(cell, 901, "LOT 3")).refusal is Refusal.NOT_READY
+            why = (await cell.line.state()).why_not_ready
+            assert "Lot LOT 3 cannot begin: recipe blueberry with the PLC's number 2 is no longer in force" in why
+            assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
+            return records_folder(home)
+
+    folder = asyncio.run(scenario())
+    with reading(folder) as connection:
+        actions = [row.action for row in read_audit(connection, 100)]
+        assert check_audit(connection, read_head(folder)).broken == ()
+    assert actions.count("lot.started") == 2
+    assert actions.count("lot.refused") == 1
+    for action in ("service.started", "service.ended", "command.change_recipe", "recipe.approved", "recipe.retired"):
+        assert action in actions
+
+
+async def begin(cell, trigger_id, lot):
+    await cell.line.ready()
+    return await cell.line.client.ask(Begin(trigger_id=trigger_id, encoder=7, lot=lot), Begun, deadline_s=20)

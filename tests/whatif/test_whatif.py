@@ -1,0 +1,147 @@
+"""The what-if: a stored inspection judged by a draft ends as the station would have ended it, or is not guessed."""
+
+import csv
+import json
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.inspection.judge import judge
+from station.vocabulary import Reason
+from station.whatif.replay import replay
+from station.whatif.stored import StoredPress
+
+SOUND, BRUISED, BETWEEN = 27.0, 45.0, 34.5
+
+
+def stored_of(press, recipe, sequence=1):
+    return StoredPress(sequence, "A", judge(press, recipe).outcome, "x", press)
+
+
+def test_the_own_recipe_gives_what_is_stored(orchard):
+    for growth in (20.0, SOUND, BETWEEN, BRUISED, 60.0):
+        stored = stored_of(orchard.press(growth), orchard.recipe)
+        replayed = replay(stored, orchard.recipe, orchard.recipe)
+        assert replayed.faithful
+        assert replayed.after == stored.before
+        assert replayed.changes_side == ""
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
+@given(
+    growth=st.floats(15, 60),
+    limit=st.floats(80, 118),
+    growth_limit=st.floats(30, 55),
+    stop=st.floats(118, 250),
+    seed=st.integers(0, 9),
+)
+def test_a_verdict_on_a_stored_curve_is_that_of_the_fruit_pressed_by_the_draft(
+    orchard, changed, growth, limit, growth_limit, stop, seed
+):
+    """Whatever is said to be decided is so: the same fruit pressed by the draft goes to the same side."""
+    own = orchard.recipe
+    values = {"damage__area__0__area_mm2": limit, "damage__growth_mm2_per_mm": growth_limit}
+    draft = changed(own, early_stop__area_mm2=stop, early_stop__growth_mm2_per_mm=max(55.0, growth_limit), **values)
+    replayed = replay(stored_of(orchard.press(growth, seed=seed), own), own, draft)
+    orchard.recipe = draft
+    truth = judge(orchard.press(growth, seed=seed), draft).outcome
+    orchard.recipe = own
+    if replayed.after != "UNDECIDABLE":
+        assert (replayed.after == "PASS") == (truth == "PASS")
+        if replayed.after != "FAIL":
+            assert replayed.after == truth
+
+
+def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orchard, changed):
+    stored = stored_of(orchard.press(SOUND), orchard.recipe)
+    assert stored.before == "PASS"
+    assert len(stored.press.points) < orchard.recipe.steps.number, "it was stopped early"
+    further = changed(orchard.recipe, early_stop__area_mm2=200.0)
+    replayed = replay(stored, orchard.recipe, further)
+    assert replayed.after == "UNDECIDABLE"
+    assert "where it was stopped early, and the draft would have pressed on" in replayed.why
+    stricter = changed(further, damage__area__0__area_mm2=62.0)
+    assert replay(stored, orchard.recipe, stricter).after == "FAIL", "what is proven stands, whatever would have come"
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"steps__step_mm": 1.02}, "the draft presses otherwise (steps.step_mm)"),
+        ({"gripper__speed_mm_s": 30.0, "imaging__settle_s": 0.5}, "the draft presses otherwise (gripper, imaging)"),
+        (
+            {"segmentation__robust__gate_ratio": 4.0},
+            "the draft measures otherwise, and not all of its images",
+        ),
+    ],
+)
+def test_what_no_stored_curve_can_tell_is_not_guessed(orchard, changed, changes, told):
+    own = orchard.recipe
+    replayed = replay(stored_of(orchard.press(SOUND), own), own, changed(own, **changes))
+    assert replayed.after == "UNDECIDABLE"
+    assert replayed.why.startswith(told)
+
+
+def test_an_interrupted_inspection_stays_no_result_and_an_unknown_recipe_is_said(orchard, changed):
+    stored = stored_of(orchard.press(SOUND, Reason.ARM_FAULT), orchard.recipe)
+    assert stored.before == "NO_RESULT"
+    assert replay(stored, orchard.recipe, changed(orchard.recipe, early_stop__area_mm2=200.0)).after == "NO_RESULT"
+    assert replay(stored, None, orchard.recipe).after == "UNDECIDABLE"
+
+
+def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orchard, draft, station, tmp_path):
+    orchard.store([orchard.press(growth, seed=7) for growth in (SOUND, BRUISED, BETWEEN)], "A")
+    orchard.store([orchard.press(SOUND)], "B")
+    file, out = draft(damage__area__0__area_mm2=90.0), tmp_path / "out"
+    code, told = station("whatif", "--recipe", file, "--lots", "A", "--out", out, "--jobs", 1)
+    assert code == 0
+    assert "3 inspections, 3 decided by the draft" in told
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["rejects_before"], summary["rejects_after"], summary["newly_rejected"]) == (1, 2, 1)
+    assert summary["not_reproduced"] == 0
+    (row,) = [row for row in csv.DictReader((out / "changes.csv").read_text().splitlines()) if row["changes_side"]]
+    assert (row["sequence"], row["lot"], row["before"], row["changes_side"]) == ("3", "A", "PASS", "rejected")
+    page = (out / "whatif.html").read_text()
+    assert "1 newly rejected, 0 newly passed" in page
+    assert "damage.area[0].area_mm2: 112.0 → 90.0" in page
+    assert "http" not in page.replace("http://www.w3.org", ""), "it needs no network"
+    lines = (out / "replayed.jsonl").read_text()
+    (out / "replayed.jsonl").write_text(lines + '{"sequence": 4, "lo')  # a crash in the middle of a line
+    code, told = station("whatif", "--recipe", file, "--out", out, "--jobs", 1)
+    assert code == 0
+    assert "4 inspections" in told
+    again = (out / "replayed.jsonl").read_text()
+    assert again.startswith(lines)
+    assert again.count("\n") == lines.count("\n") + 1
+    code, told = station("whatif", "--recipe", draft(damage__area__0__area_mm2=91.0), "--out", out)
+    assert code == 2
+    assert "it holds the results of another draft" in told
+
+
+def test_two_processes_and_a_cluster_say_the_same_as_one(orchard, draft, station, apart, cluster, tmp_path):
+    orchard.store([orchard.press(20.0 + number / 2, seed=number) for number in range(60)])
+    file = draft(damage__area__0__area_mm2=75.0)
+    assert station("whatif", "--recipe", file, "--out", tmp_path / "one", "--jobs", 1)[0] == 0
+    for name, how in {"two": ("--jobs", 2), "cluster": ("--scheduler", cluster)}.items():
+        code, told = apart("whatif", "--recipe", file, "--out", tmp_path / name, *how)
+        assert code == 0, told
+    one, two, many = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("one", "two", "cluster"))
+    assert one == two == many
+    assert one["newly_rejected"] > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--lots", "Z"), "no judged inspection of strawberry"),
+        (("--recipe", "none.yaml"), "expected a readable file"),
+        (("--scheduler", "nonsense"), "expected tcp://HOST:PORT"),
+        (("--scheduler", "tcp://127.0.0.1:1"), "no Dask scheduler answers there"),
+    ],
+)
+def test_bad_input_is_told(orchard, draft, station, tmp_path, arguments, told):
+    orchard.store([orchard.press(SOUND)])
+    code, said = station("whatif", "--recipe", draft(), "--out", tmp_path / "out", *arguments)
+    assert code == 2
+    assert told in said
