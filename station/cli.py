@@ -29,6 +29,7 @@ COMMANDS = {
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
+    "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
     "recipes": Entry("station.commands.recipes:recipes", "Look after recipes, their revisions and approvals."),
     "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),

@@ -4,53 +4,59 @@ from pathlib import Path
 
 import click
 
-from station.records.database import reading, records_folder
+from station.commands.records_keeping import backup, check, hold, holds, lot, release, restore
+from station.commands.records_options import config_option, folder_of, query_options
+from station.commands.records_output import export, report
+from station.records.database import reading
 from station.records.opening import set_mark
-from station.records.reading import read_inspection, read_last
+from station.records.reading import Summary, read_inspection
 from station.records.report import described, listed
-from station.settings.configuration import load_configuration
-
-_config = click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration that names the home folder. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
+from station.records.search import LARGEST_PAGE, Query, find_page
 
 
 @click.group()
 def records() -> None:
-    """Ask what was inspected, and why it ended as it did."""
+    """Ask what was inspected, and why it ended as it did; hand it on, and keep it safe."""
 
 
 @records.command()
 @click.argument("sequence", type=click.IntRange(1, 2**32 - 1))
-@_config
+@config_option
 def show(sequence: int, config: Path | None) -> None:
     """Show all that is known of the inspection with the number SEQUENCE: why it ended so, its curve, its images."""
-    folder = _folder(config)
+    folder = folder_of(config)
     with reading(folder) as connection:
         click.echo(described(read_inspection(connection, sequence, folder)))
 
 
 @records.command("list")
 @click.option("--last", metavar="N", default=20, show_default=True, type=click.IntRange(1, 100_000), help="How many.")
-@_config
-def list_last(last: int, config: Path | None) -> None:
-    """List the last inspections, newest first."""
-    with reading(_folder(config)) as connection:
-        click.echo(listed(read_last(connection, last)))
+@click.option("--below", metavar="SEQUENCE", type=click.IntRange(1, 2**32), help="Only numbers below: the next page.")
+@query_options
+@config_option
+def list_last(last: int, below: int | None, query: Query, config: Path | None) -> None:
+    """List the last inspections, newest first; all conditions given have to hold."""
+    found: list[Summary] = []
+    with reading(folder_of(config)) as connection:
+        while len(found) < last:
+            page = find_page(connection, query, min(last - len(found), LARGEST_PAGE), below)
+            found += page.rows
+            below = page.below
+            if below is None:
+                break
+    click.echo(listed(found))
+    if below is not None:
+        click.echo(f"more: --below {below}", err=True)
 
 
 @records.command("continue-after")
 @click.argument("number", type=click.IntRange(0, 2**32 - 2))
-@_config
+@config_option
 def continue_after(number: int, config: Path | None) -> None:
     """Number the next inspection NUMBER + 1, where the station lost count; never lower than it knows itself."""
-    set_mark(_folder(config), number)
+    set_mark(folder_of(config), number)
     click.echo(f"the next inspection is number {number + 1}")
 
 
-def _folder(config: Path | None) -> Path:
-    """The records' folder."""
-    return records_folder(load_configuration(config).home)
+for command in (lot, hold, release, holds, export, report, backup, restore, check):
+    records.add_command(command)

@@ -36,7 +36,8 @@ async def _supervise(site: Configuration, config: Path | None) -> None:
         click.echo("running; Ctrl-C ends it")
         notify("READY=1")
 
-    await Supervisor(station_programs(config)).run(announce, ended)
+    outbox = site.outbox.postgresql.enabled or site.outbox.mqtt.enabled
+    await Supervisor(station_programs(config, outbox=outbox)).run(announce, ended)
 
 
 def addresses(site: Configuration) -> str:

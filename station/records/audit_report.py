@@ -8,8 +8,8 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from station.records.audit import AuditRow, row_of
-from station.records.report import printable
 from station.records.schema import audit
+from station.records.wording import printable
 
 _LONGEST_VALUE = 300
 

@@ -208,6 +208,18 @@ def reading(folder: Path) -> Iterator[Connection]:
         raise in_words(error, str(path)) from error
 
 
+def plain(connection: Connection) -> sqlite3.Connection:
+    """The driver's own connection, for what SQLAlchemy has no words for, or is too slow for.
+
+    Args:
+        connection: of an engine of `open_engine`.
+    """
+    driver = connection.connection.driver_connection
+    if not isinstance(driver, sqlite3.Connection):
+        raise TypeError(f"{driver} is no connection of sqlite3")
+    return driver
+
+
 def _to_json(value: Any) -> str:
     """JSON of any value: what has no JSON, as NaN, is null, so that no odd figure costs a record."""
     return json.dumps(_finite(value), default=_number, ensure_ascii=False, allow_nan=False)

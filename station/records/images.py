@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import logging
 import math
 import os
 import queue
@@ -14,16 +15,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
-from sqlalchemy import Connection, func, select
 
 from station.records.errors import RecordsError
 from station.records.failures import in_words
 from station.records.model import Image
-from station.records.schema import images
+from station.records.retention import forget_missing, referred, remove_oldest_images
 from station.records.sequence_mark import sync_folder
 from station.records.writer import Work
-from station.records.writing import add_images, remove_oldest_images
+from station.records.writing import add_images
 from station.settings.records import RecordsSettings
+
+log = logging.getLogger(__name__)
 
 FOLDER_NAME = "images"
 MB = 1_000_000
@@ -69,7 +71,7 @@ class ImageStore:
     """Writes images behind the cycle's back; what cannot be written is given up and said so."""
 
     def __init__(self, folder: Path, settings: RecordsSettings, submit: Callable[[Work[Any]], Future[Any]]) -> None:
-        """Start the thread; it first removes files that nothing refers to.
+        """Start the thread; it first reconciles files and rows.
 
         Args:
             folder: the records' folder.
@@ -120,7 +122,7 @@ class ImageStore:
 
     def _run(self) -> None:
         with contextlib.suppress(OSError, RecordsError, TimeoutError):  # tried again before images are written
-            self._remove_orphans()
+            self._reconcile()
         while (work := self._queue.get()) is not None and not self._stopping.is_set():
             self._keep(work)
             self._done += 1
@@ -131,7 +133,7 @@ class ImageStore:
         rows: list[dict[str, Any]] = []
         try:
             if not self._counted:
-                self._remove_orphans()
+                self._reconcile()
             encoded = [_encoded(image) for image in work.images]
             self._make_space(sum(len(content) for content in encoded), accepted=work.accepted)
             for image, content in zip(work.images, encoded, strict=True):
@@ -194,7 +196,7 @@ class ImageStore:
                 removed = self._record(lambda connection: remove_oldest_images(connection, accepted=False))
             if removed is None:
                 whose = "the quota is full of" if over else "the disk is nearly full, beside"
-                raise _NotKeptError(f"{whose} images of rejected fruit")
+                raise _NotKeptError(f"{whose} images of rejected fruit, or on hold")
             freed_bytes, names = removed
             for name in names:
                 image_path(self._folder, name).unlink(missing_ok=True)
@@ -204,23 +206,25 @@ class ImageStore:
     def _free_bytes(self) -> int:
         return shutil.disk_usage(self._folder).free
 
-    def _remove_orphans(self) -> None:
-        """Remove files that nothing refers to, as of a station that was killed, and count the rest."""
-        referred = self._record(_referred)
+    def _reconcile(self) -> None:
+        """Remove files that nothing refers to, as of a station that was killed, say what is missing, count the rest."""
+        wanted = self._record(referred)
+        found = set()
         for file in (self._folder / FOLDER_NAME).glob("*/*"):
-            if file.suffix == _PARTIAL or (file.suffix == ".png" and file.stem not in referred):
+            if file.suffix == ".png" and file.stem in wanted:
+                found.add(file.stem)
+            elif file.suffix in {_PARTIAL, ".png"}:
                 file.unlink(missing_ok=True)
-        self.size_bytes = sum(referred.values())
+        missing = frozenset(wanted.keys() - found)
+        if missing:
+            log.warning("%d of %d images that the records refer to are missing", len(missing), len(wanted))
+        if missing and found:  # none at all is a disk that is not mounted: they may come back
+            self._record(lambda connection: forget_missing(connection, missing))
+        self.size_bytes = sum(size for name, size in wanted.items() if name in found)
         self._counted = True
 
     def _record(self, work: Work[Any]) -> Any:
         return self._submit(work).result(_RECORDED_S)
-
-
-def _referred(connection: Connection) -> dict[str, int]:
-    """The files that rows refer to, with their sizes."""
-    query = select(images.c.sha256, func.max(images.c.size_bytes)).group_by(images.c.sha256)
-    return {name: size for name, size in connection.execute(query)}  # noqa: C416 (rows are no pairs to dict)
 
 
 def _encoded(image: Image) -> bytes:

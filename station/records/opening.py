@@ -24,7 +24,7 @@ from station.settings.records import RecordsSettings
 MARK_NAME = "sequence"
 LOCK_NAME = "lock"
 
-_BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
+BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
 """What is moved aside together. The database goes last: while it is there the next start goes on moving, and a new one
 never meets an old one's write-ahead log or takes its images for orphans."""
 
@@ -122,7 +122,7 @@ def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
     path = folder / FILE_NAME
     if not path.exists() or not path.stat().st_size:
         if mark.value:
-            aside = move_aside(folder, *_BELONGING)
+            aside = move_aside(folder, *BELONGING)
             cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
             return (Notice("damaged", cause, f"look for the old one; its images are in {aside}"),)
         if not mark.known and (folder / "aside").exists():
@@ -133,7 +133,7 @@ def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
     except DamagedError as error:
         if not mark.known:
             raise _lost_mark(mark) from error
-        aside = move_aside(folder, *_BELONGING)
+        aside = move_aside(folder, *BELONGING)
         log.exception("%s; moved to %s", error.cause, aside)
         remedy = f"the old one and its images are in {aside}: `sqlite3 FILE .recover` reads what is left of it"
         return (Notice(error.code, f"{error.cause}; a new one was begun after number {mark.value}", remedy),)

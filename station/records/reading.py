@@ -1,6 +1,8 @@
 """What is asked of the records; each a function of a connection that need not be the writer's."""
 
 import json
+from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +21,7 @@ from station.records.model import (
     StoredImage,
     Trigger,
 )
-from station.records.schema import alarms, curve_points, images, inspections, recipe_snapshots
+from station.records.schema import alarms, curve_points, images, inspections, lots, recipe_snapshots
 
 
 class Summary(NamedTuple):
@@ -29,6 +31,8 @@ class Summary(NamedTuple):
     trigger_id: int
     began_utc_ms: int
     lot: str
+    grower: str
+    """Empty where nobody told it."""
     fruit: str
     outcome: str | None
     """None while it runs."""
@@ -99,21 +103,53 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
     )
 
 
-def read_last(connection: Connection, number: int) -> list[Summary]:
-    """The last inspections, newest first.
+def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Summary]:
+    """Some inspections for a list, highest number first.
 
     Args:
         connection: any.
-        number: at most so many.
+        sequences: which; those that are not there are left out.
     """
-    table = inspections.c
+    table, points = inspections.c, curve_points.c
     rows = connection.execute(
-        select(inspections, recipe_snapshots.c.name)
+        select(
+            table.sequence,
+            table.trigger_id,
+            table.began_utc_ms,
+            table.lot,
+            lots.c.grower,
+            recipe_snapshots.c.name,
+            table.outcome,
+            table.standing,
+            table.duration_ms,
+        )
         .outerjoin(recipe_snapshots, recipe_snapshots.c.sha256 == table.recipe_sha256)
+        .outerjoin(lots, lots.c.name == table.lot)
+        .where(table.sequence.in_(sequences))
         .order_by(table.sequence.desc())
-        .limit(number)
     ).all()
-    return [_summary(connection, row) for row in rows]
+    areas: defaultdict[int, list[float | None]] = defaultdict(list)
+    for point in connection.execute(
+        select(points.sequence, points.area_mm2)
+        .where(points.sequence.in_(sequences))
+        .order_by(points.sequence, points.step)
+    ):
+        areas[point.sequence].append(point.area_mm2)
+    return [
+        Summary(
+            row.sequence,
+            row.trigger_id,
+            row.began_utc_ms,
+            row.lot,
+            row.grower or "",
+            row.name or "none",
+            row.outcome,
+            tuple(json.loads(row.standing or "{}").get("reasons", ())),
+            tuple(areas[row.sequence]),
+            row.duration_ms,
+        )
+        for row in rows
+    ]
 
 
 def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[str, str, str], int]:
@@ -133,24 +169,6 @@ def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[s
         .group_by(fruit, table.outcome, reason)
     )
     return {(name, outcome, why): number for name, outcome, why, number in connection.execute(query)}
-
-
-def _summary(connection: Connection, row: Any) -> Summary:
-    standing: dict[str, Any] = json.loads(row.standing or "{}")
-    areas = connection.scalars(
-        select(curve_points.c.area_mm2).where(curve_points.c.sequence == row.sequence).order_by(curve_points.c.step)
-    ).all()
-    return Summary(
-        row.sequence,
-        row.trigger_id,
-        row.began_utc_ms,
-        row.lot,
-        row.name or "none",
-        row.outcome,
-        tuple(standing.get("reasons", ())),
-        tuple(areas),
-        row.duration_ms,
-    )
 
 
 def _recipe(connection: Connection, row: Any) -> RecipeSnapshot | None:

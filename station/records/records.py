@@ -292,6 +292,17 @@ class Records:
         """
         return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
+    async def change(self, work: Work[T]) -> T:
+        """Carry out a change of lots or holds, as `lambda connection: start_lot(connection, name, grower)`.
+
+        Args:
+            work: runs in the writer's thread and transaction.
+
+        Raises:
+            RecordsError: it may not be durable.
+        """
+        return await self._ask(work)
+
     def status(self) -> Status:
         """How the records do; never waits."""
         opened = self._opened

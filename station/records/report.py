@@ -8,7 +8,7 @@ from typing import Any
 from station.channel.line import Outcome
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.reading import Summary
-from station.records.wording import sentence, sparkline
+from station.records.wording import printable, sentence, sparkline
 
 
 def described(record: FullRecord) -> str:
@@ -26,13 +26,14 @@ def listed(summaries: Sequence[Summary]) -> str:
     Args:
         summaries: in the order of the lines.
     """
-    rows = [("number", "begun (UTC)", "trigger", "lot", "fruit", "outcome", "s", "reasons", "curve")]
+    rows = [("number", "begun (UTC)", "trigger", "lot", "grower", "fruit", "outcome", "s", "reasons", "curve")]
     rows += [
         (
             str(summary.sequence),
             _time(summary.began_utc_ms),
             str(summary.trigger_id),
             summary.lot or "-",
+            summary.grower or "-",
             summary.fruit,
             summary.outcome or "running",
             "-" if summary.duration_ms is None else f"{summary.duration_ms / 1000:.2f}",
@@ -42,15 +43,6 @@ def listed(summaries: Sequence[Summary]) -> str:
         for summary in summaries
     ]
     return printable(_columns(rows))
-
-
-def printable(text: str) -> str:
-    """A text without what would command the terminal: a lot's name comes from outside.
-
-    Args:
-        text: of several lines.
-    """
-    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
 def _described(record: FullRecord) -> Iterator[str]:

@@ -80,7 +80,87 @@ inspections = Table(
 to be told: the name, and the whole message."""
 Index("ix_inspections_unacknowledged", inspections.c.sequence, sqlite_where=inspections.c.acknowledged_utc_ms.is_(None))
 Index("ix_inspections_lot", inspections.c.lot)
-Index("ix_inspections_began_utc_ms", inspections.c.began_utc_ms)
+Index("ix_inspections_lot_outcome", inspections.c.lot, inspections.c.outcome)
+Index("ix_inspections_outcome", inspections.c.outcome)
+
+reasons = Table(
+    "reasons",
+    metadata,
+    Column("reason", Text, primary_key=True),
+    Column("outcome", Text, primary_key=True),
+    Column("sequence", ForeignKey("inspections.sequence", ondelete="CASCADE"), primary_key=True, autoincrement=False),
+    sqlite_with_rowid=False,
+)
+"""Every reason of what stands, to be found by; the order is in `standing`."""
+
+hours = Table(
+    "hours",
+    metadata,
+    Column("first_sequence", Integer, primary_key=True, autoincrement=False),
+    Column("hour", Integer, nullable=False),
+    Index("ix_hours_hour", "hour"),
+)
+"""Where the UTC hour of the begin (ms // 3,600,000) changes from one number to the next: a span goes on to the number
+before the next row's. So a time is found by number also where the clock stepped."""
+
+lots = Table(
+    "lots",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("name", Text, nullable=False, unique=True),
+    Column("grower", Text, nullable=False),
+    Column("began_utc_ms", Integer, nullable=False),
+    Column("ended_utc_ms", Integer),
+    Column("revision", Integer, nullable=False),
+    Index("ix_lots_grower", "grower"),
+)
+"""What people or the packhouse's system told of a lot; the PLC gives its name alone, which is in `inspections`."""
+
+holds = Table(
+    "holds",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("sequence", Integer),
+    Column("lot", Text),
+    Column("reason", Text, nullable=False),
+    Column("by", Text, nullable=False),
+    Column("placed_utc_ms", Integer, nullable=False),
+    Column("released_utc_ms", Integer),
+    Column("released_by", Text),
+    Column("release_reason", Text),
+    CheckConstraint("(sequence IS NULL) <> (lot IS NULL)", name="one_thing"),
+)
+"""Images that are not to be removed, of an inspection or of a whole lot, until they are released."""
+Index(
+    "ix_holds_sequence",
+    holds.c.sequence,
+    unique=True,
+    sqlite_where=holds.c.released_utc_ms.is_(None) & holds.c.sequence.is_not(None),
+)
+Index(
+    "ix_holds_lot", holds.c.lot, unique=True, sqlite_where=holds.c.released_utc_ms.is_(None) & holds.c.lot.is_not(None)
+)
+
+outbox = Table(
+    "outbox",
+    metadata,
+    Column("entry", Integer, primary_key=True),
+    Column("kind", Text, nullable=False),
+    Column("row", Integer, nullable=False),
+    CheckConstraint("kind IN ('inspection', 'lot', 'audit')", name="kind"),
+    sqlite_autoincrement=True,
+)
+"""What other systems are told, in order: of an inspection when it is published, a lot's or the audit trail's row. Kept
+for ever: some 15 bytes each, and who comes later begins with the first."""
+
+origins = Table(
+    "origins",
+    metadata,
+    Column("first_entry", Integer, primary_key=True, autoincrement=False),
+    Column("id", Text, nullable=False),
+)
+"""Which database gave the entries from `first_entry` on: a new one after each restoring, so that a number given again
+is not taken for the one given before."""
 
 curve_points = Table(
     "curve_points",

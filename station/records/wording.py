@@ -49,6 +49,15 @@ def sentence(reason: str) -> str:
     return SENTENCES[Reason(reason)] if reason in set(Reason) else reason
 
 
+def printable(text: str) -> str:
+    """Without what would command a terminal: a lot's name comes from outside.
+
+    Args:
+        text: lines of anything.
+    """
+    return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
+
+
 def _bar(value: float, largest: float) -> str:
     share = max(0.0, value) / largest if largest > 0 else 0.0
     return _BARS[min(len(_BARS) - 1, int(share * len(_BARS)))]

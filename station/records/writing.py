@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import ValidationError
 from sqlalchemy import Connection, delete, insert, select, update
@@ -11,6 +11,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.records.errors import BadRecordError, UnknownInspectionError
+from station.records.finding import note_hour, note_reasons
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
     alarms,
@@ -20,9 +21,11 @@ from station.records.schema import (
     events,
     images,
     inspections,
+    outbox,
     recipe_snapshots,
 )
 
+OutboxKind = Literal["inspection", "lot", "audit"]
 PENDING = "pending"
 LOST = "lost: the station ended before they were written"
 
@@ -62,6 +65,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     _lost(begun)
     sha256 = recipe.sha256 if recipe else None
     connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
+    note_hour(connection, sequence, trigger.began_utc_ms)
 
 
 def withdraw(connection: Connection, sequence: int) -> None:
@@ -116,16 +120,21 @@ def conclude(
             standing=standing.model_dump_json(),
         )
     )
+    if row.standing is None:
+        note_reasons(connection, None, standing)
     if record.curve:
         points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
         connection.execute(insert(curve_points), points)
+    if row.published_utc_ms is not None:
+        tell(connection, "inspection", sequence)
     return standing, images_state
 
 
 def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:
     """Note what the PLC was told, unless that is noted already; True the first time."""
+    table = inspections.c
     found = connection.execute(
-        select(inspections.c.published_utc_ms).where(inspections.c.sequence == outcome.sequence)
+        select(table.published_utc_ms, table.standing).where(table.sequence == outcome.sequence)
     ).one_or_none()
     if found is not None and found.published_utc_ms is not None:
         return False
@@ -138,7 +147,21 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
         .where(inspections.c.sequence == outcome.sequence)
         .values(outcome=outcome.outcome, standing=outcome.model_dump_json(), published_utc_ms=utc_ms())
     )
+    stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
+    note_reasons(connection, stood, outcome)
+    tell(connection, "inspection", outcome.sequence)
     return True
+
+
+def tell(connection: Connection, kind: OutboxKind, row: int) -> None:
+    """Have other systems told of a row: an inspection when it is published, and again when it changes after that.
+
+    Args:
+        connection: the writer's, in the transaction that makes it so.
+        kind: of what.
+        row: its sequence, id or number.
+    """
+    connection.execute(insert(outbox).values(kind=kind, row=row))
 
 
 def acknowledge(connection: Connection, sequence: int) -> int:
@@ -168,7 +191,11 @@ def end_what_was_left(connection: Connection) -> list[int]:
             .where(table.sequence == row.sequence)
             .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
         )
-    connection.execute(update(inspections).where(table.images_state == PENDING).values(images_state=LOST))
+        note_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
+    lost_images = update(inspections).where(table.images_state == PENDING).values(images_state=LOST)
+    for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
+        if row.published_utc_ms is not None:
+            tell(connection, "inspection", row.sequence)
     return [row.sequence for row in rows]
 
 
@@ -199,32 +226,10 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
     """Reference images whose files are durable, and say how many were kept."""
     if rows:
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
-    connection.execute(update(inspections).where(inspections.c.sequence == sequence).values(images_state=state))
-
-
-def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:
-    """Forget the images of the oldest accepted, or the oldest other inspection that has some.
-
-    Returns:
-        The freed bytes and the names of the files that nothing refers to any more; None where there is none.
-    """
-    kind = inspections.c.outcome == "PASS" if accepted else inspections.c.outcome != "PASS"
-    oldest = connection.scalar(
-        select(images.c.sequence)
-        .join(inspections, inspections.c.sequence == images.c.sequence)
-        .where(kind)
-        .order_by(images.c.sequence)
-        .limit(1)
-    )
-    if oldest is None:
-        return None
-    rows = connection.execute(select(images.c.sha256, images.c.size_bytes).where(images.c.sequence == oldest)).all()
-    connection.execute(delete(images).where(images.c.sequence == oldest))
-    sizes = {row.sha256: row.size_bytes for row in rows}
-    kept = connection.scalars(select(images.c.sha256).where(images.c.sha256.in_(sizes))).all()
-    free = {name: size for name, size in sizes.items() if name not in kept}
-    add_images(connection, oldest, (), "removed: space for newer ones")
-    return sum(free.values()), list(free)
+    table = inspections.c
+    changed = update(inspections).where(table.sequence == sequence).values(images_state=state)
+    if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
+        tell(connection, "inspection", sequence)
 
 
 def _row(connection: Connection, sequence: int) -> Any:
@@ -305,3 +310,4 @@ def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
             images_state="none: known by its outcome alone",
         )
     )
+    note_hour(connection, outcome.sequence, outcome.began_utc_ms)

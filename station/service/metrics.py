@@ -23,6 +23,7 @@ from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
 from station.channel.line import Outcome
+from station.outbox.status import OutboxStatus
 from station.records.records import Status
 from station.service.metrics_table import LABELS, OTHER, TABLE, Row
 
@@ -50,6 +51,7 @@ class Metrics:
         self._reference: tuple[float, float] | None = None
         self._status: Callable[[], Status] | None = None
         self._figures: Callable[[], Sequence[float | None]] | None = None
+        self._outbox: Callable[[], OutboxStatus | None] = lambda: None
         buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
         self._made: dict[str, Any] = {
             key: _made(row, buckets, self.registry) for key, row in TABLE.items() if not row.at_scrape
@@ -127,6 +129,10 @@ class Metrics:
         """Ask at each scrape for the calibration's age, the verification's age, and the drift: `Calibrated.figures`."""
         self._figures = figures
 
+    def watch_outbox(self, status: Callable[[], OutboxStatus | None]) -> None:
+        """Ask at each scrape how far other systems are told."""
+        self._outbox = status
+
     def exposition(self, accept: str = "") -> tuple[bytes, str]:
         """Everything, and the content type.
 
@@ -169,6 +175,8 @@ class Metrics:
                     yield GaugeMetricFamily(TABLE[key].name, TABLE[key].help, value)
         if self._status is not None:
             yield from _of_records(self._status())
+        if (told := self._outbox()) is not None:
+            yield from _of_outbox(told)
 
 
 class _AtScrape(Collector):
@@ -192,28 +200,49 @@ def _made(row: Row, around_deadline: tuple[float, ...], registry: CollectorRegis
             return Info(row.name, row.help, registry=registry)
 
 
+Values = Mapping[str, Mapping[tuple[str, ...], float | None]]
+"""By the table's key and the labels; None is absent."""
+
+
 def _of_records(status: Status) -> Iterator[Metric]:
     """The records' metrics."""
-    gauges: dict[str, Mapping[tuple[str, ...], float | None]] = {
+    gauges: Values = {
         "records_queue": {(): status.queue},
         "records_images_queue": {(): status.images_waiting},
         "records_bytes": {("database",): status.database_bytes, ("images",): status.image_bytes},
         "records_free": {(): status.free_bytes},
         "records_write_age": {(): status.last_write_age_s},
     }
-    for key, values in gauges.items():
-        gauge = GaugeMetricFamily(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
-        for labels, value in values.items():
-            if value is not None:
-                gauge.add_metric(labels, value)
-        yield gauge
-    counters: dict[str, Mapping[tuple[str, ...], float]] = {
+    counters: Values = {
         "records_writes": {(): status.writes},
         "records_failures": {(code,): number for code, number in status.failures.items()},
         "records_images": {(result,): number for result, number in status.images.items()},
     }
-    for key, values in counters.items():
-        counter = CounterMetricFamily(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
-        for labels, value in values.items():
-            counter.add_metric(labels, value)
-        yield counter
+    yield from _families(gauges, counters)
+
+
+def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
+    """How far other systems are told."""
+    now_utc_ms = time.time_ns() // 1_000_000
+    told = status.destinations.items()
+
+    def age_s(utc_ms: int | None) -> float:
+        return 0.0 if utc_ms is None else max(0.0, (now_utc_ms - utc_ms) / 1000)
+
+    gauges: Values = {
+        "outbox_connected": {(name,): each.connected for name, each in told},
+        "outbox_waiting": {(name,): each.waiting for name, each in told},
+        "outbox_lag": {(name,): age_s(each.oldest_utc_ms) for name, each in told},
+        "outbox_age": {(): age_s(status.utc_ms)},
+    }
+    yield from _families(gauges, {"outbox_refused": {(name,): each.refused for name, each in told}})
+
+
+def _families(gauges: Values, counters: Values) -> Iterator[Metric]:
+    for kind, families in ((GaugeMetricFamily, gauges), (CounterMetricFamily, counters)):
+        for key, values in families.items():
+            family = kind(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
+            for labels, value in values.items():
+                if value is not None:
+                    family.add_metric(labels, value)
+            yield family

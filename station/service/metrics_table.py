@@ -24,6 +24,7 @@ LABELS: dict[str, frozenset[str] | int] = {
     "kind": frozenset({"database", "images"}),
     "code": 16,
     "result": frozenset({"kept", "dropped", "failed", "removed"}),
+    "destination": frozenset({"postgresql", "mqtt"}),
     "version": 1,
     "python": 1,
 }
@@ -119,6 +120,33 @@ TABLE: dict[str, Row] = {
     "records_free": Row("station_records_free_bytes", "gauge", (), "Space left on the records' disk", at_scrape=True),
     "records_images": Row(
         "station_records_images", "counter", ("result",), "Images by what became of them", at_scrape=True
+    ),
+    "outbox_connected": Row(
+        "station_outbox_connected", "gauge", ("destination",), "1 while another system can be told", at_scrape=True
+    ),
+    "outbox_waiting": Row(
+        "station_outbox_waiting",
+        "gauge",
+        ("destination",),
+        "Entries that another system has not been told; absent while that is not known",
+        at_scrape=True,
+    ),
+    "outbox_lag": Row(
+        "station_outbox_lag_seconds",
+        "gauge",
+        ("destination",),
+        "Time since the first of them was done, by the machine's clock; 0 where none waits",
+        at_scrape=True,
+    ),
+    "outbox_refused": Row(
+        "station_outbox_refused",
+        "counter",
+        ("destination",),
+        "Events that another system did not take as they are, since the outbox began",
+        at_scrape=True,
+    ),
+    "outbox_age": Row(
+        "station_outbox_heard_age_seconds", "gauge", (), "Time since the outbox's process was heard", at_scrape=True
     ),
     "records_write_age": Row(
         "station_records_last_write_age_seconds",

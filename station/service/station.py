@@ -5,11 +5,13 @@ import contextlib
 import logging
 import uuid
 from collections.abc import Callable, Coroutine
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 from station.errors import StationError
 from station.inspection.states import STATES
+from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
@@ -91,6 +93,8 @@ class Station:
         trail = Trail(records)
         stack.push_async_callback(self._note_end, trail)
         metrics.watch_records(records.status)
+        if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
+            metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))
 
         def device_changed(name: str, fault: StationError | None) -> None:
             alarms.device(name, crew.watches[name].told_fault)

@@ -17,6 +17,7 @@ from station.settings.gripper import GripperSettings
 from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
 from station.settings.network import Host
+from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
 from station.settings.problems import Contradiction, Problem, SettingsError, dotted
@@ -96,6 +97,9 @@ class Configuration(Settings):
     can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
         RecordsSettings(), title="Records", description="What the station keeps of its inspections."
+    )
+    outbox: OutboxSettings = setting(
+        OutboxSettings(), title="Outbox", description="Which other systems are told of inspections."
     )
     service: ServiceSettings = setting(
         ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."

@@ -6,17 +6,19 @@ from pathlib import Path
 from station.supervision.supervisor import Program
 
 
-def station_programs(config: Path | None, logs: Path | None = None) -> list[Program]:
+def station_programs(config: Path | None, logs: Path | None = None, *, outbox: bool = False) -> list[Program]:
     """The processes of one station: the service, and the PLC interface, which outlives it.
 
     Args:
         config: the configuration's file; None for the usual one.
         logs: the folder of their logs; None to leave them on the supervisor's own output.
+        outbox: whether other systems are told of inspections, by one more process.
     """
-    return [
+    programs = [
         _program("service", logs, "service", *_config(config)),
         _program("plc", logs, "plc", "run", *_config(config)),
     ]
+    return [*programs, _program("outbox", logs, "outbox", "run", *_config(config))] if outbox else programs
 
 
 def twin_program(config: Path | None, console_port: int, seed: int, logs: Path | None = None) -> Program:

@@ -7,6 +7,7 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families 
 from prometheus_client.parser import text_string_to_metric_families as parse
 
 from station.channel.line import Reason, Refusal
+from station.outbox.status import DestinationStatus, OutboxStatus
 from station.records.model import InspectionRecord, Trigger
 from station.records.records import Records, Status
 from station.service import metrics_table
@@ -46,6 +47,8 @@ def everything_told(metrics, outcome):
     status = Status(9, {"disk_full": 2}, 1, 2, {"kept": 5, "dropped": 1}, 1000, 2000, 3000, 0.5, "")
     metrics.watch_records(lambda: status)
     metrics.watch_calibration(lambda: (86_400.0, 60.0, -0.02))
+    told = DestinationStatus(connected=False, told=7, refused=1, waiting=12, oldest_utc_ms=5, error="away")
+    metrics.watch_outbox(lambda: OutboxStatus(utc_ms=9, destinations={"postgresql": told}))
 
 
 def test_everything_in_the_table_is_exposed_and_nothing_else(metrics, outcome):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 WRITER = """
 import asyncio, json, os, sys
@@ -98,3 +99,16 @@ def _written_until_killed(nursery, after_lines):
     assert killer is not None, "it said too little"
     killer.join()
     return lines
+
+
+def test_a_station_killed_at_random_moments_keeps_all_that_it_acknowledged():
+    """A sample of `./run bench kills`: the outbox, the audit trail and the images too."""
+    program = Path(__file__).resolve().parents[2] / "benchmarks" / "bench_kills.py"
+    done = subprocess.run(
+        [sys.executable, program, "--rounds", "8", "--json"], capture_output=True, text=True, timeout=110, check=False
+    )
+    assert done.stdout, done.stderr[-2000:]
+    said = json.loads(done.stdout)
+    assert said["told"]["begun"] > 0
+    assert {what: number for what, number in said["wrong"].items() if number} == {}
+    assert len(said["wrong"]) == 12

@@ -1,0 +1,86 @@
+"""`station outbox`: other systems are told of inspections, lots and the audit trail."""
+
+import asyncio
+import contextlib
+import signal
+import time
+from pathlib import Path
+
+import click
+
+from station.commands.records_options import config_option
+from station.errors import StationError
+from station.outbox.status import outbox_folder, read_status
+from station.outbox.telling import destinations, keep_telling
+from station.service.logs import configure_logging
+from station.settings.configuration import Configuration, load_configuration
+from station.supervision.notify import feed_watchdog, notify
+
+_LOST_S = 30.0
+
+
+@click.group()
+def outbox() -> None:
+    """Tell other systems of inspections, lots and the audit trail: PostgreSQL, MQTT."""
+
+
+@outbox.command()
+@config_option
+def run(config: Path | None) -> None:
+    """Tell them until SIGTERM or Ctrl-C; `station run` starts this by itself where one is enabled.
+
+    It reads the records and never writes them; what cannot be told now is told later, in order.
+    """
+    configure_logging("outbox")
+    asyncio.run(_until_ended(load_configuration(config)))
+
+
+@outbox.command()
+@config_option
+def status(config: Path | None) -> None:
+    """Say how far they are told; exit code 1 where one is behind for want of a connection."""
+    site = load_configuration(config)
+    said = read_status(outbox_folder(site.home))
+    wanted = [each.name for each in destinations(site.outbox, site.home)]
+    if not wanted:
+        click.echo("no destination is enabled: see outbox.postgresql and outbox.mqtt in docs/outbox.md")
+        return
+    if said is None:
+        raise StationError("the outbox has never run here; start `station run`, or `station outbox run`")
+    for name, each in said.destinations.items():
+        waiting = "unknown how many wait" if each.waiting is None else f"{each.waiting} wait"
+        oldest = (
+            "" if each.oldest_utc_ms is None else f", the oldest for {time.time() - each.oldest_utc_ms / 1000:.0f} s"
+        )
+        connected = "connected" if each.connected else f"not connected: {each.error}"
+        click.echo(f"{name}: {each.told} told, {waiting}{oldest}, {each.refused} refused; {connected}")
+    age_s = time.time() - said.utc_ms / 1000
+    if age_s > _LOST_S:
+        raise StationError(f"the outbox was last heard {age_s:.0f} s ago; start `station run`, or `station outbox run`")
+    if not all(each.connected for each in said.destinations.values()):
+        raise StationError("not all destinations are connected; what waits is told when they are")
+
+
+async def _until_ended(site: Configuration) -> None:
+    ended, heard_s = asyncio.Event(), time.monotonic()
+
+    def progress() -> None:
+        nonlocal heard_s
+        heard_s = time.monotonic()
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    tasks = [
+        asyncio.create_task(keep_telling(site.outbox, site.home, progress), name="outbox"),
+        asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < _LOST_S), name="watchdog"),
+        asyncio.create_task(ended.wait(), name="order to end"),
+    ]
+    notify("READY=1")
+    click.echo("running; SIGTERM or Ctrl-C ends it")
+    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    for task in tasks:
+        if task.done():
+            task.result()
+        task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -1,0 +1,109 @@
+"""An MQTT broker as a destination: the same events as plain JSON, at least once and in order."""
+
+import json
+import logging
+import ssl
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+import aiomqtt
+
+from station.outbox.errors import OutboxError
+from station.outbox.feed import Batch, text_of
+from station.outbox.secrets import password
+from station.outbox.status import write_whole
+from station.settings.outbox import OutboxMqttSettings
+
+log = logging.getLogger(__name__)
+
+NAME = "mqtt"
+_TIMEOUT_S = 10
+_AT_LEAST_ONCE = 1
+
+
+class Mqtt:
+    """A publisher.
+
+    Args:
+        settings: where the broker is.
+        station: this station's name.
+        folder: where the position is kept: a broker keeps none.
+    """
+
+    name = NAME
+
+    def __init__(self, settings: OutboxMqttSettings, station: str, folder: Path) -> None:
+        self._settings, self._station, self._folder = settings, station, folder
+        self.refused = 0
+        """Always 0: a broker takes what it is given."""
+
+    @asynccontextmanager
+    async def connected(self) -> AsyncIterator["Session"]:
+        """Connect. `TOPIC/STATION/online` is `true` as long as the block lasts, then `false`: the broker's last will.
+
+        Raises:
+            OutboxError: the broker cannot be reached, or the connection was lost in the block.
+        """
+        settings = self._settings
+        root = f"{settings.topic}/{self._station}"
+        online = f"{root}/online"
+        try:
+            async with aiomqtt.Client(
+                settings.host,
+                settings.port,
+                username=settings.user,
+                password=password(settings.password_file, "MQTT_PASSWORD") if settings.user else None,
+                identifier=f"fruit-station-{self._station}",
+                tls_context=ssl.create_default_context(cafile=settings.authority) if settings.tls else None,
+                will=aiomqtt.Will(online, b"false", _AT_LEAST_ONCE, retain=True),
+                timeout=_TIMEOUT_S,
+                keepalive=20,
+            ) as client:
+                await client.publish(online, b"true", _AT_LEAST_ONCE, retain=True)
+                yield Session(client, root, self._folder / "mqtt.json")
+                await client.publish(online, b"false", _AT_LEAST_ONCE, retain=True)
+        except (aiomqtt.MqttError, OSError) as error:
+            raise OutboxError(
+                f"MQTT broker {settings.host}:{settings.port}: {error}", "see the broker and the outbox's settings"
+            ) from error
+
+
+class Session:
+    """An open connection."""
+
+    def __init__(self, client: aiomqtt.Client, root: str, position: Path) -> None:
+        self._client, self._root, self._path = client, root, position
+
+    async def position(self, lineage: Batch) -> int:
+        """The last entry that was published; at the very first start the last there is: what is past is no news.
+
+        Args:
+            lineage: any batch of the present database.
+        """
+        try:
+            kept: dict[str, int] = json.loads(self._path.read_bytes())
+        except FileNotFoundError:
+            self._keep(lineage, lineage.last)
+            return lineage.last
+        except (OSError, ValueError) as error:
+            log.warning("%s: %s; publishing goes on with what is new", self._path, error)
+            kept = {}
+        known = lineage.known(kept)
+        return lineage.last if known is None and not kept else known or 0
+
+    async def tell(self, batch: Batch) -> None:
+        """Publish a batch, each event after the broker has taken the one before.
+
+        Args:
+            batch: what comes after the position.
+        """
+        for event in batch.events:
+            now = datetime.now(UTC).isoformat(timespec="milliseconds")
+            data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}
+            await self._client.publish(f"{self._root}/{event.kind}", text_of(data).encode(), _AT_LEAST_ONCE)
+        self._keep(batch, batch.up_to)
+
+    def _keep(self, batch: Batch, position: int) -> None:
+        write_whole(self._path, json.dumps({batch.lineage[0].id: position}))

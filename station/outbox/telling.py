@@ -1,0 +1,177 @@
+"""Keeps telling: reads what is next, tells each destination, and comes back when one was away."""
+
+import asyncio
+import contextlib
+import logging
+import random
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import Protocol
+
+from station.errors import StationError
+from station.outbox.feed import LARGEST_BATCH, Batch, read_batch
+from station.outbox.mqtt import Mqtt
+from station.outbox.postgresql import Postgresql
+from station.outbox.status import DestinationStatus, outbox_folder, write_status
+from station.records.database import records_folder
+from station.records.errors import RecordsError
+from station.settings.outbox import OutboxSettings
+
+log = logging.getLogger(__name__)
+
+FIRST_PAUSE_S = 0.5
+LOOK_S = 0.5
+"""How often it is looked whether there is something new."""
+_STATUS_S = 2.0
+
+
+class Session(Protocol):
+    """An open connection to a destination."""
+
+    async def position(self, lineage: Batch) -> int:
+        """The last entry that the destination has."""
+        ...
+
+    async def tell(self, batch: Batch) -> None:
+        """Tell it; when this returns, the position is behind the batch, durably."""
+        ...
+
+
+class Destination(Protocol):
+    """Somebody who is told."""
+
+    name: str
+    refused: int
+
+    def connected(self) -> AbstractAsyncContextManager[Session]:
+        """Connect."""
+        ...
+
+
+class Teller:
+    """Tells one destination.
+
+    Args:
+        folder: the records' folder.
+        station: this station's name.
+        destination: who is told.
+        longest_pause_s: between two tries to reach it.
+    """
+
+    def __init__(self, folder: Path, station: str, destination: Destination, longest_pause_s: float) -> None:
+        self.destination = destination
+        self._folder, self._station, self._longest_pause_s = folder, station, longest_pause_s
+        self._told = 0
+        self._position: int | None = None
+        self._waiting: int | None = None
+        self._oldest_utc_ms: int | None = None
+        self._connected, self._error = False, "not yet connected"
+
+    async def run(self) -> None:
+        """Tell until cancelled."""
+        tries = 0
+        while True:
+            try:
+                async with self.destination.connected() as session:
+                    self._now(connected=True)
+                    async for _ in self._batches(session):
+                        tries = 0
+            except Exception as error:
+                if not isinstance(error, StationError):
+                    log.exception("%s: a fault of the program", self.destination.name)
+                self._now(connected=False, error=f"{error}")
+            await self._look()
+            pause_s = min(self._longest_pause_s, FIRST_PAUSE_S * 2**tries)
+            tries = min(tries + 1, 20)
+            await asyncio.sleep(pause_s * random.uniform(0.5, 1.0))  # noqa: S311 (no secret)
+
+    def status(self) -> DestinationStatus:
+        """How it does."""
+        return DestinationStatus(
+            connected=self._connected,
+            told=self._told,
+            refused=self.destination.refused,
+            waiting=self._waiting,
+            oldest_utc_ms=self._oldest_utc_ms,
+            error=self._error,
+        )
+
+    async def _look(self) -> None:
+        """See how much waits while the destination is away."""
+        if self._position is not None:
+            with contextlib.suppress(RecordsError):
+                self._note(await self._read(self._position, 1), self._position)
+
+    async def _batches(self, session: Session) -> AsyncIterator[Batch]:
+        """Tell batch after batch, as long as the connection holds."""
+        origin, position = "", 0
+        while True:
+            batch = await self._read(position, LARGEST_BATCH)
+            if batch.lineage[0].id != origin:  # at the begin, and after a restoring
+                origin, position = batch.lineage[0].id, await session.position(batch)
+                continue
+            self._note(batch, position)
+            if batch.up_to > position:
+                await session.tell(batch)
+                position = batch.up_to
+                self._told += len(batch.events)
+                self._waiting, self._position = batch.last - position, position
+            yield batch
+            if batch.last == position:
+                self._oldest_utc_ms = None
+                await asyncio.sleep(LOOK_S)
+
+    async def _read(self, position: int, limit: int) -> Batch:
+        return await asyncio.to_thread(read_batch, self._folder, self._station, position, limit)
+
+    def _note(self, batch: Batch, position: int) -> None:
+        self._position, self._waiting = position, batch.last - position
+        self._oldest_utc_ms = batch.oldest_utc_ms
+
+    def _now(self, *, connected: bool, error: str = "") -> None:
+        """Log what has changed, once."""
+        if connected and not self._connected:
+            log.info("%s: connected", self.destination.name)
+        if error and error != self._error:
+            log.warning("%s: %s", self.destination.name, error)
+        self._connected, self._error = connected, error
+
+
+def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:
+    """Those that are enabled.
+
+    Args:
+        settings: the site's.
+        home: the station's home folder.
+    """
+    chosen: list[Destination] = []
+    if settings.postgresql.enabled:
+        chosen.append(Postgresql(settings.postgresql, settings.station))
+    if settings.mqtt.enabled:
+        chosen.append(Mqtt(settings.mqtt, settings.station, outbox_folder(home)))
+    return chosen
+
+
+async def keep_telling(settings: OutboxSettings, home: Path, progress: Callable[[], None] = lambda: None) -> None:
+    """Tell every destination until cancelled, and say how it goes.
+
+    Args:
+        settings: the site's.
+        home: the station's home folder.
+        progress: called while all goes on.
+    """
+    folder = records_folder(home)
+    chosen = destinations(settings, home)
+    tellers = [Teller(folder, settings.station, each, settings.longest_pause_s) for each in chosen]
+    async with asyncio.TaskGroup() as group:
+        for teller in tellers:
+            group.create_task(teller.run(), name=f"outbox {teller.destination.name}")
+        while True:
+            try:
+                status = {teller.destination.name: teller.status() for teller in tellers}
+                await asyncio.to_thread(write_status, outbox_folder(home), status)
+            except OSError as error:
+                log.warning("the outbox's status cannot be written: %s", error)
+            progress()
+            await asyncio.sleep(_STATUS_S)

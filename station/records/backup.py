@@ -1,0 +1,205 @@
+"""A whole copy of the records, made while the station writes, verified, and there only when it is complete."""
+
+import hashlib
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from station.records.database import FILE_NAME, open_engine, plain, reading
+from station.records.errors import DamagedError, DiskFullError, RecordsError
+from station.records.failures import in_words
+from station.records.images import FOLDER_NAME, image_path
+from station.records.retention import forget_missing, referred
+from station.records.sequence_mark import LARGEST, SequenceMark, sync_folder
+from station.records.writing import utc_ms
+
+MANIFEST_NAME = "backup.json"
+MARK_NAME = "sequence"
+_PARTIAL = ".partial"
+_CHUNK_BYTES = 1 << 20
+
+
+class Manifest(BaseModel):
+    """What a backup holds, to be checked before it is used."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    form: int = 1
+    made_utc_ms: int = Field(ge=0)
+    sequence: int = Field(ge=0, le=LARGEST)
+    """The highest number that was given by then."""
+    inspections: int = Field(ge=0)
+    images: int = Field(ge=0)
+    size_bytes: int = Field(ge=0)
+    database_sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    notes: tuple[str, ...] = ()
+    """What could not be copied."""
+
+
+def make_backup(folder: Path, directory: Path) -> Manifest:
+    """Copy database and images. The database is as it was at one moment; the station is not held up.
+
+    Args:
+        folder: the records' folder.
+        directory: made by this; not there before. It lies beside as `.NAME.partial` until it is complete.
+
+    Raises:
+        RecordsError: there is something already, no space, or the disk failed; then no `directory` is left.
+    """
+    if os.path.lexists(directory):
+        raise RecordsError(f"{directory} is there already", "name a new folder; a backup never changes another one")
+    partial = directory.with_name(f".{directory.name}{_PARTIAL}")
+    try:
+        _remove(partial)
+        _room(folder, directory.parent)
+        (partial / FOLDER_NAME).mkdir(parents=True)
+        manifest = _copied(folder, partial)
+        (partial / MANIFEST_NAME).write_text(manifest.model_dump_json(indent=1), encoding="utf-8")
+        _sync(partial / MANIFEST_NAME)
+        sync_folder(partial)
+        partial.rename(directory)
+        sync_folder(directory.parent)
+    except RecordsError:
+        _remove(partial)
+        raise
+    except (OSError, sqlite3.Error) as error:
+        _remove(partial)
+        raise in_words(error, str(directory)) from error
+    return manifest
+
+
+def read_manifest(directory: Path) -> Manifest:
+    """What a backup says of itself.
+
+    Args:
+        directory: as `make_backup` made it.
+
+    Raises:
+        RecordsError: it is none, or not a whole one.
+    """
+    try:
+        return Manifest.model_validate_json((directory / MANIFEST_NAME).read_bytes())
+    except FileNotFoundError:
+        raise RecordsError(f"{directory} is no backup: it has no {MANIFEST_NAME}", "name a folder made by it") from None
+    except ValidationError as error:
+        raise DamagedError(f"{directory / MANIFEST_NAME}: {error.errors()[0]['msg']}", "take another backup") from error
+    except OSError as error:
+        raise in_words(error, str(directory)) from error
+
+
+def copy_image(source: Path, target: Path, sha256: str) -> int:
+    """Copy an image, durably, if it is what its name says.
+
+    Returns:
+        Its size in bytes.
+
+    Raises:
+        FileNotFoundError: it is not there.
+        DamagedError: its content is another.
+    """
+    content = source.read_bytes()
+    if hashlib.sha256(content).hexdigest() != sha256:
+        raise DamagedError(f"{source} is damaged: its content is not what its name says", "put back a backup")
+    target.parent.mkdir(exist_ok=True)
+    target.write_bytes(content)
+    _sync(target)
+    return len(content)
+
+
+def hash_of(path: Path) -> str:
+    """A file's SHA-256, hexadecimal."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK_BYTES):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def integrity(connection: sqlite3.Connection) -> Iterator[str]:
+    """What SQLite finds wrong with a database, up to 100 faults.
+
+    Args:
+        connection: any.
+    """
+    try:
+        for (found,) in connection.execute("PRAGMA integrity_check(100)"):
+            if found != "ok":
+                yield f"the database: {found}"
+        for table, row, parent, _ in connection.execute("PRAGMA foreign_key_check").fetchmany(100):
+            yield f"the database: row {row} of {table} refers to no row of {parent}"
+    except sqlite3.Error as error:
+        yield f"the database: {error}"
+
+
+def _copied(folder: Path, partial: Path) -> Manifest:
+    path = partial / FILE_NAME
+    with reading(folder) as live, closing(sqlite3.connect(path)) as target:
+        plain(live).backup(target)  # in one step: a reader of the write-ahead log holds up nobody
+        target.execute("PRAGMA journal_mode = DELETE")
+        faults = list(integrity(target))
+    if faults:
+        raise DamagedError(f"{folder / FILE_NAME}: {faults[0]}", "see `station records check`; keep the last backup")
+    size_bytes, notes = _copy_images(folder, partial)
+    with closing(sqlite3.connect(path)) as target:
+        inspections, last = target.execute("SELECT count(*), max(sequence) FROM inspections").fetchone()
+        images = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()[0]
+    _sync(path)
+    return Manifest(
+        made_utc_ms=utc_ms(),
+        sequence=max(SequenceMark(folder / MARK_NAME).value, last or 0),
+        inspections=inspections,
+        images=images,
+        size_bytes=size_bytes + path.stat().st_size,
+        database_sha256=hash_of(path),
+        notes=tuple(notes),
+    )
+
+
+def _copy_images(folder: Path, partial: Path) -> tuple[int, list[str]]:
+    """Copy what the copied database refers to; what the quota has removed since, it does not refer to any more."""
+    engine = open_engine(partial / FILE_NAME, "rw")
+    size_bytes, missing, damaged = 0, set[str](), list[str]()
+    try:
+        with engine.begin() as connection:
+            for sha256 in referred(connection):
+                try:
+                    size_bytes += copy_image(image_path(folder, sha256), image_path(partial, sha256), sha256)
+                except FileNotFoundError:
+                    missing.add(sha256)
+                except DamagedError as error:
+                    missing.add(sha256)
+                    damaged.append(error.cause)
+            if missing:
+                forget_missing(connection, frozenset(missing))
+        with closing(sqlite3.connect(partial / FILE_NAME)) as plain:
+            plain.execute("PRAGMA journal_mode = DELETE")
+    finally:
+        engine.dispose()
+    for subfolder in (partial / FOLDER_NAME, *(partial / FOLDER_NAME).iterdir()):
+        sync_folder(subfolder)
+    gone = len(missing) - len(damaged)
+    return size_bytes, [*damaged, *([f"{gone} images were removed or missing meanwhile"] if gone else [])]
+
+
+def _room(folder: Path, place: Path) -> None:
+    wanted = sum(file.stat().st_size for file in folder.glob(f"{FILE_NAME}*"))
+    with reading(folder) as connection:
+        wanted += sum(referred(connection).values())
+    place.mkdir(parents=True, exist_ok=True)
+    free = shutil.disk_usage(place).free
+    if free < wanted:
+        raise DiskFullError(f"{place}: {free} bytes are free, the backup takes {wanted}", "free space, or name another")
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+def _remove(partial: Path) -> None:
+    if partial.exists():
+        shutil.rmtree(partial)

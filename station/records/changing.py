@@ -1,0 +1,41 @@
+"""Changes from another process than the station's: short, between two of its writes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import Connection
+
+from station.records.audit import newer_head
+from station.records.audit_head import keep_head, read_head
+from station.records.database import FILE_NAME, open_engine
+from station.records.errors import RecordsError
+from station.records.failures import in_words
+
+
+@contextmanager
+def changing(folder: Path) -> Iterator[Connection]:
+    """One transaction, durable when the block ends; undone where it raises. The station waits meanwhile: be short.
+
+    Args:
+        folder: the records' folder.
+
+    Raises:
+        RecordsError: there are no records, or they cannot be changed.
+    """
+    path = folder / FILE_NAME
+    if not path.exists():
+        raise RecordsError(f"there is no {path}", "give the station's home folder, or let the station begin one")
+    engine = open_engine(path, "rw")
+    try:
+        with engine.begin() as connection:
+            yield connection
+            head = newer_head(connection, read_head(folder))
+        if head is not None:
+            keep_head(folder, head)
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise in_words(error, str(path)) from error
+    finally:
+        engine.dispose()

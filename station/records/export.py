@@ -1,0 +1,177 @@
+"""Inspections as a table for other programs: CSV or Parquet, written as they are read, in constant memory."""
+
+import csv
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from station.records.database import plain, reading
+from station.records.failures import in_words
+from station.records.search import Query
+from station.records.sequence_mark import LARGEST
+
+WINDOW = 10_000
+"""Numbers read in one transaction, and rows of one Parquet row group at most."""
+
+_LIST = "(SELECT json_group_array({0}) FROM (SELECT {0} FROM {1} WHERE {1}.sequence = i.sequence ORDER BY {2}))"
+_TIME = pa.timestamp("ms", tz="UTC")
+
+
+class Column(NamedTuple):
+    """One column of the table."""
+
+    name: str
+    kind: pa.DataType
+    sql: str
+    meaning: str
+
+
+COLUMNS = (
+    Column("sequence", pa.int64(), "i.sequence", "the inspection's number"),
+    Column("began", _TIME, "i.began_utc_ms", "when the trigger was accepted, UTC"),
+    Column("ended", _TIME, "i.ended_utc_ms", "when it was judged, UTC"),
+    Column("duration_ms", pa.int64(), "i.duration_ms", "from trigger to outcome, by the monotonic clock"),
+    Column("trigger_id", pa.int64(), "i.trigger_id", "the PLC's"),
+    Column("encoder", pa.int64(), "i.encoder", "the line's encoder at the trigger"),
+    Column("lot", pa.string(), "i.lot", "as the PLC named it"),
+    Column("grower", pa.string(), "l.grower", "as told with the lot's begin"),
+    Column("fruit", pa.string(), "r.name", "the recipe's name"),
+    Column("recipe_sha256", pa.string(), "i.recipe_sha256", "of the recipe as it was"),
+    Column("outcome", pa.string(), "i.outcome", "what the PLC was told, or is to be told; empty while it runs"),
+    Column("reasons", pa.list_(pa.string()), "json_extract(i.standing, '$.reasons')", "of it, the first one decided"),
+    Column("judged", pa.string(), "i.judged", "the station's own view"),
+    Column("area_mm2", pa.float64(), "i.area_mm2", "the contact area that decided"),
+    Column("area_px", pa.int64(), "i.area_px", "the same"),
+    Column("closing_mm", pa.float64(), "i.closing_mm", "where it was measured"),
+    Column("confidence", pa.float64(), "i.confidence", "0 to 1"),
+    Column("late", pa.bool_(), "i.late", "after the deadline"),
+    Column("partial", pa.bool_(), "i.partial", "before the recipe's last step"),
+    Column("simulated", pa.bool_(), "i.simulated", "a twin's device took part"),
+    Column("published", _TIME, "i.published_utc_ms", "when the PLC was told, UTC"),
+    Column("acknowledged", _TIME, "i.acknowledged_utc_ms", "when the PLC took it, UTC"),
+    Column("closings_mm", pa.list_(pa.float64()), _LIST.format("closing_mm", "curve_points", "step"), "of each step"),
+    Column("areas_mm2", pa.list_(pa.float64()), _LIST.format("area_mm2", "curve_points", "step"), "of each step"),
+    Column("images", pa.list_(pa.string()), _LIST.format("sha256", "images", "id"), "the SHA-256 of those kept"),
+)
+"""A list is JSON text in CSV."""
+SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])
+SUFFIXES = (".csv", ".parquet")
+
+Rows = Sequence[Sequence[Any]]
+
+
+def export(folder: Path, query: Query, target: Path) -> int:
+    """Write what a query finds, in order of number; the file is there when it is complete.
+
+    Args:
+        folder: the records' folder.
+        query: what to write.
+        target: with one of `SUFFIXES`; replaced.
+
+    Returns:
+        How many inspections.
+
+    Raises:
+        RecordsError: the records cannot be read, or the file not written; then `target` is as it was.
+    """
+    partial = target.with_name(f".{target.name}.partial")
+    open_writer = _csv_writer if target.suffix == ".csv" else _parquet_writer
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        number = 0
+        with open_writer(partial) as write:
+            for rows in _windows(folder, query):
+                write(rows)
+                number += len(rows)
+        partial.replace(target)
+    except OSError as error:
+        raise in_words(error, str(target)) from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return number
+
+
+def _windows(folder: Path, query: Query) -> Iterator[Rows]:
+    """The rows, a window of numbers at a time, so that no reader keeps the write-ahead log from being emptied."""
+    where, values = _conditions(query)
+    statement = (
+        f"SELECT {', '.join(column.sql for column in COLUMNS)} FROM inspections AS i"  # noqa: S608 (of constants)
+        " LEFT JOIN recipe_snapshots AS r ON r.sha256 = i.recipe_sha256 LEFT JOIN lots AS l ON l.name = i.lot"
+        f" WHERE i.sequence BETWEEN ? AND ?{where} ORDER BY i.sequence"
+    )
+    with reading(folder) as connection:
+        cursor = plain(connection).cursor()
+        first, last = cursor.execute(
+            "SELECT (SELECT min(sequence) FROM inspections), (SELECT max(sequence) FROM inspections)"
+        ).fetchone()
+        for start in range(first or 1, (last or 0) + 1, WINDOW):
+            rows = cursor.execute(statement, (start, min(start + WINDOW - 1, last, LARGEST), *values)).fetchall()
+            if rows:
+                yield rows
+
+
+def _conditions(query: Query) -> tuple[str, list[Any]]:
+    reason = (
+        "EXISTS (SELECT 1 FROM reasons WHERE reason = ? AND reasons.outcome = i.outcome "
+        "AND reasons.sequence = i.sequence)"
+    )
+    given = (
+        ("i.lot = ?", query.lot),
+        ("l.grower = ?", query.grower),
+        ("i.began_utc_ms >= ?", query.from_utc_ms),
+        ("i.began_utc_ms < ?", query.to_utc_ms),
+        ("i.outcome = ?", query.outcome),
+        (reason, query.reason),
+    )
+    chosen = [(text, value) for text, value in given if value is not None]
+    return "".join(f" AND {text}" for text, _ in chosen), [value for _, value in chosen]
+
+
+@contextmanager
+def _csv_writer(path: Path) -> Iterator[Callable[[Rows], None]]:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([column.name for column in COLUMNS])
+        kinds = [column.kind for column in COLUMNS]
+
+        def write(rows: Rows) -> None:
+            for row in rows:
+                writer.writerow([_text(kind, value) for kind, value in zip(kinds, row, strict=True)])
+
+        yield write
+
+
+@contextmanager
+def _parquet_writer(path: Path) -> Iterator[Callable[[Rows], None]]:
+    with pq.ParquetWriter(path, SCHEMA, compression="zstd") as writer:
+
+        def write(rows: Rows) -> None:
+            columns = [
+                pa.array([_value(column.kind, value) for value in values], column.kind)
+                for column, values in zip(COLUMNS, zip(*rows, strict=True), strict=True)
+            ]
+            writer.write_table(pa.Table.from_arrays(columns, schema=SCHEMA))
+
+        yield write
+
+
+def _value(kind: pa.DataType, value: Any) -> Any:
+    if value is None:
+        return None
+    if pa.types.is_list(kind):
+        return json.loads(value)
+    return bool(value) if pa.types.is_boolean(kind) else value
+
+
+def _text(kind: pa.DataType, value: Any) -> Any:
+    if value is None:
+        return ""
+    if pa.types.is_timestamp(kind):
+        return datetime.fromtimestamp(value / 1000, UTC).isoformat(timespec="milliseconds")
+    return ("true" if value else "false") if pa.types.is_boolean(kind) else value

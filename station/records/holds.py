@@ -1,0 +1,115 @@
+"""Holds: images that stay, whatever the quota says, until somebody releases them."""
+
+from typing import Any, NamedTuple
+
+from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, update
+
+from station.records.errors import RecordsError
+from station.records.schema import holds, inspections
+from station.records.writing import utc_ms
+
+
+class Hold(NamedTuple):
+    """One that stands."""
+
+    sequence: int | None
+    lot: str | None
+    """Of an inspection or of a lot."""
+    reason: str
+    by: str
+    placed_utc_ms: int
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        return f"lot {self.lot}" if self.sequence is None else f"inspection {self.sequence}"
+
+
+def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
+    """Keep the images of an inspection or a lot. Idempotent: the first reason stands.
+
+    Args:
+        connection: the writer's.
+        thing: the inspection's sequence, or the lot's name.
+        reason: why.
+        by: who.
+
+    Raises:
+        RecordsError: there is no such inspection or lot, or no reason.
+    """
+    _given(reason)
+    standing = _standing(connection, thing)
+    if standing is not None:
+        return standing
+    table = inspections.c
+    condition = table.sequence == thing if isinstance(thing, int) else table.lot == thing
+    if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
+        raise RecordsError(f"there is no {_named(thing)}", "`station records list` shows what there is")
+    connection.execute(insert(holds).values(**_key(thing), reason=reason, by=by, placed_utc_ms=utc_ms()))
+    held = _standing(connection, thing)
+    if held is None:
+        raise RuntimeError("a hold was inserted and is not there")
+    return held
+
+
+def release(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
+    """Let the images go where the quota wants it; the hold itself is kept as history.
+
+    Args:
+        connection: the writer's.
+        thing: as held.
+        reason: why.
+        by: who.
+
+    Raises:
+        RecordsError: it is not held, or no reason.
+    """
+    _given(reason)
+    standing = _standing(connection, thing)
+    if standing is None:
+        raise RecordsError(f"{_named(thing)} is not on hold", "`station records holds` shows what is")
+    connection.execute(
+        update(holds)
+        .where(_is(thing), holds.c.released_utc_ms.is_(None))
+        .values(released_utc_ms=utc_ms(), released_by=by, release_reason=reason)
+    )
+    return standing
+
+
+def read_holds(connection: Connection) -> list[Hold]:
+    """Those that stand, oldest first."""
+    rows = connection.execute(select(*_COLUMNS).where(holds.c.released_utc_ms.is_(None)).order_by(holds.c.id))
+    return [Hold(*row) for row in rows]
+
+
+def is_held() -> ColumnElement[bool]:
+    """Whether the inspection of the query around it is on hold."""
+    return exists().where(
+        holds.c.released_utc_ms.is_(None),
+        or_(holds.c.sequence == inspections.c.sequence, holds.c.lot == inspections.c.lot),
+    )
+
+
+_COLUMNS = (holds.c.sequence, holds.c.lot, holds.c.reason, holds.c.by, holds.c.placed_utc_ms)
+
+
+def _key(thing: int | str) -> dict[str, Any]:
+    return {"sequence": thing} if isinstance(thing, int) else {"lot": thing}
+
+
+def _is(thing: int | str) -> ColumnElement[bool]:
+    return holds.c.sequence == thing if isinstance(thing, int) else holds.c.lot == thing
+
+
+def _standing(connection: Connection, thing: int | str) -> Hold | None:
+    row = connection.execute(select(*_COLUMNS).where(_is(thing), holds.c.released_utc_ms.is_(None))).one_or_none()
+    return None if row is None else Hold(*row)
+
+
+def _named(thing: int | str) -> str:
+    return f"inspection {thing}" if isinstance(thing, int) else f"lot {thing!r}"
+
+
+def _given(reason: str) -> None:
+    if not reason.strip():
+        raise RecordsError("no reason was given", "say why, for whoever asks later")

@@ -1,0 +1,106 @@
+"""Lots as people or the packhouse's system tell of them: which grower's, from when to when."""
+
+from typing import NamedTuple
+
+from sqlalchemy import Connection, insert, select, update
+
+from station.records.errors import RecordsError
+from station.records.schema import lots
+from station.records.writing import tell, utc_ms
+
+LONGEST_NAME = 32
+"""As the PLC gives it: `station.channel.line.Begin.lot`."""
+
+
+class Lot(NamedTuple):
+    """One lot."""
+
+    name: str
+    grower: str
+    began_utc_ms: int
+    ended_utc_ms: int | None
+    """None while it runs."""
+    revision: int
+    """Counts the changes, from 1."""
+
+
+def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> Lot:
+    """Tell of a lot's begin. Idempotent.
+
+    Args:
+        connection: the writer's.
+        name: as the PLC gives it with each trigger.
+        grower: whose fruit it is.
+        correct: put this grower in the place of the one told before.
+
+    Raises:
+        RecordsError: the name or grower is none, or the lot is another grower's.
+    """
+    for what, text in (("lot", name), ("grower", grower)):
+        if not text.strip() or not text.isprintable():
+            raise RecordsError(f"the {what} {text!r} is no name", "give one of printable letters")
+    if len(name) > LONGEST_NAME:
+        raise RecordsError(f"the lot's name has {len(name)} letters", f"the PLC gives at most {LONGEST_NAME}")
+    known = _known(connection, name)
+    if known is None:
+        connection.execute(insert(lots).values(name=name, grower=grower, began_utc_ms=utc_ms(), revision=1))
+    elif known.grower == grower:
+        return known
+    elif not correct:
+        raise RecordsError(
+            f"lot {name} is told to be of {known.grower} already, not of {grower}",
+            "give the new lot another name, or correct it: station records lot start --correct",
+        )
+    else:
+        _change(connection, known, grower=grower)
+    return _told(connection, name)
+
+
+def end_lot(connection: Connection, name: str) -> Lot:
+    """Tell of a lot's end. Idempotent.
+
+    Raises:
+        RecordsError: nobody told of its begin.
+    """
+    known = _known(connection, name)
+    if known is None:
+        raise RecordsError(f"there is no lot {name!r}", "tell of its begin first: station records lot start")
+    if known.ended_utc_ms is not None:
+        return known
+    _change(connection, known, ended_utc_ms=utc_ms())
+    return _told(connection, name)
+
+
+def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[Lot]:
+    """The lots told of, newest first.
+
+    Args:
+        connection: any.
+        limit: at most so many.
+        grower: of this one; of all by default.
+        name: only the lot of this name.
+    """
+    query = select(*_COLUMNS).order_by(lots.c.id.desc()).limit(limit)
+    for column, wanted in ((lots.c.grower, grower), (lots.c.name, name)):
+        if wanted is not None:
+            query = query.where(column == wanted)
+    return [Lot(*row) for row in connection.execute(query)]
+
+
+_COLUMNS = (lots.c.name, lots.c.grower, lots.c.began_utc_ms, lots.c.ended_utc_ms, lots.c.revision)
+
+
+def _known(connection: Connection, name: str) -> Lot | None:
+    row = connection.execute(select(*_COLUMNS).where(lots.c.name == name)).one_or_none()
+    return None if row is None else Lot(*row)
+
+
+def _change(connection: Connection, lot: Lot, **values: object) -> None:
+    connection.execute(update(lots).where(lots.c.name == lot.name).values(**values, revision=lot.revision + 1))
+
+
+def _told(connection: Connection, name: str) -> Lot:
+    """The lot as it is now, and told to other systems."""
+    row = connection.execute(select(lots.c.id, *_COLUMNS).where(lots.c.name == name)).one()
+    tell(connection, "lot", row.id)
+    return Lot(*row[1:])

@@ -1,0 +1,57 @@
+"""Which images go when space is wanted, and what is found of them after a crash."""
+
+from sqlalchemy import Connection, delete, func, select
+
+from station.records.holds import is_held
+from station.records.schema import images, inspections
+from station.records.writing import add_event, add_images
+
+
+def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:
+    """Forget the images of the oldest accepted, or the oldest other inspection that has some and is not on hold.
+
+    Returns:
+        The freed bytes and the names of the files that nothing refers to any more; None where there is none.
+    """
+    kind = inspections.c.outcome == "PASS" if accepted else inspections.c.outcome != "PASS"
+    oldest = connection.scalar(
+        select(images.c.sequence)
+        .join(inspections, inspections.c.sequence == images.c.sequence)
+        .where(kind, ~is_held())
+        .order_by(images.c.sequence)
+        .limit(1)
+    )
+    if oldest is None:
+        return None
+    rows = connection.execute(select(images.c.sha256, images.c.size_bytes).where(images.c.sequence == oldest)).all()
+    connection.execute(delete(images).where(images.c.sequence == oldest))
+    sizes = {row.sha256: row.size_bytes for row in rows}
+    kept = connection.scalars(select(images.c.sha256).where(images.c.sha256.in_(sizes))).all()
+    free = {name: size for name, size in sizes.items() if name not in kept}
+    add_images(connection, oldest, (), "removed: space for newer ones")
+    return sum(free.values()), list(free)
+
+
+def referred(connection: Connection) -> dict[str, int]:
+    """The files that rows refer to, with their sizes."""
+    query = select(images.c.sha256, func.max(images.c.size_bytes)).group_by(images.c.sha256)
+    return {name: size for name, size in connection.execute(query)}  # noqa: C416 (rows are no pairs to dict)
+
+
+def forget_missing(connection: Connection, missing: frozenset[str]) -> None:
+    """Say of every inspection whose files are not there that they are lost; the events keep which they were.
+
+    Args:
+        connection: the writer's.
+        missing: the files' names.
+    """
+    columns = images.c
+    rows = connection.execute(select(columns.id, columns.sequence, columns.sha256).order_by(columns.sequence))
+    lost: dict[int, dict[int, str]] = {}
+    for row in rows:
+        if row.sha256 in missing:
+            lost.setdefault(row.sequence, {})[row.id] = row.sha256
+    for sequence, names in lost.items():
+        connection.execute(delete(images).where(columns.id.in_(names)))
+        add_images(connection, sequence, (), f"lost: {len(names)} of its files were found missing")
+        add_event(connection, "images_missing", sequence, {"sha256": list(names.values())})

@@ -1,0 +1,217 @@
+"""Inspections found by lot, grower, time, outcome and reason, newest first, a page at a time.
+
+Each condition is a list of numbers in an index, which answers "the highest one not above this" with one look. A page is
+the intersection of such lists, by leaps ("leapfrog join", Veldhuizen, ICDT 2014, section 3): a condition that holds
+nowhere near is left behind in one leap, and nothing is counted, sorted or read twice. SQL alone would choose one index
+and read all that it names.
+"""
+
+import heapq
+import sqlite3
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import NamedTuple
+
+from sqlalchemy import Connection
+
+from station.channel.line import OutcomeName, Reason
+from station.records.database import plain
+from station.records.errors import RecordsError
+from station.records.finding import HOUR_MS
+from station.records.reading import Summary, read_summaries
+from station.records.sequence_mark import LARGEST
+
+LARGEST_PAGE = 1000
+
+Seek = Callable[[int], int | None]
+"""The highest number of a list that is not above this one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """What is looked for: all that is given has to hold."""
+
+    lot: str | None = None
+    grower: str | None = None
+    """Of the lot, as it was told with the lot's begin."""
+    from_utc_ms: int | None = None
+    """Begun at this time or later."""
+    to_utc_ms: int | None = None
+    """Begun before this time."""
+    outcome: OutcomeName | None = None
+    """What stands."""
+    reason: Reason | None = None
+    """One of what stands, not only the first."""
+
+
+class Page(NamedTuple):
+    """Some of what was found, newest first."""
+
+    rows: tuple[Summary, ...]
+    below: int | None
+    """What to ask with for the next page; None where this is the last."""
+
+
+def find_page(connection: Connection, query: Query, limit: int = 50, below: int | None = None) -> Page:
+    """One page.
+
+    Args:
+        connection: any.
+        query: what is looked for.
+        limit: at most so many, up to `LARGEST_PAGE`.
+        below: of the page before; None for the first.
+
+    Raises:
+        RecordsError: the limit is none.
+    """
+    if not 1 <= limit <= LARGEST_PAGE:
+        raise RecordsError(f"a page of {limit} inspections", f"ask for 1 to {LARGEST_PAGE}")
+    found = list(islice(find(connection, query, LARGEST if below is None else below - 1), limit + 1))
+    rows = tuple(read_summaries(connection, found[:limit]))
+    return Page(rows, found[limit - 1] if len(found) > limit else None)
+
+
+def find(connection: Connection, query: Query, highest: int = LARGEST) -> Iterator[int]:
+    """The numbers of what is found, highest first, as the database is now.
+
+    Args:
+        connection: any; in use until the last was taken.
+        query: what is looked for.
+        highest: none above this one.
+    """
+    database = plain(connection)
+    lists = _lists(database, query)
+    timed = query.from_utc_ms is not None or query.to_utc_ms is not None
+    earliest, latest = query.from_utc_ms or 0, 2**63 - 1 if query.to_utc_ms is None else query.to_utc_ms - 1
+    number: int | None = highest
+    while number is not None and (number := _common(lists, number)) is not None:
+        if not timed or earliest <= _began(database, number) <= latest:
+            yield number
+        number -= 1
+
+
+def _common(lists: list[Seek], highest: int) -> int | None:
+    """The highest number that is in every list."""
+    while True:
+        number = highest
+        for seek in lists:
+            found = seek(number)
+            if found is None:
+                return None
+            number = found
+        if number == highest:
+            return number
+        highest = number
+
+
+def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
+    """The lists, those that are likely to be short first."""
+    lists: list[Seek] = []
+    if query.from_utc_ms is not None or query.to_utc_ms is not None:
+        lists.append(_in_time(database, query.from_utc_ms or 0, query.to_utc_ms))
+    if query.reason is not None:
+        lists.append(_with_reason(database, query.reason, query.outcome))
+    if query.grower is not None:
+        lists.append(_of_grower(database, query.grower, query.outcome))
+    if query.lot is not None:
+        lists.append(_of_lot(database, query.lot, query.outcome))
+    elif query.outcome is not None and query.reason is None and query.grower is None:
+        lists.append(
+            _seek(
+                database,
+                "SELECT sequence FROM inspections INDEXED BY ix_inspections_outcome WHERE outcome = ? "
+                "AND sequence <= ? ORDER BY sequence DESC LIMIT 1",
+                query.outcome,
+            )
+        )
+    if query.lot is None and query.outcome is None and query.reason is None and query.grower is None:
+        lists.append(
+            _seek(database, "SELECT sequence FROM inspections WHERE sequence <= ? ORDER BY sequence DESC LIMIT 1")
+        )
+    return lists
+
+
+def _seek(database: sqlite3.Connection, statement: str, *values: str) -> Seek:
+    cursor = database.cursor()
+
+    def seek(highest: int) -> int | None:
+        found = cursor.execute(statement, (*values, highest)).fetchone()
+        return found and found[0]
+
+    return seek
+
+
+def _with_reason(database: sqlite3.Connection, reason: Reason, outcome: OutcomeName | None) -> Seek:
+    """Of one outcome, or of the two that have reasons."""
+    statement = (
+        "SELECT sequence FROM reasons WHERE reason = ? AND outcome = ? AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
+    )
+    seeks = [_seek(database, statement, reason, each) for each in ([outcome] if outcome else ["FAIL", "NO_RESULT"])]
+
+    def seek(highest: int) -> int | None:
+        return max((found for each in seeks if (found := each(highest)) is not None), default=None)
+
+    return seek
+
+
+def _of_lot(database: sqlite3.Connection, lot: str, outcome: OutcomeName | None) -> Seek:
+    return _seek(database, _lot_statement("?", outcome), lot, *([outcome] if outcome else []))
+
+
+def _lot_statement(lot: str, outcome: OutcomeName | None) -> str:
+    index, also = ("ix_inspections_lot_outcome", "AND outcome = ?") if outcome else ("ix_inspections_lot", "")
+    return (
+        f"SELECT sequence FROM inspections INDEXED BY {index} WHERE lot = {lot} {also} "  # noqa: S608 (of constants)
+        "AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
+    )
+
+
+def _of_grower(database: sqlite3.Connection, grower: str, outcome: OutcomeName | None) -> Seek:
+    """The lots' lists merged: a heap of each one's highest number not above the last that was asked for."""
+    chosen = (outcome,) if outcome else ()
+    head = _lot_statement("lots.name", outcome)
+    heads = database.execute(
+        f"SELECT name, ({head}) AS head FROM lots WHERE grower = ? AND head NOT NULL",  # noqa: S608 (of constants)
+        (*chosen, LARGEST, grower),
+    )
+    heap = [(-head, lot) for lot, head in heads]
+    heapq.heapify(heap)
+    statement, cursor = _lot_statement("?", outcome), database.cursor()
+
+    def seek(highest: int) -> int | None:
+        while heap and -heap[0][0] > highest:
+            lot = heap[0][1]
+            found = cursor.execute(statement, (lot, *chosen, highest)).fetchone()
+            if found is None:
+                heapq.heappop(heap)
+            else:
+                heapq.heapreplace(heap, (-found[0], lot))
+        return -heap[0][0] if heap else None
+
+    return seek
+
+
+def _in_time(database: sqlite3.Connection, from_utc_ms: int, to_utc_ms: int | None) -> Seek:
+    """The spans of numbers begun in the hours asked for."""
+    last_hour = 2**62 if to_utc_ms is None else (to_utc_ms - 1) // HOUR_MS
+    spans = database.execute(
+        "SELECT first_sequence, coalesce((SELECT next.first_sequence FROM hours AS next WHERE next.first_sequence > "
+        "hours.first_sequence ORDER BY next.first_sequence LIMIT 1) - 1, ?) FROM hours WHERE hour BETWEEN ? AND ? "
+        "ORDER BY first_sequence",
+        (LARGEST, from_utc_ms // HOUR_MS, last_hour),
+    ).fetchall()
+    firsts = [first for first, _ in spans]
+
+    def seek(highest: int) -> int | None:
+        at = bisect_right(firsts, highest) - 1
+        return None if at < 0 else min(highest, spans[at][1])
+
+    return seek
+
+
+def _began(database: sqlite3.Connection, number: int) -> int:
+    """When an inspection began; before all time where there is none with this number."""
+    row = database.execute("SELECT began_utc_ms FROM inspections WHERE sequence = ?", (number,)).fetchone()
+    return -1 if row is None else row[0]

@@ -1,0 +1,114 @@
+"""A PostgreSQL and an MQTT broker of the test's own, and records with many inspections."""
+
+import importlib.util
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LIMIT_S = 60.0
+
+
+def _helper(name: str) -> ModuleType:
+    """A module that benchmarks share with these tests."""
+    specification = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / "archive" / f"{name}.py")
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def _missing(what: str) -> None:
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
+    pytest.skip(f"{what} is missing on this machine")
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Any]:
+    """A running PostgreSQL with our tables."""
+    postgres = _helper("postgres")
+    programs = postgres.programs()
+    if programs is None:
+        _missing("postgresql")
+    with postgres.throwaway(programs) as started:
+        yield started
+
+
+@pytest.fixture
+def fill() -> Callable[..., None]:
+    """Write many inspections into a records' folder."""
+    return _helper("many").fill
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator["Broker"]:
+    """A running mosquitto that wants a password."""
+    if shutil.which("mosquitto") is None:
+        _missing("mosquitto")
+    running = Broker(tmp_path)
+    running.start()
+    yield running
+    running.stop()
+
+
+class Broker:
+    """A mosquitto in a folder of the test's."""
+
+    user, password = "station", "not for the log"
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.password_file = folder / "mqtt-password"
+        self.password_file.touch(0o600)
+        self.password_file.write_text(self.password + "\n")
+        known = folder / "passwords"
+        known.touch(0o600)
+        subprocess.run(["mosquitto_passwd", "-b", known, self.user, self.password], check=True, capture_output=True)
+        self._configuration = folder / "mosquitto.conf"
+        self._configuration.write_text(
+            f"listener {self.port} 127.0.0.1\nallow_anonymous false\npassword_file {known}\nuser root\n"
+        )
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        self._process = subprocess.Popen(["mosquitto", "-c", self._configuration], stdout=-3, stderr=-3)
+        until_s = time.monotonic() + LIMIT_S
+        while time.monotonic() < until_s:
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
+                    return
+            time.sleep(0.02)
+        pytest.fail("mosquitto does not listen")
+
+    def stop(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._process = None
+
+
+@pytest.fixture
+def command(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `station …` as a user does, with the home `tmp_path`."""
+
+    def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "station", *map(str, arguments)],
+            capture_output=True, text=True, timeout=100, check=False,
+            env={**os.environ, "STATION_HOME": str(tmp_path), **environment},
+        )  # fmt: skip
+
+    return run

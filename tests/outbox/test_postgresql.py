@@ -1,0 +1,196 @@
+"""Rows reach a real PostgreSQL once each and in order, whatever becomes of it meanwhile."""
+
+import asyncio
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from station.outbox.errors import OutboxError
+from station.outbox.feed import read_batch
+from station.outbox.postgresql import Postgresql
+from station.records.audit import AuditEntry, append_audit
+from station.records.backup import make_backup
+from station.records.changing import changing
+from station.records.database import FILE_NAME
+from station.records.lots import end_lot, start_lot
+from station.records.restoring import restore_backup
+from station.records.writing import tell
+from station.settings.outbox import OutboxPostgresqlSettings
+
+LIMIT_S = 90.0
+
+
+def settings(server, **changes):
+    return OutboxPostgresqlSettings(
+        **{"enabled": True, "host": str(server.folder), "port": 5432, "user": "fruit", "tls": "disable", **changes}
+    )
+
+
+def rows(server, query, *values):
+    with server.connect() as connection:
+        return connection.execute(query, values).fetchall()
+
+
+async def tell_all(server, folder, station):
+    """Tell until nothing waits; how many entries that were."""
+    told = 0
+    async with Postgresql(settings(server), station).connected() as session:
+        position = await session.position(read_batch(folder, station, 0))
+        while (batch := read_batch(folder, station, position)).up_to > position:
+            await session.tell(batch)
+            told, position = told + len(batch.events), batch.up_to
+    return told
+
+
+def test_three_stations_lose_and_double_nothing_while_the_server_is_cut_crashed_and_stopped():
+    """15,000 inspections; `./run bench outbox` does it with 100,000."""
+    program = Path(__file__).resolve().parents[2] / "benchmarks" / "bench_outbox.py"
+    if not list(Path("/usr/lib/postgresql").glob("*/bin/initdb")):
+        pytest.skip("the fixture of the other tests says whether this may be")
+    done = subprocess.run(
+        [sys.executable, program, "--rows", "15000", "--json"], capture_output=True, text=True, timeout=110, check=False
+    )
+    assert done.stdout, done.stderr[-2000:]
+    said = json.loads(done.stdout)
+    assert said["wrong"] == {"missing": 0, "doubled": 0, "out of order": 0, "refused": 0}
+    assert said["done"]["cut"] > 0
+    assert said["done"]["crashed"] == said["done"]["stopped"] == 3
+
+
+def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, tmp_path):
+    fill(tmp_path, 1, 3, steps=4)
+    with changing(tmp_path) as connection:
+        start_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", "Meier")
+        end_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}")
+        append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing", "to see", {"a": 1}, [2]))
+    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 5
+    query = "SELECT lot, outcome, reasons, area_mm2, fruit, jsonb_array_length(curve), began::text FROM inspections"
+    first, *_ = rows(server, f"{query} WHERE station = 'as-they-are' ORDER BY sequence")
+    assert first == ("L00000", "PASS", [], 21.0, "strawberry", 4, "2026-01-01 00:00:03+00")
+    ((grower, ended, revision),) = rows(server, "SELECT grower, ended, revision FROM lots WHERE name = 'Aü'")
+    assert (grower, revision, ended is None) == ("Meier", 2, False)
+    ((who, old, new, digest),) = rows(server, "SELECT who, old, new, hash FROM audit WHERE station = 'as-they-are'")
+    with sqlite3.connect(tmp_path / FILE_NAME) as database:
+        assert (digest,) == database.execute("SELECT hash FROM audit").fetchone()
+    database.close()
+    assert (who, old, new) == ("ada", '{"a":1}', "[2]")
+    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 0, "the server knows how far it was told"
+
+
+def test_a_row_that_changed_is_told_again_and_is_there_once(server, fill, tmp_path):
+    fill(tmp_path, 1, 2, steps=0)
+    asyncio.run(tell_all(server, tmp_path, "changed"))
+    with changing(tmp_path) as connection:
+        connection.exec_driver_sql("UPDATE inspections SET images_state = 'kept' WHERE sequence = 2")
+        tell(connection, "inspection", 2)
+    asyncio.run(tell_all(server, tmp_path, "changed"))
+    found = rows(server, "SELECT sequence, images_state FROM inspections WHERE station = 'changed' ORDER BY sequence")
+    assert found == [(1, "not wanted"), (2, "kept")]
+
+
+def test_what_no_database_can_hold_is_kept_apart_and_nothing_waits_behind_it(server, fill, tmp_path):
+    fill(tmp_path, 1, 4, steps=0)
+    with sqlite3.connect(tmp_path / FILE_NAME) as database:
+        database.execute("UPDATE inspections SET lot = 'nul' || char(0) || 'inside' WHERE sequence = 1")
+        database.execute("UPDATE inspections SET trigger_id = 5000000000 WHERE sequence = 2")
+        database.execute("UPDATE inspections SET began_utc_ms = 9000000000000000 WHERE sequence = 3")
+    database.close()
+    asyncio.run(tell_all(server, tmp_path, "odd"))
+    found = rows(server, "SELECT sequence, lot FROM inspections WHERE station = 'odd' ORDER BY sequence")
+    assert found == [(1, "nul\N{REPLACEMENT CHARACTER}inside"), (3, "L00000"), (4, "L00000")]
+    ((kind, entry, why),) = rows(server, "SELECT kind, entry, error FROM refused WHERE station = 'odd'")
+    assert (kind, entry) == ("inspection", 2)
+    assert "out of range" in why
+
+
+def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):
+    folder, copy = tmp_path / "records", tmp_path / "copy"
+    fill(folder, 1, 5, steps=0)
+    make_backup(folder, copy)
+    fill(folder, 6, 8, steps=0)
+    asyncio.run(tell_all(server, folder, "restored"))
+    restore_backup(folder, copy, "ada")
+    fill(folder, 9, 10, steps=0)
+    told = asyncio.run(tell_all(server, folder, "restored"))
+    assert told == 1 + 2, "the restoring itself, two inspections, and not all from the first again"
+    found = rows(server, "SELECT sequence FROM inspections WHERE station = 'restored' ORDER BY sequence")
+    assert [number for (number,) in found] == [*range(1, 11)]
+
+
+def test_two_processes_cannot_tell_as_one_station(server):
+    async def steps():
+        async with Postgresql(settings(server), "one").connected():
+            with pytest.raises(OutboxError, match=r"another process tells as one; give each station a name of its own"):
+                async with Postgresql(settings(server), "one").connected():
+                    pass
+
+    asyncio.run(steps())
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"database": "postgres"}, "has no tables of ours; load deploy/postgresql/schema.sql there"),
+        ({"host": "/nowhere"}, "see the server and the outbox's settings"),
+        ({"user": "stranger"}, 'role "stranger" does not exist'),
+    ],
+)
+def test_what_is_wrong_is_said(server, changes, said):
+    async def steps():
+        async with Postgresql(settings(server, **changes), "wrong").connected():
+            pass
+
+    with pytest.raises(OutboxError, match=said):
+        asyncio.run(steps())
+
+
+def test_a_station_may_add_to_the_trail_and_not_change_it(server, fill, tmp_path):
+    """The rights that the schema gives a station's login are enough, and no more."""
+    with server.connect() as connection:
+        connection.execute("CREATE ROLE limited LOGIN IN ROLE fruit_station")
+    fill(tmp_path, 1, 2, steps=0)
+    with changing(tmp_path) as connection:
+        append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing"))
+
+    async def steps():
+        async with Postgresql(settings(server, user="limited"), "limited").connected() as session:
+            await session.tell(read_batch(tmp_path, "limited", 0))
+
+    asyncio.run(steps())
+    assert rows(server, "SELECT count(*) FROM audit WHERE station = 'limited'") == [(1,)]
+    refused = psycopg.errors.InsufficientPrivilege
+    with psycopg.connect(host=str(server.folder), user="limited", dbname="fruit") as mine, pytest.raises(refused):
+        mine.execute("UPDATE audit SET who = 'nobody'")
+
+
+def test_the_process_tells_says_how_far_and_ends_in_order(server, fill, tmp_path, command):
+    fill(tmp_path / "records", 1, 40, steps=1)
+    site = {
+        "STATION_OUTBOX_STATION": "by-process",
+        "STATION_OUTBOX_POSTGRESQL_ENABLED": "true",
+        "STATION_OUTBOX_POSTGRESQL_HOST": str(server.folder),
+        "STATION_OUTBOX_POSTGRESQL_USER": "fruit",
+        "STATION_OUTBOX_POSTGRESQL_TLS": "disable",
+    }
+    environment = {**os.environ, "STATION_HOME": str(tmp_path), **site}
+    arguments = [sys.executable, "-m", "station", "outbox", "run"]
+    with subprocess.Popen(arguments, env=environment, stdout=-3, stderr=-1, text=True) as process:
+        until_s = time.monotonic() + LIMIT_S
+        query = "SELECT count(*) FROM inspections WHERE station = 'by-process'"
+        while rows(server, query) != [(40,)] and time.monotonic() < until_s:
+            time.sleep(0.1)
+        assert rows(server, query) == [(40,)]
+        said = command("outbox", "status", **site)
+        while "40 told, 0 wait" not in said.stdout and time.monotonic() < until_s:
+            said = command("outbox", "status", **site)
+        assert "postgresql: 40 told, 0 wait, 0 refused; connected" in said.stdout
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(LIMIT_S) == 0

@@ -1,0 +1,202 @@
+"""Held images stay; a copy is whole; a check finds what is wrong; and what is put back goes on."""
+
+import asyncio
+import json
+import shutil
+import sqlite3
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+
+from station.cli import cli
+from station.records.backup import MANIFEST_NAME, make_backup
+from station.records.checking import check_records
+from station.records.database import FILE_NAME
+from station.records.errors import DamagedError, DiskFullError, LockedError, RecordsError
+from station.records.holds import hold, release
+from station.records.restoring import restore_backup
+
+
+@pytest.fixture
+def ask(folder):
+    def run(*arguments):
+        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
+
+    return run
+
+
+@pytest.fixture
+def inspected(trigger, failed, settled):
+    """Inspect so many rejected fruit, each with these images."""
+
+    async def inspect(records, number, *images):
+        for _ in range(number):
+            sequence = await records.begin(trigger)
+            await records.published(await records.conclude(sequence, replace(failed, images=images)))
+            await settled(records)
+
+    return inspect
+
+
+def names(folder):
+    return sorted(file.stem for file in (folder / "images").glob("*/*.png"))
+
+
+def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected, noise, folder, ask):
+    """An image is 0.3 MB, so that 3 fit."""
+
+    async def steps():
+        async with opened(images_quota_mb=1) as records:
+            for _ in range(3):
+                await inspected(records, 1, noise(side_px=320))
+            said = await asyncio.to_thread(ask, "hold", 1, "--reason", "a complaint", "--by", "ada")
+            assert "inspection 1 is on hold" in said.output
+            for _ in range(2):
+                await inspected(records, 1, noise(side_px=320))
+            states = [(await records.inspection(number)).images_state for number in (1, 2, 3)]
+            assert states == ["kept", "removed: space for newer ones", "removed: space for newer ones"]
+            await records.change(lambda connection: hold(connection, "A-17", "the whole lot", "ada"))
+            await inspected(records, 1, noise(side_px=320))
+            last = await records.inspection(6)
+            assert last.images_state == "dropped: the quota is full of images of rejected fruit, or on hold"
+            await records.change(lambda connection: release(connection, "A-17", "all is well", "ada"))
+            assert (await asyncio.to_thread(ask, "release", 1, "--reason", "answered")).exit_code == 0
+            await inspected(records, 1, noise(side_px=320))
+            assert (await records.inspection(1)).images_state.startswith("removed")
+
+    scenario(steps)
+    assert ask("holds").output == ""
+    for arguments in (("hold", 99), ("release", 1), ("hold", "nowhere")):
+        said = ask(*arguments, "--reason", "why not")
+        assert said.exit_code == 1
+        assert "records list` shows" in str(said.exception) or "is not on hold" in str(said.exception)
+    assert ask("hold", 1, "--reason", " ").exit_code == 1
+
+
+def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
+    opened, scenario, inspected, noise, folder, tmp_path, ask
+):
+    copy = tmp_path / "copy"
+
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 3, noise())
+            writing = asyncio.create_task(inspected(records, 10, noise()))
+            made = await asyncio.to_thread(make_backup, folder, copy)
+            await writing
+            assert 3 <= made.inspections <= 13
+            assert made.notes == ()
+            with pytest.raises(LockedError, match="stop that one"):
+                await asyncio.to_thread(restore_backup, folder, copy, "ada")
+        return made
+
+    made = scenario(steps)
+    assert "is there already" in str(ask("backup", copy).exception)
+    last = sqlite3.connect(folder / FILE_NAME).execute("SELECT max(sequence) FROM inspections").fetchone()[0]
+    shutil.rmtree(folder / "images")
+    said = ask("restore", copy, "--by", "ada")
+    assert f"restored {made.inspections} inspections and {made.images} images" in said.output
+    found = check_records(folder)
+    assert (found.faults, found.inspections, found.images) == ((), made.inspections, made.images)
+    (aside,) = (folder / "aside").iterdir()
+    assert sqlite3.connect(aside / FILE_NAME).execute("SELECT max(sequence) FROM inspections").fetchone()[0] == last
+
+    async def goes_on():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+            assert (await records.inspection(last + 1)).images_state == "kept", "no number is given twice"
+
+    scenario(goes_on)
+
+
+@pytest.mark.parametrize("spoiled", [FILE_NAME, "image", MANIFEST_NAME])
+def test_a_backup_that_is_not_whole_is_not_put_back(opened, scenario, inspected, noise, folder, tmp_path, spoiled):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    make_backup(folder, tmp_path / "copy")
+    path = tmp_path / "copy" / spoiled
+    if spoiled == "image":
+        (path,) = (tmp_path / "copy" / "images").glob("*/*.png")
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+    before = (folder / FILE_NAME).read_bytes()
+    with pytest.raises(DamagedError, match=r"take another backup|put back a backup"):
+        restore_backup(folder, tmp_path / "copy", "ada")
+    assert (folder / FILE_NAME).read_bytes() == before
+    assert names(folder)
+    assert not (folder / "aside").exists()
+
+
+def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario, inspected, noise, folder, small_disk):
+    async def steps():
+        async with opened() as records:
+            for _ in range(5):
+                await inspected(records, 1, noise(side_px=700))
+
+    scenario(steps)
+    with pytest.raises(DiskFullError, match="bytes are free, the backup takes"):
+        make_backup(folder, small_disk / "copy")
+    assert list(small_disk.iterdir()) == []
+    with pytest.raises(RecordsError, match="is no backup"):
+        restore_backup(folder, small_disk, "ada")
+
+
+def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
+    opened, scenario, inspected, noise, folder, ask, trigger
+):
+    async def steps():
+        async with opened() as records:
+            for _ in range(3):
+                await inspected(records, 1, noise())
+
+    scenario(steps)
+    assert "3 inspections and 3 images checked" in ask("check").output
+    first, second, _ = (folder / "images" / name[:2] / f"{name}.png" for name in names(folder))
+    second.write_bytes(b"something else")
+    first.rename(first.with_stem("f" * 64))
+    said = ask("check")
+    assert said.exit_code == 1
+    assert f"fault: {first}: missing, though an inspection refers to it" in said.output
+    assert f"fault: {second}: its content is not what its name says" in said.output
+    assert "note: 1 image files belong to no inspection" in said.output
+
+    async def again():
+        async with opened() as records:
+            await records.begin(trigger)
+            while records.status().queue or not (folder / "images").exists():
+                await asyncio.sleep(0.01)
+            async with asyncio.timeout(20):
+                while first.with_stem("f" * 64).exists():
+                    await asyncio.sleep(0.01)
+                states = ["kept"]
+                while not any(state.startswith("lost") for state in states):
+                    states = [(await records.inspection(number)).images_state for number in (1, 2, 3)]
+        return states
+
+    assert "lost: 1 of its files were found missing" in scenario(again)
+    with sqlite3.connect(folder / FILE_NAME) as database:
+        ((details,),) = database.execute("SELECT details FROM events WHERE name = 'images_missing'").fetchall()
+    assert json.loads(details) == {"sha256": [first.stem]}
+
+
+def test_images_that_are_all_away_are_not_forgotten(opened, scenario, inspected, noise, folder):
+    """A disk that is not mounted may come back."""
+
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    (folder / "images").rename(folder / "elsewhere")
+
+    async def again():
+        async with opened() as records:
+            await inspected(records, 1)
+            assert (await records.inspection(1)).images_state == "kept"
+
+    scenario(again)

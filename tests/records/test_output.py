@@ -1,0 +1,108 @@
+"""What is handed on: the same in CSV, Parquet and a lot's report as in the records."""
+
+import contextlib
+import csv
+import json
+import re
+import subprocess
+from dataclasses import replace
+
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+from station.cli import cli
+from station.records import export as exporting
+from station.records.errors import DiskFullError
+from station.records.export import COLUMNS, export
+from station.records.search import Query
+
+
+@pytest.fixture
+def ask(folder):
+    def run(*arguments):
+        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
+
+    return run
+
+
+@pytest.fixture
+def history(opened, scenario, trigger, passed, failed, noise, settled):
+    """Seven fruit of two lots, and one that runs."""
+
+    async def steps():
+        async with opened() as records:
+            for number in range(7):
+                sequence = await records.begin(replace(trigger, lot="a <b> & 'c'" if number < 4 else "other"))
+                record = replace(failed, images=(noise("step", 0, 200),)) if number % 2 else passed
+                await records.published(await records.conclude(sequence, record))
+            await settled(records)
+
+    scenario(steps)
+
+
+def test_csv_and_parquet_hold_the_same(history, ask, tmp_path, monkeypatch):
+    monkeypatch.setattr(exporting, "WINDOW", 3)  # the last window is not full
+    assert ask("export", tmp_path / "all.csv").output.endswith("7 inspections\n")
+    assert ask("export", tmp_path / "all.parquet").exit_code == 0
+    with (tmp_path / "all.csv").open(newline="", encoding="utf-8") as file:
+        text = list(csv.DictReader(file))
+    typed = pq.read_table(tmp_path / "all.parquet").to_pylist()
+    assert [row["sequence"] for row in typed] == list(range(1, 8))
+    assert list(text[0]) == [column.name for column in COLUMNS]
+    for row, told in zip(typed, text, strict=True):
+        assert row["began"].isoformat(timespec="milliseconds") == told["began"]
+        assert row["reasons"] == json.loads(told["reasons"])
+        assert row["areas_mm2"] == json.loads(told["areas_mm2"]) == [0.0, 8.0, 16.0, 24.0, 32.0]
+        assert (row["lot"], str(row["area_mm2"])) == (told["lot"], told["area_mm2"])
+        assert len(row["images"]) == (row["outcome"] == "FAIL")
+        assert told["simulated"] == "true"
+
+
+def test_an_export_holds_what_was_asked_for(history, ask, tmp_path):
+    for conditions, number in ((("--lot", "other"), 3), (("--outcome", "FAIL"), 3), (("--reason", "early_stop"), 3)):
+        said = ask("export", tmp_path / "some.csv", *conditions)
+        assert said.output.endswith(f": {number} inspections\n")
+    assert ask("export", tmp_path / "some.xlsx").exit_code == 2
+
+
+def test_an_export_that_does_not_fit_leaves_the_file_as_it_was(history, folder, small_disk):
+    target = small_disk / "all.csv"
+    target.write_text("the last one")
+    with contextlib.suppress(OSError), (small_disk / "filler").open("wb", buffering=0) as filler:
+        while True:
+            filler.write(bytes(4096))
+    with pytest.raises(DiskFullError, match="the disk is full"):
+        export(folder, Query(), target)
+    assert target.read_text() == "the last one"
+    assert list(small_disk.glob(".*")) == []
+
+
+def test_a_lots_report_needs_no_other_file_and_escapes_what_comes_from_outside(history, ask, tmp_path):
+    assert ask("report", "a <b> & 'c'", tmp_path / "lot.html").exit_code == 0
+    text = (tmp_path / "lot.html").read_text(encoding="utf-8")
+    assert "Lot a &lt;b&gt; &amp; &#39;c&#39;" in text
+    assert "<b>" in text
+    assert "<b> &" not in text
+    assert re.findall(r"(?:src|href)=\"(?!data:)", text) == []
+    assert text.count("data:image/jpeg") == 2
+    assert "<b>50.0 %</b>" in text
+    assert "area over limit" in text
+    assert ask("report", "nothing", tmp_path / "none.html").exit_code == 1
+    assert ask("report", "other", tmp_path / "lot.doc").exit_code == 2
+
+
+def test_a_lots_report_as_pdf_can_be_read(history, ask, tmp_path):
+    assert ask("report", "other", tmp_path / "lot.pdf").exit_code == 0
+    content = (tmp_path / "lot.pdf").read_bytes()
+    assert content.startswith(b"%PDF-1.")
+    assert content.rstrip().endswith(b"%%EOF")
+    assert len(content) > 10_000
+
+
+def test_a_browser_shows_the_report(history, ask, tmp_path, chromium):
+    ask("report", "other", tmp_path / "lot.html")
+    profile, picture = tmp_path / "profile", tmp_path / "lot.png"
+    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", f"--screenshot={picture}")
+    subprocess.run([chromium, *options, (tmp_path / "lot.html").as_uri()], capture_output=True, check=True, timeout=100)
+    assert picture.stat().st_size > 10_000

@@ -1,0 +1,180 @@
+"""Whatever is asked for, a page is what a look at every inspection would give."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from station.channel.line import Reason
+from station.cli import cli
+from station.records.changing import changing
+from station.records.database import FILE_NAME, migrate, open_engine, reading
+from station.records.errors import RecordsError
+from station.records.finding import HOUR_MS
+from station.records.lots import end_lot, read_lots, start_lot
+from station.records.search import Query, find, find_page
+from station.records.writing import conclude, insert_trigger, publish
+
+GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}
+LOTS = st.sampled_from(["A", "B", "C", "D", ""])
+HOURS = st.integers(0, 4)
+FAILED = st.sampled_from([("area_over_limit",), ("growth_over_limit", "early_stop"), ("early_stop",)])
+ENDS = st.one_of(
+    st.just(("PASS", ())),
+    st.tuples(st.just("FAIL"), FAILED),
+    st.tuples(st.just("NO_RESULT"), st.sampled_from([("no_contact",), ("late", "no_contact")])),
+    st.none(),
+)
+QUERIES = st.builds(
+    Query,
+    lot=st.none() | LOTS,
+    grower=st.none() | st.sampled_from(["Meier", "Huber", "nobody"]),
+    from_utc_ms=st.none() | st.integers(0, 5 * HOUR_MS),
+    to_utc_ms=st.none() | st.integers(1, 5 * HOUR_MS),
+    outcome=st.none() | st.sampled_from(["PASS", "FAIL", "NO_RESULT"]),
+    reason=st.none() | st.sampled_from([Reason.EARLY_STOP, Reason.NO_CONTACT, Reason.ARM_FAULT]),
+)
+
+
+def wanted(inspected, query):
+    """By looking at every one."""
+    found = []
+    for sequence, (lot, hour, end) in enumerate(inspected, start=1):
+        began_utc_ms, (outcome, reasons) = hour * HOUR_MS + sequence, end or (None, ())
+        holds = (
+            (query.lot is None or lot == query.lot)
+            and (query.grower is None or GROWERS.get(lot) == query.grower)
+            and (query.from_utc_ms is None or began_utc_ms >= query.from_utc_ms)
+            and (query.to_utc_ms is None or began_utc_ms < query.to_utc_ms)
+            and (query.outcome is None or outcome == query.outcome)
+            and (query.reason is None or query.reason in reasons)
+        )
+        found += [sequence] if holds else []
+    return found[::-1]
+
+
+@given(inspected=st.lists(st.tuples(LOTS, HOURS, ENDS), max_size=40), queries=st.lists(QUERIES, min_size=1, max_size=8))
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, queries, trigger, passed):
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        engine = open_engine(folder / FILE_NAME, "rwc")
+        migrate(engine, folder)
+        with engine.begin() as connection:
+            for lot, grower in GROWERS.items():
+                start_lot(connection, lot, grower)
+            for sequence, (lot, hour, end) in enumerate(inspected, start=1):
+                began = replace(trigger, lot=lot, began_utc_ms=hour * HOUR_MS + sequence)
+                insert_trigger(connection, sequence, began, "boot")
+                if end is not None:
+                    record = replace(passed, outcome=end[0], reasons=end[1], curve=())
+                    conclude(connection, sequence, record, {"PASS": "", "other": ""})
+        engine.dispose()
+        with reading(folder) as connection:
+            for query in queries:
+                expected = wanted(inspected, query)
+                assert list(find(connection, query)) == expected
+                pages, below = [], None
+                while True:
+                    page = find_page(connection, query, 7, below)
+                    pages += [row.sequence for row in page.rows]
+                    below = page.below
+                    if below is None:
+                        break
+                assert pages == expected
+
+
+def test_an_outcome_told_otherwise_is_found_by_what_was_told(opened, scenario, folder, trigger, failed):
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            judged = await records.conclude(sequence, failed)
+            told = judged.model_copy(update={"outcome": "NO_RESULT", "reasons": (Reason.CALLED_OFF,)})
+            await records.published(told)
+
+    scenario(steps)
+    with reading(folder) as connection:
+        assert list(find(connection, Query(reason=Reason.CALLED_OFF))) == [1]
+        assert list(find(connection, Query(outcome="NO_RESULT"))) == [1]
+        assert list(find(connection, Query(reason=Reason.AREA_OVER_LIMIT))) == []
+
+
+def test_an_inspection_known_by_its_outcome_alone_is_found_by_its_time(opened, scenario, folder, trigger, passed):
+    """It lies before others that were begun in other hours."""
+
+    async def steps():
+        async with opened() as records:
+            for hour in (7, 7, 9):
+                await records.begin(replace(trigger, began_utc_ms=hour * HOUR_MS))
+            outcome = await records.conclude(2, passed)
+            await records.change(lambda connection: connection.exec_driver_sql("DELETE FROM curve_points"))
+            gone = "DELETE FROM inspections WHERE sequence = 2"
+            await records.change(lambda connection: connection.exec_driver_sql(gone))
+            early = outcome.model_copy(update={"began_utc_ms": 3 * HOUR_MS})
+            await records.change(lambda connection: publish(connection, early, 3, "boot"))
+
+    scenario(steps)
+    with reading(folder) as connection:
+        for hour, found in ((3, [2]), (7, [1]), (9, [3]), (8, [])):
+            query = Query(from_utc_ms=hour * HOUR_MS, to_utc_ms=(hour + 1) * HOUR_MS)
+            assert list(find(connection, query)) == found
+
+
+def test_a_page_is_of_some_size(opened, scenario, folder):
+    async def steps():
+        async with opened():
+            pass
+
+    scenario(steps)
+    with reading(folder) as connection, pytest.raises(RecordsError, match="ask for 1 to 1000"):
+        find_page(connection, Query(), 1001)
+
+
+@pytest.fixture
+def ask(folder):
+    def run(*arguments):
+        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
+
+    return run
+
+
+def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, ask, trigger, passed, failed):
+    async def steps():
+        async with opened() as records:
+            for number in range(4):
+                lot = "west" if number < 2 else "east"
+                sequence = await records.begin(replace(trigger, lot=lot))
+                await records.published(await records.conclude(sequence, failed if number % 2 else passed))
+            said = ask("lot", "start", "west", "--grower", "Meier", "--by", "ada")  # while the station runs
+            assert said.output.startswith("west: Meier, began ")
+
+    scenario(steps)
+    said = ask("list", "--grower", "Meier", "--reason", "early_stop")
+    assert [line.split()[0] for line in said.output.splitlines()] == ["number", "2"]
+    assert " west  Meier   strawberry  FAIL " in said.output
+    assert "more: --below 4" in ask("list", "--last", 1).output
+    assert [line.split()[0] for line in ask("list", "--below", 4, "--last", 2).output.splitlines()[:3]] == [
+        "number",
+        "3",
+        "2",
+    ]
+    assert len(ask("list", "--from", "2023-11-14T22:13:20", "--to", "2023-11-15").output.splitlines()) == 5
+    refused = ask("list", "--from", "yesterday")
+    assert refused.exit_code == 2
+    assert "write 2026-06-30" in refused.output
+    other = ask("lot", "start", "west", "--grower", "Huber")
+    assert "lot west is told to be of Meier already" in str(other.exception)
+    assert ask("lot", "start", "west", "--grower", "Huber", "--correct", "--by", "ada").exit_code == 0
+    assert ask("lot", "end", "west").output.startswith("west: Huber, began")
+    with changing(folder) as connection:
+        (lot,) = read_lots(connection, 9)
+        assert end_lot(connection, "west") == lot, "a lot ends once"
+        assert lot.revision == 3
+        query = "SELECT who, action, old, new FROM audit WHERE action LIKE 'lot%' ORDER BY seq"
+        trail = connection.exec_driver_sql(query).all()
+    assert [row.action for row in trail] == ["lot.started", "lot.started", "lot.ended"]
+    assert trail[1][:3] == ("ada", "lot.started", '{"grower":"Meier"}')
