@@ -85,16 +85,13 @@ class Station:
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
         kept, alarms = Kept(configuration.home), AlarmDesk(metrics)
         calibrated = Calibrated(configuration, lambda: crew.cell.camera.description.serial)
-        metrics.watch_calibration(lambda: calibrated.figures)
         eye = Eye(Golden(kept, calibrated.golden), settings.reference)
         stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
         trail = Trail(records)
         stack.push_async_callback(self._note_end, trail)
-        metrics.watch_records(records.status)
-        if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
-            metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))
+        _ask_at_each_scrape(metrics, configuration, records, calibrated)
 
         def device_changed(name: str, fault: StationError | None) -> None:
             alarms.device(name, crew.watches[name].told_fault)
@@ -203,3 +200,12 @@ def _made_room_for(endpoint: str) -> str:
     if endpoint.startswith("ipc://"):
         Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     return endpoint
+
+
+def _ask_at_each_scrape(
+    metrics: Metrics, configuration: Configuration, records: Records, calibrated: Calibrated
+) -> None:
+    metrics.watch_calibration(lambda: calibrated.figures)
+    metrics.watch_records(records.status)
+    if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
+        metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))
