@@ -15,6 +15,10 @@ from station.calibration.report import calibration_files
 from station.calibration.store import PAGE, CalibrationStore
 from station.commands.ball import at_the_bench, cancelled_by_signals, show
 from station.errors import BadInputError
+from station.records.audit import append_audit
+from station.records.database import records_folder
+from station.records.direct import writing
+from station.service.trail import calibration_stored
 from station.settings.configuration import Configuration, load_configuration
 
 _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
@@ -75,10 +79,20 @@ def calibrate(
         return
     site = load_configuration(config)
     draft = _run(site, operator, places, bench=bench, yes=yes)
-    folder = CalibrationStore(site.home).add_calibration(draft.calibration, calibration_files(draft))
+    folder = _store(site, operator, draft)
     _tell(draft.calibration.checks)
     click.echo(f"calibration {draft.calibration.in_words()}")
     click.echo(f"stored; look at {folder / PAGE}")
+
+
+def _store(site: Configuration, operator: str, draft: Draft) -> Path:
+    """Store it and tell the audit trail, or neither where one of them cannot be written."""
+    store, new = CalibrationStore(site.home), draft.calibration
+    before = store.current(new.serial)
+    with writing(records_folder(site.home)) as connection:
+        old = None if before is None else before.id
+        append_audit(connection, calibration_stored(operator, "", f"sensor {new.serial}", old, new.id))
+        return store.add_calibration(new, calibration_files(draft))
 
 
 def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench: bool, yes: bool) -> Draft:

@@ -14,6 +14,10 @@ from station.calibration.store import PAGE, CalibrationStore
 from station.calibration.verifying import Verified, Verifying
 from station.commands.ball import at_the_bench, cancelled_by_signals, show
 from station.errors import StationError
+from station.records.audit import append_audit
+from station.records.database import records_folder
+from station.records.direct import writing
+from station.service.trail import calibration_verified
 from station.settings.configuration import Configuration, load_configuration
 
 
@@ -44,7 +48,11 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
     except asyncio.CancelledError:
         raise click.Abort from None
     verification = verified.verification
-    folder = store.add_verification(verification, verification_files(verified, calibration))
+    with writing(records_folder(site.home)) as connection:
+        subject, passed = f"sensor {calibration.serial}", verification.passed
+        entry = calibration_verified(operator, subject, calibration.id, verification.id, passed=passed)
+        append_audit(connection, entry)
+        folder = store.add_verification(verification, verification_files(verified, calibration))
     for check in verification.checks:
         click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:8}{check.found}, expected {check.expected}")
     click.echo(f"{'PASS' if verification.passed else 'FAIL'}; look at {folder / PAGE}")

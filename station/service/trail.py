@@ -110,6 +110,20 @@ def calibration_stored(who: str, reason: str, subject: str, old: Any, new: Any) 
     return AuditEntry(who, "service", "calibration.stored", subject, reason, old, new)
 
 
+def calibration_verified(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
+    """What the trail says of a verification.
+
+    Args:
+        who: the person who made it.
+        subject: what was verified, as `sensor D20966`.
+        calibration: the id of what it was compared with.
+        verification: its own id.
+        passed: whether all was within its tolerance.
+    """
+    new = {"calibration": calibration, "verification": verification, "passed": passed}
+    return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
+
+
 def alarm_changed(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
     """What the trail says of a person's or the PLC's hand on an alarm.
 

@@ -59,6 +59,10 @@ def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
     assert "PASS" in shown.stdout
     assert "FAIL" in shown.stdout
 
+    trail = site.station("audit", "show").stdout
+    assert trail.count("calibration.stored") == 1
+    assert trail.count("calibration.verified") == 2
+
     folder = store.folder(calibration)
     images = ["--reference", folder / "reference.png", "--out", tmp_path / "out", folder / "press_07.png"]
     analyzed = site_analyze(site, "--unit", site.serial, *images)

@@ -78,7 +78,13 @@ BAD = {
             "25: damage.area[1].closing: unknown key closing: did you mean closing_mm?",
         ],
     ),
-    "other version": (r"schema_version: 1", "schema_version: 2", ["1: schema_version: expected 1, got 2"]),
+    "other version": (
+        r"schema_version: 1",
+        "schema_version: 2",
+        [
+            "1: schema_version: expected at most 1, got 2 of a newer fruit-station: install that, or write the older form"
+        ],
+    ),
     "name": (
         r"name: cherry",
         "name: Cherry!",
