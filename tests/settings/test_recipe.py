@@ -82,8 +82,10 @@ BAD = {
         r"schema_version: 1",
         "schema_version: 2",
         [
-            "1: schema_version: expected at most 1, got 2 of a newer fruit-station: "
-            "install that, or write the older form",
+            (
+                "1: schema_version: expected at most 1, got 2 of a newer fruit-station: "
+                "install that, or write the older form"
+            ),
         ],
     ),
     "name": (
