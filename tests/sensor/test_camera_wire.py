@@ -182,7 +182,20 @@ def test_an_intermittent_camera_is_found_again_each_time(bench):
     asyncio.run(play())
 
 
-@pytest.mark.parametrize("fault", GEL_FAULTS)
+def test_a_worn_gel_shows_a_press_more_weakly(bench):
+    async def play():
+        async with bench() as one:
+            await one.camera.open()
+            untouched = (await fresh(one.camera)).image.astype(float)
+            one.close_to(3.0)
+            sound = np.abs((await fresh(one.camera)).image - untouched).sum()
+            one.server.faults.set("gel_worn")
+            await until(one.camera, lambda frame: np.abs(frame.image - untouched).sum() < 0.8 * sound)
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize("fault", [fault for fault in GEL_FAULTS if fault != "gel_worn"])
 def test_an_ill_gel_lens_or_led_shows(bench, fault):
     async def play():
         async with bench() as one:
