@@ -77,7 +77,7 @@ def test_a_lost_and_a_running_one_say_so(history, ask):
 
 def test_the_last_ones_are_listed_newest_first(history, ask):
     lines = ask("list", "--last", 3).output.splitlines()
-    assert [line.split()[0] for line in lines] == ["number", "4", "3", "2"]
+    assert [line.split()[0] for line in lines] == ["number", "4", "3", "2", "more:"]
     assert "running" in lines[1]
     assert "called_off" in lines[3]
     assert len(ask("list").output.splitlines()) == 5
