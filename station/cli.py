@@ -23,7 +23,7 @@ COMMANDS = {
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
-    "demo": Entry("station.commands.demo:demo", "Run the station against the simulated world and a simulated line."),
+    "demo": Entry("station.commands.demo:demo", "Run the station against a simulated world and line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),

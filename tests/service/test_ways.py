@@ -127,7 +127,9 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
             assert set(outcome.reasons) <= {Reason.RECORDS_FAULT, Reason.STATION_LOST}
             await line.publish(outcome)
             await line.ready()
-            assert AlarmId.RECORDS_NOT_WRITABLE not in active(cell)
+            async with asyncio.timeout(60):
+                while AlarmId.RECORDS_NOT_WRITABLE in active(cell):
+                    await asyncio.sleep(0.05)
             assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
             again = await line.inspect()
             assert again.sequence == begun.sequence + 1
