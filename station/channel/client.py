@@ -78,6 +78,8 @@ class ChannelClient:
         except TimeoutError:
             asked = request.asked or f"for {name}"
             raise DeadlineError(f"{self._peer} gave no answer within {deadline_s:g} s when asked {asked}") from None
+        except zmq.ZMQError as error:
+            raise ChannelError(f"the channel to {self._peer} was closed") from error
         finally:
             self._waiting.pop(number, None)
         if status != b"ok":

@@ -1,5 +1,7 @@
 """An MQTT broker as a destination: the same events as plain JSON, at least once and in order."""
 
+import asyncio
+import contextlib
 import json
 import logging
 import ssl
@@ -104,6 +106,17 @@ class Session:
             data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}
             await self._client.publish(f"{self._root}/{event.kind}", text_of(data).encode(), _AT_LEAST_ONCE)
         self._keep(batch, batch.up_to)
+
+    async def idle(self, pause_s: float) -> None:
+        """Let time pass; a broker that goes away meanwhile is noticed.
+
+        Args:
+            pause_s: how long.
+        """
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(pause_s):
+                async for _ in self._client.messages:  # none is subscribed to: it only ends with the connection
+                    pass
 
     def _keep(self, batch: Batch, position: int) -> None:
         write_whole(self._path, json.dumps({batch.lineage[0].id: position}))

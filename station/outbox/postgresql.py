@@ -1,5 +1,6 @@
 """PostgreSQL as a destination: rows and the position they reach are one transaction, so none is lost or doubled."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
@@ -154,6 +155,14 @@ class Session:
             (self._station, batch.lineage[0].id, batch.up_to),
         )
         await self._connection.commit()
+
+    async def idle(self, pause_s: float) -> None:
+        """Let time pass; a connection that was cut meanwhile is noticed with the next row.
+
+        Args:
+            pause_s: how long.
+        """
+        await asyncio.sleep(pause_s)
 
     async def _write(self, events: Sequence[Event]) -> None:
         async with self._connection.cursor() as cursor:

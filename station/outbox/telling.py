@@ -37,6 +37,10 @@ class Session(Protocol):
         """Tell it; when this returns, the position is behind the batch, durably."""
         ...
 
+    async def idle(self, pause_s: float) -> None:
+        """Let time pass while there is nothing new; raises where the connection is seen to be lost."""
+        ...
+
 
 class Destination(Protocol):
     """Somebody who is told."""
@@ -120,7 +124,7 @@ class Teller:
             yield batch
             if batch.last == position:
                 self._oldest_utc_ms = None
-                await asyncio.sleep(LOOK_S)
+                await session.idle(LOOK_S)
 
     async def _read(self, position: int, limit: int) -> Batch:
         return await asyncio.to_thread(read_batch, self._folder, self._station, position, limit)

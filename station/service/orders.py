@@ -209,7 +209,7 @@ class Orders:
             return why_not
         service.reset_wanted = True
         self._crew.confirmed_clear = True
-        if state in {State.LATCHED, State.CARRIED}:
+        if state is State.LATCHED:
             service.conductor.post(Event.PERSON_CONFIRMED, "reset")
         elif state is State.STOPPED:
             service.conductor.post(Event.RESET)
@@ -218,6 +218,8 @@ class Orders:
                 await self._crew.play_again()
             except ArmFault as fault:
                 return str(fault)
+            if state is State.CARRIED:
+                service.conductor.post(Event.PERSON_CONFIRMED, "reset")
         tried_s = time.monotonic()
         reached = await service.conductor.until(
             lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)

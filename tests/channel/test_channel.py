@@ -181,6 +181,8 @@ def test_closing_ends_what_is_under_way(tmp_path):
         with pytest.raises(ChannelError, match="was closed"):
             await asking
         await client.close()
+        with pytest.raises(ChannelError, match="was closed"):
+            await client.ask(Sleep(duration_s=0.0), Sum, deadline_s=1.0)
 
     with_peer(tmp_path, body)
 

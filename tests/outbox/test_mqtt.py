@@ -65,7 +65,7 @@ def test_events_are_published_in_order_and_none_is_missing_after_the_broker_was_
             listening = asyncio.create_task(hear(broker, set(range(4, 61)), heard))
             await until(lambda: ("fruit/line-7/online", True) in heard)
             await asyncio.to_thread(fill, records, 4, 20, 1)
-            await until(lambda: len(heard) > 10)
+            await until(lambda: len(heard) > 10 and teller.status().waiting == 0)
             broker.stop()
             await until(lambda: not teller.status().connected)
             await asyncio.to_thread(fill, records, 21, 60, 1)
