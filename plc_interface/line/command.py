@@ -18,6 +18,8 @@ from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes
 
+_ENDING_S = 0.5
+
 
 @click.command("line")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
@@ -118,12 +120,17 @@ async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, c
     console = Console()
     async with scanner:
         simulator = LineSimulator(program, scanner, nest, pace)
-        running = asyncio.ensure_future(simulator.run(count))
+        running, told = asyncio.ensure_future(simulator.run(count)), asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, running.cancel)
+            asyncio.get_running_loop().add_signal_handler(number, told.set)
+        ending = asyncio.ensure_future(told.wait())
         with LineDisplay(console, simulator.summary) as display:
             simulator.on_passage, simulator.on_scan = display.passed, display.doing
-            await asyncio.wait([running])
+            await asyncio.wait([running, ending], return_when=asyncio.FIRST_COMPLETED)
+            ending.cancel()
+            while not running.done():  # Python 3.11's wait_for loses a cancellation that comes with its answer
+                running.cancel()
+                await asyncio.wait([running], timeout=_ENDING_S)
         console.print(summary_line(simulator.summary))
         if not running.cancelled():
             running.result()
