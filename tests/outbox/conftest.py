@@ -35,13 +35,18 @@ def _missing(what: str) -> None:
 
 
 @pytest.fixture(scope="session")
-def server() -> Iterator[Any]:
-    """A running PostgreSQL with our tables."""
-    postgres = _helper("postgres")
-    programs = postgres.programs()
+def postgresql_programs() -> Any:
+    """Where PostgreSQL's server programs lie."""
+    programs = _helper("postgres").programs()
     if programs is None:
         _missing("postgresql")
-    with postgres.throwaway(programs) as started:
+    return programs
+
+
+@pytest.fixture(scope="session")
+def server(postgresql_programs: Any) -> Iterator[Any]:
+    """A running PostgreSQL with our tables."""
+    with _helper("postgres").throwaway(postgresql_programs) as started:
         yield started
 
 
