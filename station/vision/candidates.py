@@ -1,37 +1,23 @@
-"""Where contacts may lie: regions of strong bending, one for each contact."""
-
-from typing import NamedTuple
+"""Where contacts may lie: where the gel bends or has moved, one region for each contact."""
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
+from station.vision.body import Movement, level_of
 from station.vision.clusters import boundaries
-from station.vision.confidence import background_spread
 from station.vision.contact import FloatImage, Mask
-from station.vision.drift import weighted_median
-from station.vision.edge_signal import length_of
 
 _FOOT_SHARE = 0.5
-_BODY_SHARE = 0.12
-_BRIDGE_SHARE = 0.05
+_WINDOW_PX = 3.0
+_LOW_QUANTILE = 0.3
+_SHARE_OF_LOW = 0.5
+_OVER_SPREAD = 3.0
+_BRIDGE_PX = 9
 _OWN_SHARE = 0.35
 _LEAST_BEND = 0.01
-_CHANGE_SIGMA_PX = 2.5
-_CHANGE_OVER_NOISE = 5.0
-_CHANGE_OVER_STREAK = 2.5
-_STREAK_QUANTILE = 0.25
-_SPECK_PX = 5
 _NECKS = (0.4, 0.55, 0.7, 0.8)
 _NECK_DEPTH = 0.12
-
-
-class Candidate(NamedTuple):
-    """A region that may hold one contact."""
-
-    region: Mask
-    """Shape of the bending, 0 or 1."""
-    weight: float
-    """The bending's square, summed: the larger, the more likely the contact meant."""
 
 
 def cluster_levels(bend: FloatImage) -> list[float]:
@@ -43,66 +29,31 @@ def cluster_levels(bend: FloatImage) -> list[float]:
     return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend[::2, ::2], _LEAST_BEND)))]
 
 
-def changed_places(change: FloatImage, background: FloatImage) -> Mask:
-    """Where the change is larger than noise and streaks: a large, soft contact changes much where it bends little.
-
-    A column's lower quartile is what its streak reaches; a place has to stand out of that as well.
+def body_candidates(moved: Movement, bend: FloatImage, levels: list[float], threshold: float) -> list[Mask]:
+    """Where one body may lie: what bends or has moved clear of the noise.
 
     Args:
-        change: without drift, at half the working size, shape (height, width, 3), grey levels.
-        background: shape (height, width), 0 to 1.
-
-    Returns:
-        Shape (height, width), 0 or 1; small specks are left out.
-    """
-    length = length_of(np.asarray(cv2.GaussianBlur(change, (0, 0), _CHANGE_SIGMA_PX), np.float32))
-    noise = weighted_median(length, background) + _CHANGE_OVER_NOISE * background_spread(length, background)
-    quartile = int(_STREAK_QUANTILE * len(length))
-    streak = _CHANGE_OVER_STREAK * np.partition(length, quartile, axis=0)[quartile]
-    changed = (length > np.maximum(noise, streak)).astype(np.uint8)
-    speck = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SPECK_PX, _SPECK_PX))
-    return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, speck), np.uint8)
-
-
-def extended(region: Mask, changed: Mask) -> Mask:
-    """A region with all changed places that hang together with it.
-
-    Args:
-        region: shape (height, width), 0 or 1.
-        changed: from `changed_places`, shape of `region`.
-    """
-    _, labels = cv2.connectedComponents(region | changed)
-    inside = np.unique(labels[region > 0])
-    return np.isin(labels, inside).astype(np.uint8)
-
-
-def body_candidates(
-    bend: FloatImage, levels: list[float], threshold: float, changed: Mask | None = None
-) -> list[Candidate]:
-    """Where one body may touch: strong bending, bridged over the gaps between seeds and drupelets.
-
-    Args:
+        moved: from `body.movement`, of the bending's size.
         bend: shape (height, width), grey levels per pixel.
         levels: from `cluster_levels`.
-        threshold: the gate's, grey levels per pixel.
-        changed: from `changed_places`, where a region may lie although it bends less.
+        threshold: the gate's, grey levels per pixel; each region reaches it.
 
     Returns:
-        The heaviest first.
+        Of the bending's shape, 0 or 1; the most moved first.
     """
-    strong = (bend > max(_foot(levels, threshold), _BODY_SHARE * float(bend.max()))).astype(np.uint8)
-    if changed is not None:
-        strong |= changed
-    side = 2 * round(_BRIDGE_SHARE * max(bend.shape) / 2) + 1
-    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    framed = cv2.copyMakeBorder(strong, side, side, side, side, cv2.BORDER_CONSTANT)
-    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[side:-side, side:-side]
-    return _by_weight(
-        bend, [part for part in _parts(np.asarray(bridged, np.uint8)) if bend[part > 0].max() > threshold]
-    )
+    level, spread = level_of(moved, _WINDOW_PX)
+    strong = level[bend > threshold]
+    if not strong.size:
+        return []
+    lowest = max(_OVER_SPREAD * spread, _SHARE_OF_LOW * float(np.quantile(strong, _LOW_QUANTILE)))
+    seen = ((level > lowest) | (bend > _foot(levels, threshold))).astype(np.uint8)
+    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_BRIDGE_PX, _BRIDGE_PX))
+    framed = cv2.copyMakeBorder(seen, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, cv2.BORDER_CONSTANT)
+    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
+    return _heaviest_first(level, [part for part in _parts(bridged) if bend[part > 0].max() > threshold])
 
 
-def separate_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Candidate]:
+def separate_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Mask]:
     """Where several contacts may lie, each for itself.
 
     Of each region counts what bends at least about a third as much as its own strongest place, so that a strong
@@ -123,7 +74,7 @@ def separate_candidates(bend: FloatImage, levels: list[float], threshold: float)
             for part in _parts(whole * (bend > _OWN_SHARE * peak)):
                 if bend[part > 0].max() > threshold:
                     pieces += _split_at_necks(part)
-    return _by_weight(bend, pieces)
+    return _heaviest_first(bend * bend, pieces)
 
 
 def _foot(levels: list[float], threshold: float) -> float:
@@ -131,12 +82,11 @@ def _foot(levels: list[float], threshold: float) -> float:
     return max([_FOOT_SHARE * threshold, *(level for level in levels if level <= threshold)])
 
 
-def _by_weight(bend: FloatImage, regions: list[Mask]) -> list[Candidate]:
-    candidates = [Candidate(region, float((bend[region > 0] ** 2).sum())) for region in regions]
-    return sorted(candidates, key=lambda candidate: -candidate.weight)
+def _heaviest_first(weight: FloatImage, regions: list[Mask]) -> list[Mask]:
+    return sorted(regions, key=lambda region: -float(weight[region > 0].sum()))
 
 
-def _parts(region: Mask) -> list[Mask]:
+def _parts(region: npt.NDArray[np.integer]) -> list[Mask]:
     count, labels = cv2.connectedComponents(np.ascontiguousarray(region))
     return [(labels == label).astype(np.uint8) for label in range(1, count)]
 

@@ -27,7 +27,7 @@ _REACH_STEP_PX = 2
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
-_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+COSINES, SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +74,14 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
 
 
 def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
-    return np.stack([middle[0] + _COSINES * radius, middle[1] + _SINES * radius], axis=1)
+    return np.stack([middle[0] + COSINES * radius, middle[1] + SINES * radius], axis=1)
 
 
 def _reach(region: Mask, middle: tuple[float, float]) -> _Floats:
     """How far the region reaches on each ray; beyond the border as far as it does elsewhere."""
     height, width = region.shape
     steps = np.arange(1.0, np.hypot(height, width), _REACH_STEP_PX)
-    x, y = middle[0] + _COSINES[:, None] * steps, middle[1] + _SINES[:, None] * steps
+    x, y = middle[0] + COSINES[:, None] * steps, middle[1] + SINES[:, None] * steps
     inside = (x >= -0.5) & (y >= -0.5) & (x <= width - 0.5) & (y <= height - 0.5)
     values = cv2.remap(
         region, x.astype(np.float32), y.astype(np.float32), cv2.INTER_NEAREST, None, cv2.BORDER_REPLICATE
@@ -106,7 +106,7 @@ def _steepest(
     height, width = length.shape
     shares = np.linspace(*span, _STEPS)
     away = radius[:, None] * shares
-    x, y = middle[0] + _COSINES[:, None] * away, middle[1] + _SINES[:, None] * away
+    x, y = middle[0] + COSINES[:, None] * away, middle[1] + SINES[:, None] * away
     profile = cv2.remap(
         length, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
     )

@@ -5,8 +5,7 @@ as many as the data ask for; for each region the edge where the change falls off
 explains each with its reasons.
 """
 
-import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -15,18 +14,12 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.candidates import (
-    Candidate,
-    body_candidates,
-    changed_places,
-    cluster_levels,
-    extended,
-    separate_candidates,
-)
+from station.vision.body import Movement, find_body, movement
+from station.vision.candidates import body_candidates, cluster_levels, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge_signal import denoised, length_of
-from station.vision.outline import Outline, Place, find_outline, radius_px
+from station.vision.outline import Outline, find_outline
 from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
@@ -107,13 +100,12 @@ class RobustMethod:
         levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
-        changed = functools.cache(lambda: changed_places(half, background))
+        moved = movement(half, background)
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, levels, threshold)
         else:
-            candidates = body_candidates(bend, levels, threshold, None if sure else changed())
-        seen = _Seen(change, half, bend, drift.background, changed)
-        found = self._outlines(seen, candidates, sure=sure)
+            candidates = body_candidates(moved, bend, levels, threshold)
+        found = self._outlines(_Seen(change, half, drift.background, moved), candidates, sure=sure)
         mask = self._mask(found)
         if on_stage:
             pictures.emit(
@@ -136,25 +128,22 @@ class RobustMethod:
             drift_levels=drift.strength_levels,
         )
 
-    def _outlines(self, seen: "_Seen", candidates: list[Candidate], *, sure: bool) -> list[Outline]:
+    def _outlines(self, seen: "_Seen", candidates: list[Mask], *, sure: bool) -> list[Outline]:
         """The outlines that the image supports, or any where contact is sure."""
         found: list[Outline] = []
         one = self._parameters.contacts == "one"
         height, width = seen.change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
-        for small, _ in candidates:
+        for candidate in candidates:
             if found and one:
                 break
-            region = _grown(small, (width, height))
-
-            def widened(small: Mask = small) -> Mask:
-                return _grown(extended(small, seen.changed()), (width, height))
-
-            smooth = denoised(seen.change, seen.half, radius_px(region))
+            others = None if one else sum((other for other in candidates if other is not candidate), 0 * candidate)
+            body = find_body(seen.moved, candidate, others)
+            if body is None:
+                continue
+            smooth = denoised(seen.change, seen.half, body.radius_px * width / candidate.shape[1])
             length = resized(length_of(smooth), (width, height))
-            middle = _middle(seen.bend, small, (width, height))
-            place = Place(region, widened if one else None, middle, seen.background)
-            outline = find_outline(length, seen.bend, place, self._parameters.edge_stiffness)
+            outline = find_outline(length, body, seen.background, self._parameters.edge_stiffness)
             if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline):
                 continue
             if sure or outline.confidence >= _LEAST_SUPPORT:
@@ -200,27 +189,9 @@ class _Seen(NamedTuple):
     change: FloatImage
     half: FloatImage
     """The change averaged down to the bending's size."""
-    bend: FloatImage
     background: FloatImage
     """Of the change's size."""
-    changed: Callable[[], Mask]
-    """Gives the changed places, of the bending's size."""
-
-
-def _middle(bend: FloatImage, region: Mask, size: tuple[int, int]) -> tuple[float, float]:
-    """Where a region bends most, in pixels of an image of the given width and height."""
-    squared = (bend * region) ** 2
-    moments = cv2.moments(squared * squared)
-    x_scale, y_scale = size[0] / bend.shape[1], size[1] / bend.shape[0]
-    return (
-        (moments["m10"] / moments["m00"] + 0.5) * x_scale - 0.5,
-        (moments["m01"] / moments["m00"] + 0.5) * y_scale - 0.5,
-    )
-
-
-def _grown(small: Mask, size: tuple[int, int]) -> Mask:
-    """A region of the bending's size at the change's, width and height."""
-    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    moved: Movement
 
 
 def _one_sided(change: FloatImage, outline: Outline) -> bool:

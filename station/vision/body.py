@@ -1,0 +1,188 @@
+"""Where a body lies: the region in which the gel has moved, before its edge is looked for.
+
+A body's edge alone misleads: seeds, drupelets and a crown outshine it, and a soft body's is weak. What the body moves
+as a whole does not: the change's root mean square over a window, above the background's, is high all over the
+contact, between seeds too, and its noise falls with the window. The region is the star-shaped one that gains most,
+where a place gains by how far its level, capped at what most of the region reaches, lies above a share of that cap.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import FloatImage, Mask
+from station.vision.drift import thinned, weighted_median
+from station.vision.edge import COSINES, SINES, closed_path
+from station.vision.working import length_squared
+
+_BLUR_PX = 1.0
+_WINDOW_SHARE = 0.08
+_LEAST_WINDOW_PX = 1.5
+_CAP_QUANTILE = 0.43
+_FIRST_SHARE = 0.5
+_SHARE_OF_RANDOM, _SHARE_OF_COHERENCE, _SHARE_OF_FIELD = 0.29, 1.6, -0.23
+_SHARES = (0.2, 0.8)
+"""Of the cap, where the region ends: the less the change's directions agree, the weaker is a body's rim."""
+_COHERENCE_WINDOW_SHARE = 0.13
+_SMOOTH, _SMOOTH_PER_SIZE = 1.142, 0.185
+_SPAN = 1.9
+_INNER_SHARE = 0.7
+_STEPS = 80
+_STIFFNESS = 0.05
+_NORMAL_OF_MEDIAN = 1.4826
+_LEAST_LEVEL = 1e-3
+
+_Floats = npt.NDArray[np.float64]
+
+
+class Movement(NamedTuple):
+    """What of a frame's change the search for bodies needs, at half the working size."""
+
+    change: FloatImage
+    """Slightly smoothed, shape (height, width, 3), grey levels."""
+    squared: FloatImage
+    """Its squared length, shape (height, width)."""
+    background: FloatImage
+    """How surely a place is background, shape (height, width), 0 to 1."""
+
+
+class Body(NamedTuple):
+    """A body's region."""
+
+    region: Mask
+    """At half the working size, 0 or 1."""
+    middle: tuple[float, float]
+    """x and y there, from which it is star-shaped, px."""
+    radii_px: _Floats
+    """Shape (64,): how far it reaches on each ray, there; some perhaps beyond the image's border."""
+    level: FloatImage
+    """The change's root mean square above the background's, shape of `region`, grey levels."""
+    spread_levels: float
+    """Of the level's root where nothing touches."""
+    coherence: float
+    """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1."""
+
+    @property
+    def radius_px(self) -> float:
+        """Of a circle of the region's area, at half the working size."""
+        return _radius(self.region)
+
+    @property
+    def textured(self) -> bool:
+        """Whether seeds or drupelets turn the change's direction within the window, which a smooth body does not."""
+        return self.coherence < _SMOOTH - _SMOOTH_PER_SIZE * np.log(self.radius_px)
+
+
+def movement(half: FloatImage, background: FloatImage) -> Movement:
+    """Prepare a frame's change.
+
+    Args:
+        half: without drift, at half the working size, shape (height, width, 3), grey levels.
+        background: shape (height, width), 0 to 1.
+    """
+    change = np.asarray(cv2.GaussianBlur(half, (0, 0), _BLUR_PX), np.float32)
+    return Movement(change, length_squared(change), background)
+
+
+def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body | None:
+    """Find the region of the body that a start belongs to.
+
+    Args:
+        moved: from `movement`.
+        start: where the body has been seen, at half the working size, 0 or 1, not empty.
+        others: what belongs to other bodies, 0 or not.
+
+    Returns:
+        The region, or None where nothing stands out of the background.
+    """
+    region, share, coherence = start, _FIRST_SHARE, 0.0
+    within = _within(start)
+    for last in (False, True):
+        radius = _radius(region)
+        window = max(_LEAST_WINDOW_PX, _WINDOW_SHARE * radius)
+        level, spread = level_of(moved, window)
+        cap = max(_quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
+        if last:
+            coherence = _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
+            share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * coherence + _SHARE_OF_FIELD * region.mean()
+            share = float(np.clip(share, *_SHARES))
+        gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
+        np.maximum(gain, 0, out=gain, where=within > 0)
+        if others is not None:
+            gain[others > 0] = -share
+        moments = cv2.moments(within | region, binaryImage=True)
+        middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
+        radii = _most_gained(gain, middle, _SPAN * max(radius, _radius(within)))
+        region = _drawn(middle, radii, (region.shape[0], region.shape[1]))
+        if not region.any():
+            return None
+    return Body(region, middle, radii, level, spread, coherence)
+
+
+def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
+    """The change's root mean square over a window above the background's, and that root's spread in the background.
+
+    Args:
+        moved: from `movement`.
+        window_px: the Gaussian window's standard deviation, px of half the working size.
+
+    Returns:
+        Shape (height, width) and the spread, grey levels.
+    """
+    mean = cv2.GaussianBlur(moved.squared, (0, 0), window_px)
+    few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.background)
+    floor = weighted_median(few, weight)
+    spread = _NORMAL_OF_MEDIAN * weighted_median(np.abs(np.sqrt(few) - np.sqrt(floor)), weight)
+    return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
+
+
+def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
+    """Squared mean over mean square of the change in a window, both above the background's: the region's median."""
+    window_px = max(_BLUR_PX, window_px)
+    agreed = length_squared(np.asarray(cv2.GaussianBlur(moved.change, (0, 0), window_px), np.float32))
+    whole = np.asarray(cv2.GaussianBlur(moved.squared, (0, 0), window_px), np.float32)
+    floors = [weighted_median(one, moved.background) for one in (agreed, whole)]
+    inside = region > 0
+    share = np.maximum(agreed[inside] - floors[0], 0) / np.maximum(whole[inside] - floors[1], _LEAST_LEVEL)
+    return float(np.median(share))
+
+
+def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float) -> _Floats:
+    """The radii of the closed path that encloses the largest sum of gains; beyond the border nothing is gained."""
+    height, width = gain.shape
+    away = (np.arange(_STEPS) + 0.5) * (reach_px / _STEPS)
+    x, y = middle[0] + COSINES[:, None] * away, middle[1] + SINES[:, None] * away
+    along = cv2.remap(gain, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+    along[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
+    gained = np.cumsum(along * away, axis=1) * (8 / (_STEPS * reach_px))
+    return away[closed_path(-gained, _STIFFNESS)]
+
+
+def _drawn(middle: tuple[float, float], radii_px: _Floats, shape: tuple[int, int]) -> Mask:
+    points = np.stack([middle[0] + COSINES * radii_px, middle[1] + SINES * radii_px], axis=1)
+    region = np.zeros(shape, np.uint8)
+    cv2.fillPoly(region, [np.rint(points * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
+    return region
+
+
+def _within(region: Mask) -> Mask:
+    """The inner part of a region's convex hull: a flat centre lies there, be its ring closed or not."""
+    hull = cv2.convexHull(cv2.findNonZero(region))[:, 0].astype(np.float64)
+    moments = cv2.moments(hull.astype(np.float32))
+    inner = np.zeros_like(region)
+    if moments["m00"] > 0:
+        middle = np.array([moments["m10"], moments["m01"]]) / moments["m00"]
+        points = middle + (hull - middle) * _INNER_SHARE
+        cv2.fillPoly(inner, [np.rint(points * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
+    return inner
+
+
+def _radius(region: Mask) -> float:
+    return max(3.0, float(np.sqrt(np.count_nonzero(region) / np.pi)))
+
+
+def _quantile(values: npt.NDArray[np.floating], share: float) -> float:
+    place = int(share * (values.size - 1))
+    return float(np.partition(values, place)[place])
