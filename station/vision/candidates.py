@@ -13,6 +13,7 @@ _WINDOW_PX = 3.0
 _LOW_QUANTILE = 0.3
 _SHARE_OF_LOW = 0.5
 _OVER_SPREAD = 3.0
+_BODY_SHARE = 0.12
 _BRIDGE_PX = 9
 _OWN_SHARE = 0.35
 _LEAST_BEND = 0.01
@@ -46,7 +47,7 @@ def body_candidates(moved: Movement, bend: FloatImage, levels: list[float], thre
     if not strong.size:
         return []
     lowest = max(_OVER_SPREAD * spread, _SHARE_OF_LOW * float(np.quantile(strong, _LOW_QUANTILE)))
-    seen = ((level > lowest) | (bend > _foot(levels, threshold))).astype(np.uint8)
+    seen = ((level > lowest) | (bend > threshold)).astype(np.uint8)
     bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_BRIDGE_PX, _BRIDGE_PX))
     framed = cv2.copyMakeBorder(seen, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, cv2.BORDER_CONSTANT)
     bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
