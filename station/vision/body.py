@@ -18,17 +18,21 @@ from station.vision.edge import COSINES, SINES, closed_path
 from station.vision.working import length_squared
 
 _BLUR_PX = 1.0
+_LIGHT_BLUR_PX = 4.0
+_LEAST_LIGHT = 0.6
 _WINDOW_SHARE = 0.08
 _LEAST_WINDOW_PX = 1.5
-_CAP_QUANTILE = 0.43
+_CAP_QUANTILE = 0.38
 _FIRST_SHARE = 0.5
-_SHARE_OF_RANDOM, _SHARE_OF_COHERENCE, _SHARE_OF_FIELD = 0.29, 1.6, -0.23
-_SHARES = (0.2, 0.8)
+_SHARE_OF_RANDOM, _SHARE_OF_COHERENCE, _SHARE_OF_FIELD = 0.33, 1.6, -0.2
+_SHARES = (0.2, 0.76)
 """Of the cap, where the region ends: the less the change's directions agree, the weaker is a body's rim."""
 _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH, _SMOOTH_PER_SIZE = 1.142, 0.185
 _SPAN = 1.9
-_INNER_SHARE = 0.7
+_INNER_SHARE = 0.6
+import os
+PASSES=(True,) if os.environ.get("ONE") else (False,True)
 _STEPS = 80
 _STIFFNESS = 0.05
 _NORMAL_OF_MEDIAN = 1.4826
@@ -46,6 +50,8 @@ class Movement(NamedTuple):
     """Its squared length, shape (height, width)."""
     background: FloatImage
     """How surely a place is background, shape (height, width), 0 to 1."""
+    evening: FloatImage
+    """What makes up for weak light, shape (height, width), about 1."""
 
 
 class Body(NamedTuple):
@@ -75,7 +81,7 @@ class Body(NamedTuple):
         return self.coherence < _SMOOTH - _SMOOTH_PER_SIZE * np.log(self.radius_px)
 
 
-def movement(half: FloatImage, background: FloatImage) -> Movement:
+def movement(half: FloatImage, background: FloatImage, evening: FloatImage) -> Movement:
     """Prepare a frame's change.
 
     Args:
@@ -83,7 +89,7 @@ def movement(half: FloatImage, background: FloatImage) -> Movement:
         background: shape (height, width), 0 to 1.
     """
     change = np.asarray(cv2.GaussianBlur(half, (0, 0), _BLUR_PX), np.float32)
-    return Movement(change, length_squared(change), background)
+    return Movement(change, length_squared(change), background, evening)
 
 
 def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body | None:
@@ -99,10 +105,11 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
     """
     region, share, coherence = start, _FIRST_SHARE, 0.0
     within = _within(start)
-    for last in (False, True):
+    for last in PASSES:
         radius = _radius(region)
         window = max(_LEAST_WINDOW_PX, _WINDOW_SHARE * radius)
         level, spread = level_of(moved, window)
+        level *= moved.evening
         cap = max(_quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
         if last:
             coherence = _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
@@ -119,6 +126,20 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         if not region.any():
             return None
     return Body(region, middle, radii, level, spread, coherence)
+
+
+def evening(light: FloatImage) -> FloatImage:
+    """What a change is multiplied by to be as large as in the mean light: a slope changes weak light by less.
+
+    Args:
+        light: the reference, shape (height, width, 3), grey levels.
+
+    Returns:
+        Shape (height, width).
+    """
+    total = cv2.GaussianBlur(np.sqrt(length_squared(light)), (0, 0), _LIGHT_BLUR_PX)
+    mean = float(total.mean())
+    return np.asarray((1 + _LEAST_LIGHT) * mean / (total + _LEAST_LIGHT * mean), np.float32)
 
 
 def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:

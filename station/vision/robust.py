@@ -14,7 +14,7 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.body import Movement, find_body, movement
+from station.vision.body import Movement, evening, find_body, movement
 from station.vision.candidates import body_candidates, cluster_levels, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
@@ -61,6 +61,9 @@ class RobustMethod:
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
         self._light = capped(self._reference)
+        height, width = self._light.shape[:2]
+        half = resized(self._light, (-(-width // _FINE_STEP), -(-height // _FINE_STEP)))
+        self._evening = evening(half)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
         sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
@@ -100,7 +103,7 @@ class RobustMethod:
         levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
-        moved = movement(half, background)
+        moved = movement(half, background, self._evening)
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, levels, threshold)
         else:
