@@ -15,7 +15,7 @@ import numpy.typing as npt
 from station.vision.contact import FloatImage, Mask
 from station.vision.drift import thinned, weighted_median
 from station.vision.edge import COSINES, SINES, closed_path
-from station.vision.working import length_squared
+from station.vision.working import length_squared, resized
 
 _BLUR_PX = 1.0
 _LIGHT_BLUR_PX = 4.0
@@ -31,9 +31,11 @@ _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH, _SMOOTH_PER_SIZE = 1.142, 0.185
 _SPAN = 1.9
 _INNER_SHARE = 0.6
-import os
-PASSES=(True,) if os.environ.get("ONE") else (False,True)
+
+
 _STEPS = 80
+_FIRST_EVERY = 2
+_HALF_FROM_PX = 2.5
 _STIFFNESS = 0.05
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_LEVEL = 1e-3
@@ -105,7 +107,7 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
     """
     region, share, coherence = start, _FIRST_SHARE, 0.0
     within = _within(start)
-    for last in PASSES:
+    for last in (False, True):
         radius = _radius(region)
         window = max(_LEAST_WINDOW_PX, _WINDOW_SHARE * radius)
         level, spread = level_of(moved, window)
@@ -121,8 +123,9 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
             gain[others > 0] = -share
         moments = cv2.moments(within | region, binaryImage=True)
         middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
-        radii = _most_gained(gain, middle, _SPAN * max(radius, _radius(within)))
-        region = _drawn(middle, radii, (region.shape[0], region.shape[1]))
+        every = 1 if last else _FIRST_EVERY
+        radii = _most_gained(gain, middle, _SPAN * max(radius, _radius(within)), every)
+        region = _drawn(middle, radii, every, (region.shape[0], region.shape[1]))
         if not region.any():
             return None
     return Body(region, middle, radii, level, spread, coherence)
@@ -162,27 +165,34 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
 def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median."""
     window_px = max(_BLUR_PX, window_px)
-    agreed = length_squared(np.asarray(cv2.GaussianBlur(moved.change, (0, 0), window_px), np.float32))
-    whole = np.asarray(cv2.GaussianBlur(moved.squared, (0, 0), window_px), np.float32)
-    floors = [weighted_median(one, moved.background) for one in (agreed, whole)]
+    change, squared = moved.change, moved.squared
+    if window_px > _HALF_FROM_PX:
+        size = (change.shape[1] // 2, change.shape[0] // 2)
+        change, squared, window_px = resized(change, size), resized(squared, size), window_px / 2
+        region = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST)
+    agreed = length_squared(np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32))
+    whole = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
+    background = resized(moved.background, (whole.shape[1], whole.shape[0]))
+    floors = [weighted_median(one, background) for one in (agreed, whole)]
     inside = region > 0
     share = np.maximum(agreed[inside] - floors[0], 0) / np.maximum(whole[inside] - floors[1], _LEAST_LEVEL)
     return float(np.median(share))
 
 
-def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float) -> _Floats:
+def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float, every: int) -> _Floats:
     """The radii of the closed path that encloses the largest sum of gains; beyond the border nothing is gained."""
     height, width = gain.shape
-    away = (np.arange(_STEPS) + 0.5) * (reach_px / _STEPS)
-    x, y = middle[0] + COSINES[:, None] * away, middle[1] + SINES[:, None] * away
+    steps = _STEPS // every
+    away = (np.arange(steps) + 0.5) * (reach_px / steps)
+    x, y = middle[0] + COSINES[::every, None] * away, middle[1] + SINES[::every, None] * away
     along = cv2.remap(gain, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
     along[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
-    gained = np.cumsum(along * away, axis=1) * (8 / (_STEPS * reach_px))
+    gained = np.cumsum(along * away, axis=1) * (8 / (steps * reach_px))
     return away[closed_path(-gained, _STIFFNESS)]
 
 
-def _drawn(middle: tuple[float, float], radii_px: _Floats, shape: tuple[int, int]) -> Mask:
-    points = np.stack([middle[0] + COSINES * radii_px, middle[1] + SINES * radii_px], axis=1)
+def _drawn(middle: tuple[float, float], radii_px: _Floats, every: int, shape: tuple[int, int]) -> Mask:
+    points = np.stack([middle[0] + COSINES[::every] * radii_px, middle[1] + SINES[::every] * radii_px], axis=1)
     region = np.zeros(shape, np.uint8)
     cv2.fillPoly(region, [np.rint(points * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
     return region

@@ -10,6 +10,8 @@ _BLUR_PX = 2.0
 _STRONG_QUANTILE = 0.8
 _SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.09, 0.45
 _SHARE_OF_FEW, _FEW_PX, _MANY_PX = 0.27, 34.0, 50.0
+_LEVELS_TRIED = (0.7, 1.4)
+_HALF_SURE = 0.4
 _GROOVE_PX, _SPECK_PX, _ROOM_PX = 9, 7, 9
 
 
@@ -30,8 +32,8 @@ def level(length: FloatImage, region: Mask, body: Body) -> float:
     return share * float(np.quantile(length[region > 0], _STRONG_QUANTILE))
 
 
-def union(length: FloatImage, region: Mask, level_levels: float) -> Mask:
-    """What is pressed in within a region and close to it, grooves bridged and holes filled.
+def union(length: FloatImage, region: Mask, level_levels: float) -> tuple[Mask, float]:
+    """What is pressed in within a region and close to it, grooves bridged and holes filled, and how sure that is.
 
     Args:
         length: of the change, shape (height, width), grey levels.
@@ -39,14 +41,18 @@ def union(length: FloatImage, region: Mask, level_levels: float) -> Mask:
         level_levels: from `level`.
 
     Returns:
-        Shape of `length`, 0 or 255.
+        Shape of `length`, 0 or 255; and 0 to 1, the less the more the pressed place hangs on the level: one half
+        where twice the level leaves two thirds of it.
     """
     groove, speck, room = (
         cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_GROOVE_PX, _SPECK_PX, _ROOM_PX)
     )
     smooth = cv2.GaussianBlur(length, (0, 0), _BLUR_PX)
-    pressed = (smooth > level_levels).astype(np.uint8) & cv2.dilate(region, room)
+    near = cv2.dilate(region, room)
+    pressed = (smooth > level_levels).astype(np.uint8) & near
+    low, high = (1 + np.count_nonzero((smooth > factor * level_levels) & (near > 0)) for factor in _LEVELS_TRIED)
+    sure = 1 / (1 + (np.log(low / high) / _HALF_SURE) ** 2)
     bridged = cv2.morphologyEx(pressed, cv2.MORPH_CLOSE, groove)
     outlines, _ = cv2.findContours(bridged, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     filled = cv2.drawContours(np.zeros_like(pressed), outlines, -1, 255, cv2.FILLED)
-    return np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, speck), np.uint8)
+    return np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, speck), np.uint8), float(sure)

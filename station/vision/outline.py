@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from station.vision import elements
 from station.vision.body import Body
@@ -53,8 +54,8 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
-    inside = elements.union(length, region, elements.level(length, region, body))
-    return Outline(edge, inside, textured=True, confidence=edge_confidence(edge, body.spread_levels))
+    inside, sure = elements.union(length, region, elements.level(length, region, body))
+    return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
@@ -75,7 +76,7 @@ def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0
     return mask
 
 
-def _fall(body: Body) -> "np.typing.NDArray[np.float64]":
+def _fall(body: Body) -> npt.NDArray[np.float64]:
     """By how much a body's level falls across the end of its region, on each ray, grey levels."""
     away = body.radii_px[:, None] * np.array([_WITHIN, _BEYOND])
     x, y = body.middle[0] + COSINES[:, None] * away, body.middle[1] + SINES[:, None] * away
