@@ -89,6 +89,7 @@ def movement(half: FloatImage, background: FloatImage, evening: FloatImage) -> M
     Args:
         half: without drift, at half the working size, shape (height, width, 3), grey levels.
         background: shape (height, width), 0 to 1.
+        evening: from `evening`, shape (height, width).
     """
     change = np.asarray(cv2.GaussianBlur(half, (0, 0), _BLUR_PX), np.float32)
     return Movement(change, length_squared(change), background, evening)

@@ -1,5 +1,7 @@
 """Where contacts may lie: where the gel bends or has moved, one region for each contact."""
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -12,49 +14,55 @@ _FOOT_SHARE = 0.5
 _WINDOW_PX = 3.0
 _LOW_QUANTILE = 0.3
 _SHARE_OF_LOW = 0.5
+_STRONG_SHARE = 0.6
+_BESIDE = (0.85, 1.3)
 _OVER_SPREAD = 3.0
-_BODY_SHARE = 0.12
 _BRIDGE_PX = 9
 _OWN_SHARE = 0.35
-_LEAST_BEND = 0.01
+_LEAST = 0.01
 _NECKS = (0.4, 0.55, 0.7, 0.8)
 _NECK_DEPTH = 0.12
 
 
-def cluster_levels(bend: FloatImage) -> list[float]:
-    """The bendings that part the frame's clusters, clustered by their logarithm.
+class Candidates(NamedTuple):
+    """Where contacts may lie, and what says so."""
 
-    Args:
-        bend: shape (height, width), grey levels per pixel.
-    """
-    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(bend[::2, ::2], _LEAST_BEND)))]
+    regions: list[Mask]
+    """Of the bending's shape, 0 or 1; the most likely first."""
+    clustered: FloatImage
+    """The quantity whose clusters are asked for: the change's level, or the bending."""
+    levels: list[float]
+    """What parts its clusters, ascending."""
 
 
-def body_candidates(moved: Movement, bend: FloatImage, levels: list[float], threshold: float) -> list[Mask]:
-    """Where one body may lie: what bends or has moved clear of the noise.
+def body_candidates(moved: Movement, bend: FloatImage, threshold: float) -> Candidates:
+    """Where one body may lie: what has moved clear of the noise, or bends enough to open the gate.
+
+    A place has moved from half of what the bent places mostly reach on, or from the cluster boundary next to that.
 
     Args:
         moved: from `body.movement`, of the bending's size.
         bend: shape (height, width), grey levels per pixel.
-        levels: from `cluster_levels`.
         threshold: the gate's, grey levels per pixel; each region reaches it.
-
-    Returns:
-        Of the bending's shape, 0 or 1; the most moved first.
     """
     level, spread = level_of(moved, _WINDOW_PX)
-    strong = level[bend > threshold]
-    if not strong.size:
-        return []
-    lowest = max(_OVER_SPREAD * spread, _SHARE_OF_LOW * float(np.quantile(strong, _LOW_QUANTILE)))
+    levels = _levels(level, max(spread, _LEAST))
+    strongest = float(bend.max())
+    if strongest <= threshold:
+        return Candidates([], level, levels)
+    strong = level[bend > min(threshold, _STRONG_SHARE * strongest)]
+    wanted = _SHARE_OF_LOW * float(np.quantile(strong, _LOW_QUANTILE))
+    beside = [cut for cut in levels if _BESIDE[0] * wanted < cut < _BESIDE[1] * wanted]
+    lowest = max(_OVER_SPREAD * spread, min(beside, key=lambda cut: abs(np.log(cut / wanted)), default=wanted))
     seen = ((level > lowest) | (bend > threshold)).astype(np.uint8)
     bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_BRIDGE_PX, _BRIDGE_PX))
     framed = cv2.copyMakeBorder(seen, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, cv2.BORDER_CONSTANT)
     bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
-    return _heaviest_first(level, [part for part in _parts(bridged) if bend[part > 0].max() > threshold])
+    found = [part for part in _parts(bridged) if bend[part > 0].max() > threshold]
+    return Candidates(_heaviest_first(level, found), level, levels)
 
 
-def separate_candidates(bend: FloatImage, levels: list[float], threshold: float) -> list[Mask]:
+def separate_candidates(bend: FloatImage, threshold: float) -> Candidates:
     """Where several contacts may lie, each for itself.
 
     Of each region counts what bends at least about a third as much as its own strongest place, so that a strong
@@ -62,12 +70,9 @@ def separate_candidates(bend: FloatImage, levels: list[float], threshold: float)
 
     Args:
         bend: shape (height, width), grey levels per pixel.
-        levels: from `cluster_levels`.
         threshold: the gate's, grey levels per pixel.
-
-    Returns:
-        The heaviest first.
     """
+    levels = _levels(bend, _LEAST)
     pieces: list[Mask] = []
     for whole in _parts((bend > _foot(levels, threshold)).astype(np.uint8)):
         peak = float(bend[whole > 0].max())
@@ -75,7 +80,12 @@ def separate_candidates(bend: FloatImage, levels: list[float], threshold: float)
             for part in _parts(whole * (bend > _OWN_SHARE * peak)):
                 if bend[part > 0].max() > threshold:
                     pieces += _split_at_necks(part)
-    return _heaviest_first(bend * bend, pieces)
+    return Candidates(_heaviest_first(bend * bend, pieces), bend, levels)
+
+
+def _levels(field: FloatImage, least: float) -> list[float]:
+    """The values that part a field's clusters, clustered by their logarithm."""
+    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(field[::2, ::2], least)))]
 
 
 def _foot(levels: list[float], threshold: float) -> float:

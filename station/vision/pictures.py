@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from station.vision.candidates import Candidates
 from station.vision.contact import FloatImage, Image, Mask, StageSink
 from station.vision.edge import Edge
 
@@ -19,7 +20,7 @@ def emit(
     difference: FloatImage,
     change: FloatImage,
     bend: FloatImage,
-    levels: list[float],
+    candidates: Candidates,
     threshold: float,
     edges: list[Edge],
     mask: Mask,
@@ -32,7 +33,7 @@ def emit(
         difference: frame minus reference, shape (height, width, 3), grey levels.
         change: the same without drift and streaks.
         bend: shape (height, width), grey levels per pixel.
-        levels: the boundaries of the bending's clusters.
+        candidates: with the clusters that they come from.
         threshold: the gate's.
         edges: of the contacts found, in pixels of `change`.
         mask: 0 or 255, at the input's size.
@@ -45,7 +46,8 @@ def emit(
             outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
         )
     strength = np.clip(bend * (255 / max(float(bend.max()), 2 * threshold)), 0, 255).astype(np.uint8)
-    clusters = (np.digitize(bend, levels) * (255 // (len(levels) + 1))).astype(np.uint8)
+    levels = candidates.levels
+    clusters = (np.digitize(candidates.clustered, levels) * (255 // (len(levels) + 1))).astype(np.uint8)
     pictures = (
         _signed(difference, 1),
         _signed(change, _AMPLIFICATION),

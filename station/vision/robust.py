@@ -15,7 +15,7 @@ from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
 from station.vision.body import Movement, evening, find_body, movement
-from station.vision.candidates import body_candidates, cluster_levels, separate_candidates
+from station.vision.candidates import body_candidates, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge_signal import denoised, length_of
@@ -100,15 +100,14 @@ class RobustMethod:
         bend = bending(half, _FINE_STEP)
         noise = noise_of(bend, background)
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
-        levels = cluster_levels(bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
         moved = movement(half, background, self._evening)
         if self._parameters.contacts == "several":
-            candidates = separate_candidates(bend, levels, threshold)
+            candidates = separate_candidates(bend, threshold)
         else:
-            candidates = body_candidates(moved, bend, levels, threshold)
-        found = self._outlines(_Seen(change, half, drift.background, moved), candidates, sure=sure)
+            candidates = body_candidates(moved, bend, threshold)
+        found = self._outlines(_Seen(change, half, drift.background, moved), candidates.regions, sure=sure)
         mask = self._mask(found)
         if on_stage:
             pictures.emit(
@@ -117,7 +116,7 @@ class RobustMethod:
                 difference=difference,
                 change=change,
                 bend=bend,
-                levels=levels,
+                candidates=candidates,
                 threshold=threshold,
                 edges=[outline.edge for outline in found],
                 mask=mask,

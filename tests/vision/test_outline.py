@@ -1,25 +1,17 @@
-"""What tells a seed's outline from a body's, and few drupelets from one body."""
+"""The outline of textured skin, and streaks that must not take a contact with them."""
 
 import numpy as np
 import pytest
 
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
+from station.vision.body import Body
 from station.vision.drift import without_bands, without_streaks
-from station.vision.edge import Edge
-from station.vision.edge_signal import envelope
-from station.vision.elements import level, show_apart, union
+from station.vision.elements import level, union
 from station.vision.robust import RobustMethod
-from station.vision.skirt import unexplained
 
 SHAPE = (320, 240)
-ANGLES = np.arange(64) * (2 * np.pi / 64)
-
-
-def circle(radius, x=120.0, y=160.0):
-    points = np.stack([x + radius * np.cos(ANGLES), y + radius * np.sin(ANGLES)], axis=1)
-    seen = (points >= 0).all(axis=1) & (points[:, 0] <= SHAPE[1] - 1)
-    return Edge(points, seen, np.ones(64)), disc(radius, x, y)
+HALF = (160, 120)
 
 
 def disc(radius, x=120.0, y=160.0):
@@ -40,22 +32,9 @@ def hertz(radius, levels, x=120.0, y=160.0):
     return (levels * np.where(ratio < 1, ratio, slope)).astype(np.float32)
 
 
-def test_a_smooth_contact_is_surrounded_by_its_own_skirt():
-    edge, inside = circle(20)
-    assert unexplained(hertz(20, 30), disc(75), edge, inside, 0.0) == pytest.approx(1.15, abs=0.15)
-
-
-def test_a_seed_in_a_body_is_surrounded_by_more():
-    edge, inside = circle(12)
-    seed_in_body = np.hypot(hertz(12, 20), hertz(60, 12, x=140.0))
-    assert unexplained(seed_in_body, disc(75), edge, inside, 0.0) > 3
-
-
-def test_surroundings_are_not_judged_at_the_border_nor_without_room():
-    edge, inside = circle(20, x=5.0)
-    assert unexplained(hertz(20, 30, x=5.0) + 10, disc(75, x=5.0), edge, inside, 0.0) == 0
-    edge, inside = circle(20)
-    assert unexplained(hertz(20, 30) + 10, disc(30), edge, inside, 0.0) == 0
+def textured(coherence):
+    nothing = np.zeros(HALF, np.uint8)
+    return Body(nothing, (60.0, 80.0), np.zeros(64), nothing.astype(np.float32), 1.0, coherence)
 
 
 def test_few_drupelets_are_their_union_and_not_their_hull():
@@ -63,28 +42,27 @@ def test_few_drupelets_are_their_union_and_not_their_hull():
     length = np.max([hertz(16, 30, x, y) * (disc(16, x, y) > 0) for x, y in drupelets], axis=0).astype(np.float32)
     apart = np.max([disc(16, x, y) for x, y in drupelets], axis=0)
     hull = disc(55, 120.0, 152.0)
-    found = union(length, hull, level(length, hull, 8.0))
+    found, _ = union(length, hull, level(length, hull, textured(0.5)))
     assert np.count_nonzero(found) == pytest.approx(np.count_nonzero(apart), rel=0.3)
     assert np.count_nonzero(found) < 0.4 * np.count_nonzero(hull)
     assert np.count_nonzero(found & apart) > 0.85 * np.count_nonzero(apart)
 
 
-def test_elements_show_apart_where_they_are_few_or_stand_clear_of_the_noise():
-    assert show_apart(disc(55), 8.0, level_over_noise=0.0)
-    assert not show_apart(disc(55), 7.0, level_over_noise=5.0)
-    assert show_apart(disc(55), 7.0, level_over_noise=12.0)
-
-
-def test_the_more_elements_there_are_the_less_the_outermost_are_pressed():
+def test_a_lone_element_ends_higher_than_the_outermost_of_many():
     length = np.full(SHAPE, 20.0, np.float32)
-    assert level(length, disc(20), 8.0) == pytest.approx(9.0)
-    assert level(length, disc(75), 8.0) == pytest.approx(3.0)
+    few, many = (level(length, disc(radius), textured(0.2)) for radius in (20, 75))
+    assert few == pytest.approx(9.0)
+    assert many == pytest.approx(3.6)
+    assert level(length, disc(75), textured(0.6)) > many
 
 
-def test_the_envelope_of_a_place_of_one_pixel_is_capped_at_its_level():
-    inside = np.zeros(SHAPE, np.uint8)
-    inside[101, 101] = 1
-    assert envelope(hertz(20, 30), inside, 0.25, 8.0).max() <= hertz(20, 30)[100:102, 100:102].mean() + 1e-3
+def test_an_area_that_hangs_on_its_level_is_less_sure():
+    steep = 20.0 * (disc(40) > 0).astype(np.float32)
+    rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    gentle = np.maximum(0, 20 - 0.3 * np.hypot(columns - 120, rows - 160)).astype(np.float32)
+    sure, unsure = (union(length, disc(70), 8.0)[1] for length in (steep, gentle))
+    assert sure > 0.9
+    assert unsure < 0.6
 
 
 def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():

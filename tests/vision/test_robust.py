@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
-from station.vision.candidates import changed_places
+from station.twin.fruit import draw_fruit
 from station.vision.contact import Flag
 from station.vision.robust import RobustMethod
 
@@ -152,15 +152,30 @@ def test_a_large_soft_contact_that_bends_the_gel_little_is_whole():
         assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.15)
 
 
-def test_a_streak_is_no_changed_place(sphere_press):
-    press = sphere_press(levels=0.0)
-    change = cv2.resize(press.image.astype(np.float32) - press.reference, (240, 320), interpolation=cv2.INTER_AREA)
-    change[:, 100:120] += 8
-    change[150:190, 160:200, 0] += 8
-    half = cv2.resize(change, (120, 160), interpolation=cv2.INTER_AREA)
-    changed = changed_places(half, np.ones((160, 120), np.float32))
-    assert changed[80:90, 82:98].mean() > 0.9
-    assert not changed[:, 45:65].any()
+@pytest.mark.parametrize(("kind", "closing_mm", "rel"), [("strawberry", 3.0, 0.2), ("raspberry", 4.0, 0.15)])
+def test_a_bruised_fruit_over_half_of_the_field_is_whole(kind, closing_mm, rel):
+    ratios = []
+    for seed in (900, 901, 902):
+        press = render_press(draw_fruit(kind, seed, bruised=True), seed, (closing_mm,))
+        truth = np.count_nonzero(press.true_masks[0])
+        assert truth > 0.45 * press.true_masks[0].size
+        ratios.append(RobustMethod(press.references, RobustParameters()).measure(press.frames[0]).area_px / truth)
+    assert np.median(ratios) == pytest.approx(1, abs=rel)
+
+
+def test_a_contact_that_fills_the_field_is_a_lower_bound_and_not_sure():
+    press = render_press(draw_fruit("strawberry", 900, bruised=True), 900, (9.0,))
+    assert press.true_masks[0].all()
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.area_px > 0.8 * press.true_masks[0].size
+    assert {Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE} <= contact.flags
+
+
+def test_a_crown_is_not_taken_for_its_blueberry():
+    press = render_press(draw_fruit("blueberry", 7002, bruised=True), 7002, (4.0, 6.5))
+    method = RobustMethod(press.references, RobustParameters())
+    for frame, truth in zip(press.frames, press.true_masks, strict=True):
+        assert method.measure(frame).area_px == pytest.approx(np.count_nonzero(truth), rel=0.15)
 
 
 def test_confidence_falls_with_the_contrast(sphere_press):
