@@ -28,7 +28,8 @@ _SHARE_OF_RANDOM, _SHARE_OF_COHERENCE, _SHARE_OF_FIELD = 0.33, 1.6, -0.2
 _SHARES = (0.2, 0.76)
 """Of the cap, where the region ends: the less the change's directions agree, the weaker is a body's rim."""
 _COHERENCE_WINDOW_SHARE = 0.13
-_SMOOTH, _SMOOTH_PER_SIZE = 1.142, 0.185
+_SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
+_SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
 _SPAN = 1.9
 _INNER_SHARE = 0.6
 
@@ -71,6 +72,8 @@ class Body(NamedTuple):
     """Of the level's root where nothing touches."""
     coherence: float
     """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1."""
+    skin_coherence: float
+    """The same within a ninth of the radius, where the body has moved more than in a quarter of its region."""
 
     @property
     def radius_px(self) -> float:
@@ -80,7 +83,7 @@ class Body(NamedTuple):
     @property
     def textured(self) -> bool:
         """Whether seeds or drupelets turn the change's direction within the window, which a smooth body does not."""
-        return self.coherence < _SMOOTH - _SMOOTH_PER_SIZE * np.log(self.radius_px)
+        return self.skin_coherence < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(self.radius_px))
 
 
 def movement(half: FloatImage, background: FloatImage, evening: FloatImage) -> Movement:
@@ -129,7 +132,8 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         region = _drawn(middle, radii, every, (region.shape[0], region.shape[1]))
         if not region.any():
             return None
-    return Body(region, middle, radii, level, spread, coherence)
+    skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
+    return Body(region, middle, radii, level, spread, coherence, skin)
 
 
 def evening(light: FloatImage) -> FloatImage:
@@ -163,8 +167,11 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
-    """Squared mean over mean square of the change in a window, both above the background's: the region's median."""
+def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float = 0.0) -> float:
+    """Squared mean over mean square of the change in a window, both above the background's: the region's median.
+
+    The share `leave_out` of the region that has moved least is left out.
+    """
     window_px = max(_BLUR_PX, window_px)
     change, squared = moved.change, moved.squared
     if window_px > _HALF_FROM_PX:
@@ -176,8 +183,9 @@ def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     background = resized(moved.background, (whole.shape[1], whole.shape[0]))
     floors = [weighted_median(one, background) for one in (agreed, whole)]
     inside = region > 0
-    share = np.maximum(agreed[inside] - floors[0], 0) / np.maximum(whole[inside] - floors[1], _LEAST_LEVEL)
-    return float(np.median(share))
+    agreed, whole = np.maximum(agreed[inside] - floors[0], 0), np.maximum(whole[inside] - floors[1], _LEAST_LEVEL)
+    kept = whole >= _quantile(whole, leave_out)
+    return float(np.median(agreed[kept] / whole[kept]))
 
 
 def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float, every: int) -> _Floats:

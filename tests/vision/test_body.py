@@ -42,7 +42,7 @@ def start(radius, x=60.0, y=80.0):
 def test_the_region_of_a_body_does_not_hang_on_where_it_was_seen(made, seen_px):
     body = find_body(moved(made(32)), start(seen_px))
     assert body is not None
-    assert np.count_nonzero(body.region) == pytest.approx(np.pi * 32**2, rel=0.2)
+    assert 0.9 < np.count_nonzero(body.region) / (np.pi * 32**2) < 1.35
 
 
 def test_directions_that_turn_from_place_to_place_are_texture():
@@ -54,7 +54,8 @@ def test_an_open_ring_is_its_whole_disc():
     ring = smooth(40) * ((away() > 26) & ((ROWS > 60) | (np.abs(COLUMNS - 60) > 10)))[..., None]
     body = find_body(moved(ring), (np.abs(ring).sum(axis=2) > 1).astype(np.uint8))
     assert body is not None
-    assert np.count_nonzero(body.region) == pytest.approx(np.pi * 40**2, rel=0.15)
+    assert 0.9 < np.count_nonzero(body.region) / (np.pi * 40**2) < 1.35
+    assert body.region[80, 60]
 
 
 def test_a_region_may_reach_beyond_the_border():
