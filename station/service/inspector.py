@@ -1,6 +1,7 @@
 """Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
 
 import asyncio
+from collections.abc import Callable
 
 from station.calibration.gate import gated
 from station.devices.camera.interface import Frame
@@ -78,7 +79,7 @@ class Inspector:
             return Event.REFERENCE_BAD
         self._crew.watches[GRIPPER].heard()
         recipe = now.active.recipe
-        frames = await self._grip(now).sound_frames(recipe.imaging.reference_frames)
+        frames = await self._grip(now, self._count).sound_frames(recipe.imaging.reference_frames)
         self._crew.watches[CAMERA].heard()
         now.reference_s = frames[-1].captured_s
         self._examining = asyncio.ensure_future(self._examine(now, frames))
@@ -190,8 +191,14 @@ class Inspector:
         now.verdict = judge(now.press(), now.active.recipe)
         now.outcome_name = "NO_RESULT"
 
-    def _grip(self, now: Inspection) -> Grip:
-        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience, self._count)
+    def _grip(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> Grip:
+        deadline_s = FRAME_DEADLINE_S * self._settings.patience
+        return Grip(self._crew.cell, now.active.recipe, deadline_s, on_frame or self._look_ahead)
+
+    def _look_ahead(self, frame: Frame) -> None:
+        self._count(frame)
+        if not frame.faults:
+            self._eye.look_ahead(frame)
 
     def _count(self, frame: Frame) -> None:
         for fault in frame.faults or ("good",):
