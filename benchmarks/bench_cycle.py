@@ -208,6 +208,7 @@ def table(results: dict[str, list[Inspected]], spent: Spent) -> list[str]:
     """Medians over the repeats."""
     rows = []
     for kind, _ in FRUIT:
+        outcomes = ", ".join(sorted({each.outcome for each in results[kind]}))
         outcome_s = statistics.median(each.to_outcome_s for each in results[kind])
         cycle_s = statistics.median(each.to_ready_s for each in results[kind])
         floors_s = [floor.kinds_s for _, floor in spent[kind]]
@@ -215,8 +216,9 @@ def table(results: dict[str, list[Inspected]], spent: Spent) -> list[str]:
         floor_s = sum(parts.values())
         ours_s = cycle_s - floor_s
         rows.append(
-            f"| {kind} | {', '.join(sorted({each.outcome for each in results[kind]}))} | {outcome_s:.2f} | {cycle_s:.2f} | {parts['motion']:.2f} | {parts['settling']:.2f} | "
-            f"{parts['camera']:.2f} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / cycle_s:.1f} % |"
+            f"| {kind} | {outcomes} | {outcome_s:.2f} | {cycle_s:.2f} | {parts['motion']:.2f} | "
+            f"{parts['settling']:.2f} | {parts['camera']:.2f} | {floor_s:.2f} | {ours_s:.2f} | "
+            f"{100 * ours_s / cycle_s:.1f} % |"
         )
     return rows
 
@@ -276,14 +278,14 @@ def main() -> None:
         "as many frames, with no reference examined, nothing measured, judged, recorded or told. Ours is the cycle",
         "less the floor; what others make of a busy machine's processors counts as ours.",
         "",
-        "| fruit | outcome | to outcome, s | cycle, s | motion, s | settling, s | camera, s | floor, s | ours, s | ours, share |",
+        "| fruit | outcome | to outcome, s | cycle, s | motion, s | settling, s | camera, s | floor, s | ours, s | % |",
         "|---|---|---|---|---|---|---|---|---|---|",
         *table(results, spent),
         "",
         "## Where ours goes",
         "",
-        "Each phase of the station's less the floor's, ms, medians. In the onset nothing else can go on while a picture",
-        "is measured on the last millimetres, and a stride that was begun meanwhile on the way there is stopped. The",
+        "Each phase of the station's less the floor's, ms, medians. On the onset's last millimetres nothing else can",
+        "go on while a picture is measured, and a stride that was begun meanwhile on the way there is stopped. The",
         "steps' measurements overlap their moves; their last one, after which an early stop ends the next step's move,",
         "does not.",
         "",
