@@ -250,7 +250,8 @@ class Crew:
         newer_than_s = time.monotonic()
         frame = await self.cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
         self._bad_frames = self._bad_frames + 1 if frame.faults else 0
-        if self._bad_frames >= _BAD_FRAMES:
+        known_ill = isinstance(self.watches[CAMERA].fault, FramesError)  # which only a good frame ends
+        if self._bad_frames >= _BAD_FRAMES or (frame.faults and known_ill):
             raise FramesError(
                 f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
                 "and its light, then `station devices check`",

@@ -5,7 +5,8 @@ import resource
 
 import pytest
 
-from station.channel.line import CommandName, PackmlState
+from station.channel.line import CommandDone, CommandName, PackmlState
+from station.channel.panel import Recover
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
 from station.twin.ur.controller import UrController
@@ -75,6 +76,21 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert AlarmId.ARM_LINK_LOST in active(cell)
             assert not (await line.state()).ready
             crew.renew_health = renew
+            await line.ready()
+
+            faults = cell.twin.boards["arm"]
+            faults.set("registers_in_use")  # which is told to new clients alone
+            faults.set("link_cut")
+            async with asyncio.timeout(60):
+                while "arm" not in crew.faults:
+                    await asyncio.sleep(0.05)
+                faults.clear("link_cut")
+                while AlarmId.ARM_NOT_REMOTE not in active(cell):
+                    await asyncio.sleep(0.05)
+            assert "claim registers" in cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail
+            faults.clear()
+            done = await line.client.ask(Recover(what="program"), CommandDone, deadline_s=60)
+            assert done.done, done.why
             await line.ready()
 
     asyncio.run(scenario())
