@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from station.calibration.gate import gated
 from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, Event
@@ -175,7 +176,12 @@ class Inspector:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
         if self._settings.placing == "arm" and self._crew.cell.arm is not None:
             await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
-        await self._crew.cell.gripper.open()
+        try:
+            await self._crew.cell.gripper.open()
+        except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
+            # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
+            # unknown needs a person.
+            await self._crew.cell.gripper.open()
         return Event.PLACED
 
     @staticmethod

@@ -7,6 +7,7 @@ import pytest
 
 from station.channel.line import CommandDone, CommandName, PackmlState
 from station.channel.panel import Recover
+from station.devices.gripper.errors import GripperSilentError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
 from station.twin.ur.controller import UrController
@@ -150,5 +151,29 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
             again = await line.inspect()
             assert again.sequence == begun.sequence + 1
             assert again.area_mm2 is not None
+
+    asyncio.run(scenario())
+
+
+def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            gripper = cell.station.service._crew.cell.gripper
+            status, lost = gripper.link.status, []
+
+            async def lose_one():
+                if not lost:
+                    lost.append(await status())
+                    raise GripperSilentError("the answer was lost", "look at the network")
+                return await status()
+
+            cell.at(State.PLACING_ACCEPT, lambda: setattr(gripper.link, "status", lose_one))
+            assert (await cell.line.inspect()).outcome == "PASS"
+            await cell.line.ready()
+            assert lost
+            assert AlarmId.FRUIT_HELD not in active(cell)
+            assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
 
     asyncio.run(scenario())
