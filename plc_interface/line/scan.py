@@ -1,5 +1,6 @@
 """The scan loop: every few milliseconds one Modbus exchange, as a PLC's Modbus block does it."""
 
+import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from typing import Self
@@ -57,7 +58,10 @@ class Scanner:
             What was read, by name; None where the exchange failed, see `trouble`.
         """
         try:
-            words = await self._exchanged(self._laid_out(outputs))
+            try:
+                words = await self._exchanged(self._laid_out(outputs))
+            finally:
+                _be_cancelled()
             values = {register.name: self._value(register, words) for register in _READ}
         except (ModbusException, RegisterValueError, TimeoutError, OSError) as error:
             self.trouble = f"{self._address[0]}:{self._address[1]}: {error}"
@@ -97,3 +101,10 @@ class Scanner:
 
     def _value(self, register: Register, words: Sequence[int]) -> int | float | str:
         return decode(register, words[register.address - _FIRST : register.end - _FIRST], self._order)
+
+
+def _be_cancelled() -> None:
+    """End where pymodbus lost a cancellation: Python 3.11's `wait_for` drops one that comes with an answer."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError

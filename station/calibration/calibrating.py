@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import combinations
 from math import hypot
+from typing import NamedTuple
 
 from station.calibration import figures, gel
 from station.calibration.bench import Bench, Place, Progress, Tell, Unit
 from station.calibration.checks import ROUNDEST, calibration_checks
 from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
-from station.calibration.model import Calibration, Noise, PlacePoint, stamp
+from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings
@@ -50,6 +51,28 @@ class Draft:
     steps: tuple[Step, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What was seen of a calibration, however far it came."""
+
+    reference: Image | None
+    steps: tuple[Step, ...]
+    """Every press, also those at further places."""
+    checks: tuple[Check, ...]
+
+
+class _Measured(NamedTuple):
+    """What the result is judged by."""
+
+    reference: Image
+    frames: Sequence[Image]
+    """With nothing touching."""
+    steps: Sequence[Step]
+    onset_mm: float
+    noise: Noise
+    places: Sequence[PlacePoint]
+
+
 class Calibrating:
     """One run. Nothing is stored; what is called off leaves the jaws open.
 
@@ -79,23 +102,31 @@ class Calibrating:
         self._places = [Place(0.0, 0.0), *places]
         self._operator, self._program, self._tell = operator, program, tell
         self._press = BallPress(bench, recipe)
+        self._pressed: list[Step] = []
+        self._checks: tuple[Check, ...] = ()
         if any(hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < _LEAST_WAY_MM for a, b in combinations(self._places, 2)):
             raise ValueError(f"expected places at least {_LEAST_WAY_MM:g} mm apart, the first is 0,0")
 
+    @property
+    def evidence(self) -> Evidence:
+        """What was seen until now."""
+        return Evidence(self._press.reference, tuple(self._pressed), self._checks)
+
     async def run(self) -> Draft:
-        """Calibrate once. The gripper closes on the ball again and again.
+        """Calibrate once. The gripper closes on the ball again and again, and lets it go before the result is judged.
 
         Raises:
             RefusedError: what was measured is no calibration, with every reason.
             StationError: a device's fault; by then the jaws were told to open.
         """
         try:
-            draft = await self._run()
+            measured = await self._measure()
         except BaseException:
             await self._let_go()
             raise
         await self._bench.release()
-        return draft
+        self._say("judge", 1, 1, "")
+        return await asyncio.to_thread(self._judge, measured)
 
     async def _let_go(self) -> None:
         try:
@@ -103,7 +134,7 @@ class Calibrating:
         except StationError as error:
             log.warning("the jaws could not be opened: %s", error)
 
-    async def _run(self) -> Draft:
+    async def _measure(self) -> _Measured:
         self._say("untouched", 1, 1, f"{NOISE_FRAMES} frames, nothing may touch the gel")
         frames = await self._press.take_reference(NOISE_FRAMES)
         reference = self._press.reference
@@ -120,10 +151,7 @@ class Calibrating:
         self._say("onset", 1, 1, f"between {before[-1].width_mm:.1f} and {first.width_mm:.1f} mm")
         onset_mm = await self._press.fine_onset(before[-1].width_mm, first.width_mm)
         noise = await asyncio.to_thread(figures.noise, frames, [*untouched, *(step.contact for step in before)])
-        places = await self._at_places(onset_mm)
-        self._say("judge", 1, 1, "")
-        scale = figures.scale_of(places, self._settings.place_tolerance_mm) if len(places) > 1 else None
-        return self._judge(reference, frames, steps, onset_mm, noise, places, scale)
+        return _Measured(reference, frames, steps, onset_mm, noise, await self._at_places(onset_mm))
 
     async def _press_through(self) -> list[Step]:
         plan = self._recipe.steps
@@ -132,6 +160,7 @@ class Calibrating:
         for number in range(plan.number + 1):
             step = await self._press.step(start_mm - number * plan.step_mm)
             steps.append(step)
+            self._pressed.append(step)
             area = f"{step.contact.area_px} px" if step.contact.found else "no contact"
             self._say("press", number + 1, plan.number + 1, f"{step.width_mm:.2f} mm: {area}")
             if number == 0 and step.contact.found:
@@ -158,6 +187,7 @@ class Calibrating:
                 await self._bench.lay(place)
                 await self._press.take_reference(self._recipe.imaging.reference_frames)
             step = await self._press.step(onset_mm - _PLACES_CLOSING_MM)
+            self._pressed.append(step)
             contact = step.contact
             where = f"place {number + 1}, {place.x_mm:g},{place.y_mm:g} mm"
             if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
@@ -179,20 +209,15 @@ class Calibrating:
             self._say("place", number + 1, len(self._places), f"{where}: at {x_px:.0f}, {y_px:.0f} px")
         return found
 
-    def _judge(
-        self,
-        reference: Image,
-        frames: Sequence[Image],
-        steps: Sequence[Step],
-        onset_mm: float,
-        noise: Noise,
-        places: Sequence[PlacePoint],
-        scale: MeasuredScale | None,
-    ) -> Draft:
+    def _judge(self, measured: _Measured) -> Draft:
+        reference, frames, steps, onset_mm, noise, places = measured
+        scale: MeasuredScale | None = None
+        if len(places) > 1:
+            scale = figures.scale_of(places, self._settings.place_tolerance_mm)
         height, width = reference.shape[:2]
         usual = Scale.typical(height, width)
         made = datetime.now(UTC)
-        checks = calibration_checks(self._settings, self._recipe, steps, onset_mm, noise, scale)
+        checks = self._checks = tuple(calibration_checks(self._settings, self._recipe, steps, onset_mm, noise, scale))
         calibration = Calibration(
             id=stamp(made),
             serial=self._unit.serial,
@@ -215,7 +240,7 @@ class Calibrating:
             light_levels=gel.light(reference),
             sharpness_levels=round(gel.sharpness(reference), 3),
             field=figures.field_map(reference, frames),
-            checks=tuple(checks),
+            checks=checks,
         )
         if bad := [check for check in checks if not check.passed]:
             raise RefusedError(*(f"{one.name}: {one.found}, expected {one.expected}: {one.remedy}" for one in bad))

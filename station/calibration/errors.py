@@ -8,7 +8,7 @@ class CalibrationError(StationError):
 
 
 class RefusedError(CalibrationError):
-    """What was measured is no calibration; nothing is stored.
+    """What was measured is no calibration; the one before stands.
 
     Args:
         reasons: in sentences, each with what to do.

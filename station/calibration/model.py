@@ -155,6 +155,27 @@ class Verification(Stored):
         return None if self.area_ratio is None else self.area_ratio - 1.0
 
 
+class Refusal(Stored):
+    """What was measured and is no calibration."""
+
+    schema_version: Literal[1] = 1
+    id: Stamp
+    serial: Serial
+    unit: str
+    operator: str
+    reasons: tuple[str, ...]
+    """In sentences, each with what to do."""
+    checks: tuple[Check, ...]
+    """Empty where it did not come to them."""
+    curve: tuple[PressPoint, ...]
+    """As far as it came."""
+
+    @property
+    def made_at(self) -> datetime:
+        """When, UTC."""
+        return time_of(self.id)
+
+
 def stamp(at: datetime) -> str:
     """A record's name from its time.
 

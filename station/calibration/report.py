@@ -5,8 +5,8 @@ import base64
 import cv2
 import jinja2
 
-from station.calibration.calibrating import Draft
-from station.calibration.model import Calibration
+from station.calibration.calibrating import Draft, Evidence
+from station.calibration.model import Calibration, Refusal
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE, press_name
 from station.calibration.verifying import Verified, outlined
@@ -74,6 +74,36 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
         tiles=[("untouched", "now", _tile(verified.reference)), *tiles],
     )
     return {REFERENCE: png(verified.reference), "area.png": area, **pictures, PAGE: page}
+
+
+def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
+    """The pictures and the page of what is no calibration, by file name.
+
+    Args:
+        refusal: why.
+        evidence: what was seen.
+    """
+    reference = evidence.reference
+    pictures = {} if reference is None else {REFERENCE: png(reference)}
+    pictures |= {press_name(number): png(step.image) for number, step in enumerate(evidence.steps)}
+    untouched = [] if reference is None else [("untouched", "reference", _tile(reference))]
+    tiles = [
+        (f"{step.width_mm:.2f} mm", f"{step.contact.area_px} px", _tile(outlined(step))) for step in evidence.steps
+    ]
+    page = _page(
+        title=f"Refused calibration {refusal.id} of {refusal.serial}",
+        verdict=False,
+        facts=[
+            ("Unit", refusal.unit),
+            ("Operator", refusal.operator or "not told"),
+            ("Made", f"{refusal.made_at:%Y-%m-%d %H:%M:%S} UTC"),
+            *(("Refused", reason) for reason in refusal.reasons),
+        ],
+        checks=[(check, None) for check in refusal.checks],
+        plots=[],
+        tiles=[*untouched, *tiles],
+    )
+    return {**pictures, PAGE: page}
 
 
 def png(picture: Image) -> bytes:

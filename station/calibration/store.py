@@ -1,6 +1,7 @@
 """Calibrations and verifications on the disk: each a folder of its own, there whole or not at all, and never changed.
 
-`calibrations/SERIAL/ID/` and `verifications/SERIAL/ID/` in the home folder, with the record, its pictures and a page.
+`calibrations/SERIAL/ID/`, `verifications/SERIAL/ID/` and, for a person to see why, `refused_calibrations/SERIAL/ID/` in
+the home folder, with the record, its pictures and a page.
 """
 
 import contextlib
@@ -16,11 +17,11 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
-from station.calibration.model import Calibration, Serial, Stamp, Stored, Verification
+from station.calibration.model import Calibration, Refusal, Serial, Stamp, Stored, Verification
 from station.vision.contact import Image
 
-CALIBRATIONS, VERIFICATIONS = "calibrations", "verifications"
-RECORDS = {CALIBRATIONS: "calibration.json", VERIFICATIONS: "verification.json"}
+CALIBRATIONS, VERIFICATIONS, REFUSALS = "calibrations", "verifications", "refused_calibrations"
+RECORDS = {CALIBRATIONS: "calibration.json", VERIFICATIONS: "verification.json", REFUSALS: "refusal.json"}
 REFERENCE = "reference.png"
 PAGE = "report.html"
 _UNFINISHED = ".unfinished-"
@@ -62,6 +63,15 @@ class CalibrationStore:
             files: its pictures and page.
         """
         return self._add(VERIFICATIONS, verification.serial, verification.id, verification, files)
+
+    def add_refusal(self, refusal: Refusal, files: Mapping[str, bytes]) -> Path:
+        """Keep what was no calibration, for a person to look at, as `add_calibration`. It is never used.
+
+        Args:
+            refusal: why.
+            files: its pictures and page.
+        """
+        return self._add(REFUSALS, refusal.serial, refusal.id, refusal, files)
 
     def serials(self) -> tuple[str, ...]:
         """The units that were ever calibrated."""

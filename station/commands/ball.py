@@ -65,7 +65,7 @@ async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncI
         arm = None
         if not (bench or site.service.bench):
             arm = await stack.enter_async_context(UrArm(site.arm))
-            await arm.ready(_ARM_DEADLINE_S)
+            await arm.ready(_ARM_DEADLINE_S * site.service.patience)
             await stack.enter_async_context(kept_healthy(arm))
         if not yes:
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"

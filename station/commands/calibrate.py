@@ -3,15 +3,17 @@
 import asyncio
 import getpass
 import logging
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 import click
 
-from station.calibration.bench import Place
-from station.calibration.calibrating import Calibrating, Draft
-from station.calibration.model import Check
-from station.calibration.report import calibration_files
+from station.calibration.bench import Place, Unit
+from station.calibration.calibrating import Calibrating, Draft, Evidence
+from station.calibration.errors import CalibrationError, RefusedError
+from station.calibration.model import Check, Refusal, stamp
+from station.calibration.report import calibration_files, refusal_files
 from station.calibration.store import PAGE, CalibrationStore
 from station.commands.ball import at_the_bench, cancelled_by_signals, show
 from station.errors import BadInputError
@@ -72,8 +74,8 @@ def calibrate(
 ) -> None:
     """Calibrate the sensor with the rubber ball, and store the result. The gripper closes on the ball.
 
-    The station must not run meanwhile. A result that is no good is not stored, and the reasons are told. Called off
-    with Ctrl-C, nothing is stored.
+    The station must not run meanwhile. A result that is no good is no calibration: the reasons are told, and where its
+    pictures lie. Called off with Ctrl-C, nothing is stored.
     """
     if context.invoked_subcommand is not None:
         return
@@ -95,6 +97,20 @@ def _store(site: Configuration, operator: str, draft: Draft) -> Path:
         return store.add_calibration(new, calibration_files(draft))
 
 
+def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:
+    """Keep the pictures by which a person sees why."""
+    refusal = Refusal(
+        id=stamp(datetime.now(UTC)),
+        serial=unit.serial,
+        unit=unit.name,
+        operator=operator,
+        reasons=refused.reasons,
+        checks=evidence.checks,
+        curve=tuple(step.point for step in evidence.steps),
+    )
+    return CalibrationStore(site.home).add_refusal(refusal, refusal_files(refusal, evidence))
+
+
 def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench: bool, yes: bool) -> Draft:
     async def run() -> Draft:
         cancelled_by_signals()
@@ -112,7 +128,11 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
                 )
             except ValueError as error:
                 raise BadInputError(f"--place: {error}") from error
-            return await procedure.run()
+            try:
+                return await procedure.run()
+            except RefusedError as refused:
+                folder = _keep_refusal(site, unit, operator, refused, procedure.evidence)
+                raise CalibrationError(f"{refused}; look at {folder / PAGE}") from refused
 
     logging.basicConfig(format="station: %(message)s")
     try:

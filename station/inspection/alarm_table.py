@@ -309,7 +309,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.MANY_NO_RESULT: AlarmRow(
         28,
         Priority.MEDIUM,
-        "Many fruit in a row could not be judged.",
+        "Five fruit in a row could not be judged.",
         "Good fruit is diverted.",
         "Look at the reasons: clean the gel, check how the fruit lies, and whether the recipe is the fruit's.",
         (P("nest", "empty"), P("camera", "lens_fogged")),
@@ -317,7 +317,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.REJECT_RATE: AlarmRow(
         29,
         Priority.LOW,
-        "Far more or fewer fruit are rejected than usual.",
+        "More than ten of the last twenty fruit failed.",
         "The lot is bad, or the measurement is.",
         "Look at some rejected fruit; check the lot, the recipe and the gel.",
         (P("nest", "bruised"),),

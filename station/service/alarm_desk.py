@@ -5,8 +5,9 @@ import logging
 import time
 
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.camera.interface import CameraError, FrameFault
+from station.devices.camera.interface import FrameFault
 from station.devices.gripper.errors import (
+    GripperEmergencyStopError,
     GripperLinkLostError,
     GripperProtocolError,
     GripperSilentError,
@@ -36,10 +37,10 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
             AlarmId.ARM_NOT_REMOTE,
         }
     ),
-    GRIPPER: frozenset({AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
+    GRIPPER: frozenset({AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
     CAMERA: frozenset({AlarmId.CAMERA_LOST, AlarmId.CAMERA_STALE}),
 }
-"""What only a device's watch tells; all of it is cleared once the device is well."""
+"""What only the devices' watches tell; all of it is cleared once each of its devices is well."""
 
 _MOST_UNSAVED = 1000
 _ARM = {
@@ -71,12 +72,12 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
             return next((alarm for faults, alarm in _FRAMES if fault.faults & faults), AlarmId.CAMERA_STALE)
         case ArmFault():
             return _ARM.get(fault.cause, AlarmId.ARM_LINK_LOST)
+        case GripperEmergencyStopError():
+            return AlarmId.EMERGENCY_STOP
         case GripperTimeoutError():
             return AlarmId.GRIPPER_JAM
         case _ if isinstance(fault, _GRIPPER_LINK):
             return AlarmId.GRIPPER_LINK_LOST
-        case CameraError():
-            return AlarmId.CAMERA_LOST
     return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_LOST}[device]
 
 
@@ -144,7 +145,7 @@ class AlarmDesk:
         told = None if fault is None else alarm_of(device, fault)
         before, self._told[device] = self._told.get(device), told
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
-            if alarm is not told:
+            if alarm not in self._told.values():
                 self.clear(alarm)
         if told is not None:
             self.raise_(told, str(fault))

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError
-from station.devices.gripper.errors import GripperError
+from station.devices.gripper.errors import GripperEmergencyStopError, GripperError
 from station.errors import StationError
 from station.inspection.cycle import START, Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
@@ -36,6 +36,8 @@ def event_of(fault: BaseException) -> Event:
     match fault:
         case ArmFault():
             return _STOPS.get(fault.cause, Event.ARM_FAULT)
+        case GripperEmergencyStopError():
+            return Event.EMERGENCY_STOP
         case GripperError():
             return Event.GRIPPER_FAULT
         case CameraError() | FramesError():

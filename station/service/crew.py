@@ -12,6 +12,7 @@ from station.devices.camera.interface import CameraError
 from station.devices.camera.open import camera_from
 from station.devices.gripper.errors import (
     NEEDS_ACTIVATION,
+    GripperEmergencyStopError,
     GripperError,
     GripperFaultError,
     GripperNotActiveError,
@@ -142,10 +143,9 @@ class Crew:
                 pass
 
     @property
-    def standing_stop(self) -> ArmFault | None:
+    def standing_stop(self) -> StationError | None:
         """The safety stop that stands and is a person's."""
-        fault = self.watches[ARM].fault if ARM in self.watches else None
-        return fault if isinstance(fault, ArmFault) and fault.cause in STANDING_STOPS else None
+        return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
 
     def renew_health(self, lease_s: float) -> None:
         """Let the arm move for a while; when the lease runs out its controller stops it.
@@ -250,7 +250,8 @@ class Crew:
         newer_than_s = time.monotonic()
         frame = await self.cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
         self._bad_frames = self._bad_frames + 1 if frame.faults else 0
-        if self._bad_frames >= _BAD_FRAMES:
+        known_ill = isinstance(self.watches[CAMERA].fault, FramesError)  # which only a good frame ends
+        if self._bad_frames >= _BAD_FRAMES or (frame.faults and known_ill):
             raise FramesError(
                 f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
                 "and its light, then `station devices check`",
@@ -273,3 +274,9 @@ class Crew:
         self._stale_looks = self._stale_looks + 1 if stale else 0
         if fault is not None and not 0 < self._stale_looks < _STALE_LOOKS:
             raise fault
+
+
+def _is_stop(fault: StationError) -> bool:
+    """Whether it is a safety stop, as the arm or the gripper that it carries tells."""
+    stopped_arm = isinstance(fault, ArmFault) and fault.cause in STANDING_STOPS
+    return stopped_arm or isinstance(fault, GripperEmergencyStopError)

@@ -1,12 +1,14 @@
 """The parts of a grip: sound frames, width steps, the approach, letting go. Why it grips is not known here."""
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Awaitable, Callable, Collection
 from dataclasses import dataclass
 
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, FrameFault, Image
+from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
 from station.settings.arm import PoseName
@@ -81,7 +83,7 @@ class Grip:
         cell: the devices, opened.
         recipe: width steps, speed, force, settle time and frames.
         frame_deadline_s: longest wait for one frame.
-        on_frame: gets every frame, also those with faults.
+        on_frame: gets every frame as it comes, also those with faults.
     """
 
     def __init__(
@@ -182,9 +184,7 @@ class Grip:
             ahead = None
             try:
                 if one_ahead:
-                    move = await self.close_to(width_mm - stride_mm)
-                    if not judging.done() or not judging.result():  # else no picture of it is needed
-                        ahead = GripStep(-1, move, await self.sound_frames(1))
+                    ahead = await self._glance_ahead(width_mm - stride_mm, judging)
             finally:
                 touched = await judging
             held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
@@ -205,6 +205,24 @@ class Grip:
     async def _glance(self, width_mm: float) -> GripStep:
         move = await self.close_to(width_mm)
         return GripStep(-1, move, await self.sound_frames(1))
+
+    async def _glance_ahead(self, width_mm: float, judging: asyncio.Future[bool]) -> GripStep | None:
+        """Glance at the next width, unless the one before is found to touch; then the fingers stop on their way."""
+        moving = asyncio.ensure_future(self.close_to(width_mm))
+        try:
+            await asyncio.wait({moving, judging}, return_when=asyncio.FIRST_COMPLETED)
+            if not moving.done() and judging.result():
+                await self._cell.gripper.stop()
+                with contextlib.suppress(GripperStoppedError):
+                    await moving
+                return None
+            move = await moving
+            if judging.done() and judging.result():
+                return None
+            return GripStep(-1, move, await self.sound_frames(1))
+        finally:
+            moving.cancel()
+            await asyncio.gather(moving, return_exceptions=True)
 
     async def let_go(self) -> str | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.

@@ -1,9 +1,11 @@
 """Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
 
 import asyncio
+from collections.abc import Callable
 
 from station.calibration.gate import gated
 from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, Event
@@ -78,7 +80,7 @@ class Inspector:
             return Event.REFERENCE_BAD
         self._crew.watches[GRIPPER].heard()
         recipe = now.active.recipe
-        frames = await self._grip(now).sound_frames(recipe.imaging.reference_frames)
+        frames = await self._grip(now, self._count).sound_frames(recipe.imaging.reference_frames)
         self._crew.watches[CAMERA].heard()
         now.reference_s = frames[-1].captured_s
         self._examining = asyncio.ensure_future(self._examine(now, frames))
@@ -174,7 +176,12 @@ class Inspector:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
         if self._settings.placing == "arm" and self._crew.cell.arm is not None:
             await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
-        await self._crew.cell.gripper.open()
+        try:
+            await self._crew.cell.gripper.open()
+        except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
+            # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
+            # unknown needs a person.
+            await self._crew.cell.gripper.open()
         return Event.PLACED
 
     @staticmethod
@@ -190,8 +197,14 @@ class Inspector:
         now.verdict = judge(now.press(), now.active.recipe)
         now.outcome_name = "NO_RESULT"
 
-    def _grip(self, now: Inspection) -> Grip:
-        return Grip(self._crew.cell, now.active.recipe, FRAME_DEADLINE_S * self._settings.patience, self._count)
+    def _grip(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> Grip:
+        deadline_s = FRAME_DEADLINE_S * self._settings.patience
+        return Grip(self._crew.cell, now.active.recipe, deadline_s, on_frame or self._look_ahead)
+
+    def _look_ahead(self, frame: Frame) -> None:
+        self._count(frame)
+        if not frame.faults:
+            self._eye.look_ahead(frame)
 
     def _count(self, frame: Frame) -> None:
         for fault in frame.faults or ("good",):

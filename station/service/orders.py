@@ -199,7 +199,8 @@ class Orders:
         if self._service.stop_asked:
             return "the station is told to end"
         if stop := self._crew.standing_stop:
-            return f"{stop} That is a person's to confirm at the cell, with `station devices recover`, before the reset"
+            why = str(stop).removesuffix(".")
+            return f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
         busy = STATES[self._service.state].refusal is Refusal.BUSY
         return "an inspection is under way; call it off first" if busy else ""
 

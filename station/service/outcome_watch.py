@@ -33,5 +33,5 @@ class OutcomeWatch:
         unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
         self._alarms.show(AlarmId.MANY_NO_RESULT, f"the last {_MANY} fruit could not be judged" if unjudged else "")
         failed = last.count("FAIL")
-        many = len(last) == _LAST and failed > _LAST / 2
-        self._alarms.show(AlarmId.REJECT_RATE, f"{failed} of the last {_LAST} fruit failed" if many else "")
+        many = failed > _LAST / 2
+        self._alarms.show(AlarmId.REJECT_RATE, f"{failed} of the last {len(last)} fruit failed" if many else "")

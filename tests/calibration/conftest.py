@@ -1,6 +1,7 @@
 """Balls that are drawn instead of pressed, a simulated bench on the wire, and one stored calibration for many tests."""
 
 import asyncio
+import contextlib
 import importlib.util
 import itertools
 import os
@@ -99,18 +100,21 @@ class Site:
         return subprocess.run(self.command(*arguments), capture_output=True, text=True, timeout=280, check=False)
 
 
-@pytest.fixture
-def site(tmp_path: Path, unused_port: int) -> Iterator[Site]:
+@contextlib.contextmanager
+def running_twin(folder: Path, port: int, *, bench: bool) -> Iterator[Site]:
     """A twin in a process of its own with the ball in its nest."""
     host = f"127.78.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
-    configuration = tmp_path / "station.yaml"
+    configuration = folder / "station.yaml"
     configuration.write_text(
-        "home: home\nservice: {bench: true, patience: 20.0}\n"
+        f"home: home\nservice: {{bench: {str(bench).lower()}, patience: 20.0}}\n"
+        f"arm: {{host: {host}, stale_after_s: 1.0, link_lost_after_s: 4.0, watchdog_hz: 0.5, "
+        "constructor_limit_s: 60.0}\n"
         f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 3.0}}\n"
-        f"camera: {{oldest_s: 2.0, open_deadline_s: 20.0, twin: {{port: {unused_port}}}}}\n"
+        f"camera: {{oldest_s: 2.0, open_deadline_s: 20.0, twin: {{port: {port}}}}}\n"
     )
-    arguments = ("twin", "--bench", "--fruit", "rubber_ball", "--console", "0", "--config", str(configuration))
-    process = subprocess.Popen([sys.executable, "-m", "station", *arguments], stdout=subprocess.PIPE, text=True)
+    arguments = ["twin", "--fruit", "rubber_ball", "--console", "0", "--config", str(configuration)]
+    command = [sys.executable, "-m", "station", *arguments, *(["--bench"] if bench else [])]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     console = 0
     for line in process.stdout:
@@ -118,7 +122,21 @@ def site(tmp_path: Path, unused_port: int) -> Iterator[Site]:
             console = int(line.split(":")[1])
         if line.startswith("running"):
             break
-    yield Site(tmp_path / "home", configuration, f"TWIN-{unused_port}", console)
+    yield Site(folder / "home", configuration, f"TWIN-{port}", console)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     assert process.returncode == 0
+
+
+@pytest.fixture
+def site(tmp_path: Path, unused_port: int) -> Iterator[Site]:
+    """A twin on a bench."""
+    with running_twin(tmp_path, unused_port, bench=True) as made:
+        yield made
+
+
+@pytest.fixture
+def cell(tmp_path: Path, unused_port: int) -> Iterator[Site]:
+    """A twin with its arm."""
+    with running_twin(tmp_path, unused_port, bench=False) as made:
+        yield made

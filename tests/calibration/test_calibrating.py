@@ -1,6 +1,7 @@
 """What a calibration finds, and what it refuses."""
 
 import asyncio
+import html
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +13,8 @@ from station.calibration.calibrating import Calibrating
 from station.calibration.errors import RefusedError
 from station.calibration.figures import noise, scale_of
 from station.calibration.gate import gated
-from station.calibration.model import PlacePoint
+from station.calibration.model import PlacePoint, Refusal
+from station.calibration.report import refusal_files
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
@@ -74,6 +76,39 @@ def test_what_is_no_calibration_is_refused_with_its_reason(drawn_ball, calibrate
         calibrate_drawn(bench)
     assert bench.released == 1
     assert "no calibration is stored" in str(refused.value)
+
+
+def test_a_refusal_keeps_every_picture_and_check_and_is_never_used(drawn_ball, store):
+    procedure = Calibrating(
+        drawn_ball(1, kind=Kind.STRAWBERRY, holder_mm=6.0),
+        UNIT,
+        find_recipe("rubber_ball"),
+        CalibrationSettings(),
+        [],
+        "anna",
+        "0.1",
+        [].append,
+    )
+    with pytest.raises(RefusedError) as refused:
+        asyncio.run(procedure.run())
+    evidence = procedure.evidence
+    refusal = Refusal(
+        id="20260101T000000Z",
+        serial=UNIT.serial,
+        unit=UNIT.name,
+        operator="anna",
+        reasons=refused.value.reasons,
+        checks=evidence.checks,
+        curve=tuple(step.point for step in evidence.steps),
+    )
+    folder = store.add_refusal(refusal, refusal_files(refusal, evidence))
+    assert len(list(folder.glob("press_*.png"))) == len(evidence.steps) == 14
+    assert (folder / "reference.png").exists()
+    page = (folder / "report.html").read_text()
+    assert all(html.escape(reason).replace("&#x27;", "&#39;") in page for reason in refused.value.reasons)
+    assert any(not check.passed for check in refusal.checks)
+    assert Refusal.model_validate_json((folder / "refusal.json").read_bytes()) == refusal
+    assert store.current(UNIT.serial) is None
 
 
 def test_an_area_that_falls_is_refused(drawn_ball, calibrate_drawn):

@@ -130,3 +130,25 @@ def test_bad_places_and_bad_names_are_bad_usage(site):
     done = site.station("calibrate", "show", "yesterday")
     assert done.returncode == 2
     assert "there is no calibration 'yesterday'" in done.stderr
+
+
+@pytest.mark.timeout(900)
+def test_with_the_arm_a_dead_led_is_refused_and_shown_and_the_mended_sensor_is_calibrated_and_verified(cell):
+    cell.ask(do="set", device="camera", fault="led_dead")
+    refused = cell.station("calibrate", "--yes", "--operator", "anna")
+    assert refused.returncode == 1
+    assert "LED is dead" in refused.stderr
+    [folder] = (cell.home / "refused_calibrations" / cell.serial).iterdir()
+    assert f"look at {folder / 'report.html'}" in refused.stderr
+    assert "LED is dead" in (folder / "report.html").read_text()
+    assert (folder / "reference.png").stat().st_size > 10_000
+    assert "nothing is calibrated yet" in cell.station("calibrate", "list").stdout
+    assert "Traceback" not in refused.stderr
+
+    cell.ask(do="clear", device="camera")
+    calibrated = cell.station("calibrate", "--yes")
+    assert calibrated.returncode == 0, calibrated.stdout + calibrated.stderr
+    verified = cell.station("verify", "--yes")
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+    assert "PASS; look at" in verified.stdout
+    assert cell.ask(do="state")["width_mm"] > 52

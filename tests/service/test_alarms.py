@@ -1,12 +1,15 @@
 """Alarms that a fault raises while nothing is inspected, or by a reference that cannot serve; cleared after it."""
 
 import asyncio
+import shutil
 import time
 
 import pytest
 
+from station.channel.line import CommandName
 from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED
+from station.inspection.states import State
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, tell
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
@@ -114,5 +117,89 @@ def test_what_the_supervisor_tells_of_restarts_is_counted_and_many_are_an_alarm(
             assert counted()
             tell(file, {"plc": Restarts(3, (), given_up=True)})
             await until(lambda: AlarmId.PROCESS_RESTARTS in active(cell))
+
+    asyncio.run(scenario())
+
+
+def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the_jaws_are_clear(bench, until):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            cell.twin.boards["gripper"].set("under_voltage")
+            await until(lambda: AlarmId.GRIPPER_FAULT in active(cell))
+            assert "supply is too low" in cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail
+            cell.twin.boards["gripper"].clear()
+            cell.twin.world.remove()
+            done = await cell.line.order(CommandName.RESET)
+            assert done.done, done.why
+            await cell.line.ready()
+            await until(lambda: not caused(cell, AlarmId.GRIPPER_FAULT))
+
+    asyncio.run(scenario())
+
+
+def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            cell.twin.boards["gripper"].set("emergency_stopped")
+            await cell.reach(State.LATCHED)
+            await until(lambda: AlarmId.EMERGENCY_STOP in active(cell))
+            refused = await cell.line.order(CommandName.RESET)
+            assert not refused.done
+            assert "release the button" in refused.why
+            cell.twin.boards["gripper"].clear()
+            await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
+            assert AlarmId.EMERGENCY_STOP in active(cell)  # latched
+            assert cell.phase is State.LATCHED
+            done = await cell.line.order(CommandName.RESET)
+            assert done.done, done.why
+            await cell.line.ready()
+            assert AlarmId.EMERGENCY_STOP not in active(cell)
+
+    asyncio.run(scenario())
+
+
+def test_little_space_on_the_disk_is_told_before_it_is_too_little(bench, until, monkeypatch):
+    free_mb = 3.0
+
+    def disk_usage(_path):
+        return shutil._ntuple_diskusage(10**9, 0, int(free_mb * 1e6))
+
+    monkeypatch.setattr(shutil, "disk_usage", disk_usage)
+
+    async def scenario():
+        nonlocal free_mb
+        async with bench() as cell:  # which keeps 1 MB in reserve
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            assert AlarmId.DISK_LOW not in active(cell)
+            free_mb = 1.5
+            await until(lambda: AlarmId.DISK_LOW in active(cell))
+            assert (await cell.line.inspect()).area_mm2 is not None
+            free_mb = 3.0
+            await until(lambda: AlarmId.DISK_LOW not in active(cell))
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_many_fruit_that_cannot_be_judged_and_many_that_fail_are_alarms(bench, until):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("raspberry")
+            cell.twin.world.remove()
+            for _ in range(5):
+                assert AlarmId.MANY_NO_RESULT not in active(cell)
+                assert (await cell.line.inspect()).outcome == "NO_RESULT"
+            assert AlarmId.MANY_NO_RESULT in active(cell)
+            cell.lay("raspberry", 1, bruised=True)
+            for number in range(11):
+                assert AlarmId.REJECT_RATE not in active(cell)
+                assert (await cell.line.inspect()).outcome == "FAIL", number
+            assert AlarmId.REJECT_RATE in active(cell)
+            assert not caused(cell, AlarmId.MANY_NO_RESULT)
 
     asyncio.run(scenario())

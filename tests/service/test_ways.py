@@ -5,7 +5,9 @@ import resource
 
 import pytest
 
-from station.channel.line import CommandName, PackmlState
+from station.channel.line import CommandDone, CommandName, PackmlState
+from station.channel.panel import Recover
+from station.devices.gripper.errors import GripperSilentError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
 from station.twin.ur.controller import UrController
@@ -77,6 +79,21 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             crew.renew_health = renew
             await line.ready()
 
+            faults = cell.twin.boards["arm"]
+            faults.set("registers_in_use")  # which is told to new clients alone
+            faults.set("link_cut")
+            async with asyncio.timeout(60):
+                while "arm" not in crew.faults:
+                    await asyncio.sleep(0.05)
+                faults.clear("link_cut")
+                while AlarmId.ARM_NOT_REMOTE not in active(cell):
+                    await asyncio.sleep(0.05)
+            assert "claim registers" in cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail
+            faults.clear()
+            done = await line.client.ask(Recover(what="program"), CommandDone, deadline_s=60)
+            assert done.done, done.why
+            await line.ready()
+
     asyncio.run(scenario())
 
 
@@ -134,5 +151,29 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
             again = await line.inspect()
             assert again.sequence == begun.sequence + 1
             assert again.area_mm2 is not None
+
+    asyncio.run(scenario())
+
+
+def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            gripper = cell.station.service._crew.cell.gripper
+            status, lost = gripper.link.status, []
+
+            async def lose_one():
+                if not lost:
+                    lost.append(await status())
+                    raise GripperSilentError("the answer was lost", "look at the network")
+                return await status()
+
+            cell.at(State.PLACING_ACCEPT, lambda: setattr(gripper.link, "status", lose_one))
+            assert (await cell.line.inspect()).outcome == "PASS"
+            await cell.line.ready()
+            assert lost
+            assert AlarmId.FRUIT_HELD not in active(cell)
+            assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
 
     asyncio.run(scenario())

@@ -1,0 +1,148 @@
+"""What is measured, or moved, while something else is waited for: it comes to the same, and nothing is done twice."""
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperStoppedError
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.service import eye as eye_module
+from station.service.eye import Eye
+from station.service.grip import Cell, Grip, GripStep
+from station.service.keeping import Kept
+from station.service.reference import Golden
+from station.settings.recipe import find_recipe
+from station.settings.service import ReferenceSettings
+from station.vision.methods import make_method
+from station.vision.step import measure_step
+
+BLUEBERRY = find_recipe("blueberry")
+
+
+def frame(seed: int, pressed: float = 0.0) -> Frame:
+    """A drawn gel, shape (120, 160, 3), with a bump in its middle."""
+    y, x = np.mgrid[-60:60, -80:80]
+    bump = pressed * np.exp(-(x**2 + y**2) / 400.0)
+    slopes = np.dstack([128 + x * bump, 128 + y * bump, 128 - x * bump])
+    noise = np.random.default_rng(seed).normal(0, 1, slopes.shape)
+    return Frame(np.clip(slopes + noise, 0, 255).astype(np.uint8), seed, float(seed))
+
+
+def reading(width_mm: float) -> GripperReading:
+    return GripperReading(width_mm, 0, 0, ObjectState.AT_POSITION, active=True, fault_code=0, current_a=None, at_s=0.0)
+
+
+def step_of(frames: list[Frame]) -> GripStep:
+    return GripStep(1, MoveResult(18.0, 0, reading(18.0)), tuple(frames))
+
+
+@pytest.fixture
+def seen_images(monkeypatch):
+    """The images that the eye's method was asked to measure, by their identity, in order."""
+    seen: list[int] = []
+
+    def counting(references, segmentation):
+        method = make_method(references, segmentation)
+
+        def measure(image, on_stage=None):
+            seen.append(id(image))
+            return method.measure(image, on_stage)
+
+        return SimpleNamespace(stages=method.stages, measure=measure)
+
+    monkeypatch.setattr(eye_module, "make_method", counting)
+    return seen
+
+
+def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and_none_twice(tmp_path, seen_images):
+    references, frames = [frame(seed) for seed in range(3)], [frame(10 + seed, 2.0) for seed in range(3)]
+
+    async def scenario():
+        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        try:
+            await eye.take_reference(references, BLUEBERRY.segmentation)
+            for each in frames[:2]:
+                eye.look_ahead(each)
+            return await eye.measure(step_of(frames))
+        finally:
+            eye.close()
+
+    seen = asyncio.run(scenario())
+    assert seen_images[:3] == [id(each.image) for each in frames]
+    assert len(seen_images) == 4  # and their mean
+    median = np.median([each.image for each in references], axis=0).astype(np.uint8)
+    method = make_method([median], BLUEBERRY.segmentation)
+    plain = measure_step(method, [each.image for each in frames], BLUEBERRY.segmentation.robust.least_confidence)
+    assert plain.found
+    assert (seen.contact.area_px, seen.contact.confidence) == (plain.area_px, plain.confidence)
+    assert (seen.contact.mask == plain.mask).all()
+
+
+def test_a_frame_that_was_begun_against_an_old_reference_is_measured_anew(tmp_path, seen_images):
+    async def scenario():
+        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        try:
+            await eye.take_reference([frame(1)], BLUEBERRY.segmentation)
+            pressed = frame(10, 2.0)
+            eye.look_ahead(pressed)
+            await eye.take_reference([frame(2)], BLUEBERRY.segmentation)
+            await eye.measure(step_of([pressed]))
+            return id(pressed.image)
+        finally:
+            eye.close()
+
+    image = asyncio.run(scenario())
+    assert seen_images == [image, image]
+
+
+class SlowGripper:
+    """Fingers that get to a width at once, but on their way ahead wait until they are stopped."""
+
+    max_width_mm = 53.0
+
+    def __init__(self) -> None:
+        self.asked_mm: list[float] = []
+        self.stops = 0
+        self._stopped = asyncio.Event()
+
+    async def move_to_width(self, width_mm: float, _speed_mm_s: float, _force_n: float) -> MoveResult:
+        ahead = bool(self.asked_mm) and not self.stops
+        self.asked_mm.append(width_mm)
+        if ahead:
+            await self._stopped.wait()
+            raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+        return MoveResult(width_mm, 0, reading(width_mm))
+
+    async def stop(self) -> GripperReading:
+        self.stops += 1
+        self._stopped.set()
+        return reading(self.asked_mm[-1])
+
+
+class Camera:
+    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
+        return Frame(np.zeros((2, 2, 3), np.uint8), 1, time.monotonic())
+
+
+def test_fingers_on_their_way_to_the_next_width_stop_once_the_last_is_found_to_touch():
+
+    async def scenario():
+        gripper = SlowGripper()
+        grip = Grip(Cell(Camera(), gripper, None), BLUEBERRY)
+        largest_mm = BLUEBERRY.expected_width.largest_mm
+
+        async def touches(step):
+            await asyncio.sleep(0.01)
+            return step.move.width_mm < largest_mm + 0.5
+
+        before, start = await grip.approach(touches)
+        assert gripper.stops == 1
+        assert before is not None
+        assert start.move.width_mm < largest_mm + 0.5 <= before.move.width_mm
+        assert min(gripper.asked_mm) == pytest.approx(largest_mm - BLUEBERRY.steps.step_mm)
+
+    asyncio.run(scenario())
