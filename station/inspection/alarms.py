@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from station.inspection.alarm_table import ALARMS, AlarmId, urgency
+from station.inspection.alarm_table import ALARMS, WORD_BITS, AlarmId, urgency
 
 LONGEST_SHELVED_S = 8 * 3600.0
 """One shift: what is hidden for longer is not an alarm."""
@@ -191,10 +191,15 @@ class Alarms:
         ticked = (_ticked(alarm, now_s) for alarm in self.known.values())
         return type(self)({alarm.id: alarm for alarm in ticked if not alarm.forgotten(now_s)})
 
+    @property
+    def standing(self) -> tuple[Alarm, ...]:
+        """All that are not normal, also those that are shelved, most urgent first: by priority, the older first."""
+        standing = [alarm for alarm in self.known.values() if alarm.state is not AlarmState.NORMAL]
+        return tuple(sorted(standing, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
+
     def shown(self) -> tuple[Alarm, ...]:
-        """What an operator sees, most urgent first: by priority, the older first."""
-        shown = [alarm for alarm in self.known.values() if alarm.state in SHOWN]
-        return tuple(sorted(shown, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
+        """What an operator sees, most urgent first."""
+        return tuple(alarm for alarm in self.standing if alarm.state in SHOWN)
 
     @property
     def active(self) -> tuple[Alarm, ...]:
@@ -204,7 +209,8 @@ class Alarms:
     @property
     def word(self) -> int:
         """The PLC's 32 bits: bit n for an active alarm with number n + 1."""
-        return sum(1 << (ALARMS[alarm.id].number - 1) for alarm in self.active)
+        numbers = (ALARMS[alarm.id].number for alarm in self.active)
+        return sum(1 << (number - 1) for number in numbers if number <= WORD_BITS)
 
     @property
     def error_code(self) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
+from station.inspection.alarm_table import ALARMS, PRIORITIES, WORD_BITS, AlarmId, Priority
 from station.inspection.alarms import (
     CHATTER_RAISES,
     CHATTER_S,
@@ -50,7 +50,7 @@ ALARM = f"""# Alarms
 
 {MADE}
 An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and bit number - 1 of the PLC's
-alarm word is set while it is active.
+alarm word is set while it is active; a number above {WORD_BITS} has no bit there.
 """
 
 
@@ -104,7 +104,8 @@ def alarms_document() -> str:
         (
             f"Shelving ends by itself, after {LONGEST_SHELVED_S / 3600:g} h at the latest. An alarm that is raised "
             f"{CHATTER_RAISES} times within {CHATTER_S:g} s is told once, counted, and stays until it was quiet for "
-            f"{CHATTER_S:g} s. All of it is remembered over a restart.\n"
+            f"{CHATTER_S:g} s. All of it is remembered over a restart. `station alarms list` shows what stands, "
+            "`station alarms acknowledge`, `shelve` and `unshelve` change it; the audit trail tells who did so.\n"
         ),
         _life(LIFE),
         "Latched alarms are never shelved, and end only when a person has reset them after their cause is gone:\n",

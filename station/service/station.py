@@ -11,10 +11,12 @@ from pathlib import Path
 
 from station.errors import StationError
 from station.inspection.states import STATES
+from station.outbox.lag import Lag
 from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
+from station.service.alarm_orders import AlarmOrders
 from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.eye import Eye
@@ -129,12 +131,18 @@ class Station:
             metrics,
             liveness,
             calibrated,
+            Lag(configuration.outbox, configuration.home).trouble,
             broken=self._broken,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,
         )
         line = LineServer(
-            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate, lots
+            _made_room_for(line_endpoint(configuration.handshake, configuration.home)),
+            service,
+            orders,
+            gate,
+            lots,
+            AlarmOrders(alarms, trail),
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
         address = configuration.metrics
