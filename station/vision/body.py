@@ -177,7 +177,7 @@ def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float
     if window_px > _HALF_FROM_PX:
         size = (change.shape[1] // 2, change.shape[0] // 2)
         change, squared, window_px = resized(change, size), resized(squared, size), window_px / 2
-        region = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST)
+        region = np.asarray(cv2.resize(region, size, interpolation=cv2.INTER_NEAREST), np.uint8)
     agreed = length_squared(np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32))
     whole = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
     background = resized(moved.background, (whole.shape[1], whole.shape[0]))
@@ -197,7 +197,7 @@ def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float,
     along = cv2.remap(gain, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
     along[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
     gained = np.cumsum(along * away, axis=1) * (8 / (steps * reach_px))
-    return away[closed_path(-gained, _STIFFNESS)]
+    return np.asarray(away[closed_path(-gained, _STIFFNESS)], np.float64)
 
 
 def _drawn(middle: tuple[float, float], radii_px: _Floats, every: int, shape: tuple[int, int]) -> Mask:

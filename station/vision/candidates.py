@@ -58,7 +58,7 @@ def body_candidates(moved: Movement, bend: FloatImage, threshold: float) -> Cand
     bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_BRIDGE_PX, _BRIDGE_PX))
     framed = cv2.copyMakeBorder(seen, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, cv2.BORDER_CONSTANT)
     bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
-    found = [part for part in _parts(bridged) if bend[part > 0].max() > threshold]
+    found = [part for part in _parts(np.asarray(bridged, np.uint8)) if bend[part > 0].max() > threshold]
     return Candidates(_heaviest_first(level, found), level, levels)
 
 

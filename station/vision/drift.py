@@ -37,8 +37,6 @@ _STRIP_PX = 10
 _NO_PRIOR = 1e-3
 _MEDIAN_SIDE = 40
 
-_Floats = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class Drift:
@@ -77,14 +75,14 @@ class DriftModel:
         cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
         stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
         slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
-        grids: list[_Floats] = []
+        grids: list[FloatImage] = []
         for channel in range(3):
             shapes = cosines + [slope[..., channel] * stretch for slope in slopes for stretch in stretches]
             gained = resized(self._light[..., channel], self._grid)
             coarse = [resized(shape, self._grid) for shape in shapes]
-            grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float64))
-        self._coarse: _Floats = np.stack(grids)
-        self._transposed: _Floats = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
+            grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float32))
+        self._coarse: FloatImage = np.stack(grids)
+        self._transposed: FloatImage = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
         self._slopes = [_rows(resized(np.asarray(slope, np.float32), self._half)) for slope in slopes]
         self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
         self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
@@ -102,28 +100,28 @@ class DriftModel:
             difference: frame minus reference, shape (height, width, 3), float32, grey levels.
             background: a first guess of where nothing touches, any size, float32, 0 to 1.
         """
-        samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T, np.float64)
-        weight = resized(background, self._grid).ravel().astype(np.float64)
+        samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
+        weight = resized(background, self._grid).ravel()
         trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
         spread = 0.0
-        coefficients: _Floats = np.zeros((3, self._coarse.shape[2], 1))
+        coefficients = np.zeros((3, self._coarse.shape[2], 1), np.float32)
         fitted = np.zeros_like(samples)
         for _ in range(_ITERATIONS):
             weighted = self._transposed * weight
             normal = weighted @ self._coarse + self._ridge
-            coefficients = np.asarray(np.linalg.solve(normal, weighted @ samples[..., None]), np.float64)
+            coefficients = np.linalg.solve(normal, weighted @ samples[..., None]).astype(np.float32)
             fitted = (self._coarse @ coefficients)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             spread = SPREAD_CAP_LEVELS / 2
             if weight.sum() >= _LEAST_BACKGROUND * weight.size:
                 spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
-            weight = np.maximum(0, 1 - (residual / (_TUKEY_WIDTH * spread)) ** 2) ** 2 * trust
+            weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         levels = self._levels(coefficients[..., 0])
         strength = float(np.sqrt(np.mean(fitted**2)))
-        certain = weight.reshape(self._grid[1], self._grid[0]).astype(np.float32)
+        certain = np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32)
         return Drift(levels, resized(certain, self._size), spread, strength)
 
-    def _levels(self, coefficients: _Floats) -> FloatImage:
+    def _levels(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
         """The drift at the reference's size: its smooth parts drawn smaller and enlarged, its gain exactly."""
         end = 1 + self._orders
         waves = (self._coarse[0, :, 1:end] @ coefficients[:, 1:end].T).astype(np.float32)

@@ -31,7 +31,7 @@ class Outline:
         if not self.textured:
             return filled(self.edge, (height, width), (width / self.inside.shape[1], height / self.inside.shape[0]))
         grown = cv2.resize(self.inside, (width, height), interpolation=cv2.INTER_LINEAR)
-        return np.where(grown > 127, 255, 0).astype(np.uint8)
+        return np.asarray(cv2.threshold(grown, 127, 255, cv2.THRESH_BINARY)[1], np.uint8)
 
 
 def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffness: float) -> Outline:
