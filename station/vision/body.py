@@ -170,7 +170,8 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
 def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float = 0.0) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
-    The share `leave_out` of the region that has moved least is left out.
+    The region's mean change is taken off before: slopes point all ways, so it is light that the drift left over. The
+    share `leave_out` of the region that has moved least is left out.
     """
     window_px = max(_BLUR_PX, window_px)
     change, squared = moved.change, moved.squared
@@ -178,12 +179,16 @@ def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float
         size = (change.shape[1] // 2, change.shape[0] // 2)
         change, squared, window_px = resized(change, size), resized(squared, size), window_px / 2
         region = np.asarray(cv2.resize(region, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-    agreed = length_squared(np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32))
-    whole = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
-    background = resized(moved.background, (whole.shape[1], whole.shape[0]))
-    floors = [weighted_median(one, background) for one in (agreed, whole)]
+    cast = np.array(cv2.mean(change, region)[:3], np.float32)
+    smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32)
+    mean_square = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
+    background = resized(moved.background, (smooth.shape[1], smooth.shape[0]))
+    floors = [weighted_median(one, background) for one in (length_squared(smooth), mean_square)]
     inside = region > 0
-    agreed, whole = np.maximum(agreed[inside] - floors[0], 0), np.maximum(whole[inside] - floors[1], _LEAST_LEVEL)
+    within = smooth[inside]
+    agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
+    whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
+    whole = np.maximum(whole, _LEAST_LEVEL)
     kept = whole >= _quantile(whole, leave_out)
     return float(np.median(agreed[kept] / whole[kept]))
 
