@@ -3,6 +3,7 @@
 import asyncio
 import time
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -132,7 +133,7 @@ def test_fingers_on_their_way_to_the_next_width_stop_once_the_last_is_found_to_t
 
     async def scenario():
         gripper = SlowGripper()
-        grip = Grip(Cell(Camera(), gripper, None), BLUEBERRY)
+        grip = Grip(Cell(cast("Any", Camera()), cast("Any", gripper), None), BLUEBERRY)
         largest_mm = BLUEBERRY.expected_width.largest_mm
 
         async def touches(step):
