@@ -39,7 +39,7 @@ def _person(command: Command) -> Command:
     """Ask who acts, in what capacity, and why: it goes into the audit trail."""
     why = click.option("--reason", required=True, help="Why; for the audit trail.")
     role = click.option("--role", default="quality", show_default=True, help="In what capacity.")
-    return click.option("--who", required=True, metavar="NAME", help="Who does it.")(role(why(command)))
+    return click.option("--who", "--by", "who", required=True, metavar="NAME", help="Who does it.")(role(why(command)))
 
 
 @click.group()

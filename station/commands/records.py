@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from station.commands.records_keeping import backup, check, hold, holds, lot, release, restore
+from station.commands.records_marks import mark, marks
 from station.commands.records_options import config_option, folder_of, query_options
 from station.commands.records_output import export, report
 from station.records.database import reading
@@ -58,5 +59,5 @@ def continue_after(number: int, config: Path | None) -> None:
     click.echo(f"the next inspection is number {number + 1}")
 
 
-for command in (lot, hold, release, holds, export, report, backup, restore, check):
+for command in (lot, hold, release, holds, mark, marks, export, report, backup, restore, check):
     records.add_command(command)

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
+from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
 from station.settings.recipe import Recipe, find_recipe, recipe_files
 from station.settings.recipe_text import with_values
@@ -36,7 +37,10 @@ _ROUND = 0.5
 
 @click.command("thresholds")
 @click.option("--recipe", "name", required=True, metavar="NAME", help="The fruit's recipe, by its name.")
-@click.option("--marks", required=True, type=click.Path(path_type=Path), metavar="CSV", help="With sequence,mark.")
+@click.option(
+    "--marks", type=click.Path(path_type=Path), metavar="CSV",
+    help="With sequence,mark. [default: what `station records mark` has told]",
+)  # fmt: skip
 @click.option("--lots", multiple=True, metavar="LOT", help="Only these, may be repeated. [default: all]")
 @click.option(
     "--false-rejects", "rate", default=0.02, show_default=True, metavar="SHARE", type=click.FloatRange(0.0001, 0.5),
@@ -46,7 +50,13 @@ _ROUND = 0.5
 @click.option("--draft", type=click.Path(path_type=Path), metavar="FILE", help="Write a recipe with these limits too.")
 @click.option("--config", metavar="FILE", type=click.Path(path_type=Path), help="The station.yaml to use.")
 def thresholds(
-    name: str, marks: Path, lots: tuple[str, ...], rate: float, out: Path, draft: Path | None, config: Path | None
+    name: str,
+    marks: Path | None,
+    lots: tuple[str, ...],
+    rate: float,
+    out: Path,
+    draft: Path | None,
+    config: Path | None,
 ) -> None:
     """Propose damage thresholds from marked fruit, with what is unsure about them.
 
@@ -54,11 +64,14 @@ def thresholds(
     written with --draft goes the way of every draft, as by `station recipes import`.
     """
     site = load_configuration(config)
-    recipe, marked = find_recipe(name, site.recipes_folder), read_marks(marks)
-    stored, own = _marked(records_folder(site.home), recipe.name, lots, set(marked))
+    recipe, folder = find_recipe(name, site.recipes_folder), records_folder(site.home)
+    marked = _told_marks(folder) if marks is None else read_marks(marks)
+    stored, own = _marked(folder, recipe.name, lots, set(marked))
     good, bad = ([each for each in stored if marked[each.sequence] == mark] for mark in ("good", "bad"))
     if not good:
-        raise BadInputError(f"{marks}: none of the fruit marked good is a judged {recipe.name} in the records")
+        raise BadInputError(
+            f"{marks or folder}: none of the fruit marked good is a judged {recipe.name} in the records"
+        )
     limits = _limits(good, bad, own, recipe, rate)
     proposed, text = _draft(recipe, limits, name, site.recipes_folder)
     told = _told(limits, good, bad, own, proposed, rate)
@@ -73,6 +86,15 @@ def thresholds(
     for line in _lines(told):
         click.echo(line)
     click.echo(f"see {out / 'thresholds.html'}" + (f"; the draft is {draft}" if draft else ""))
+
+
+def _told_marks(folder: Path) -> dict[int, Mark]:
+    """What people have told of fruit by `station records mark`, or on the panel."""
+    with reading(folder) as connection:
+        told: dict[int, Mark] = {each.sequence: each.mark for each in read_marked(connection)}
+    if not told:
+        raise BadInputError("no fruit is marked: tell some by `station records mark`, or give --marks")
+    return told
 
 
 def _marked(

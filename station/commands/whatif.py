@@ -95,6 +95,8 @@ def _say(told: Counted, out: Path) -> None:
     click.echo(f"{told.total} inspections, {told.decided} decided by the draft")
     click.echo(f"rejects: {told.rejects_before()} before, {told.rejects_after()} after")
     click.echo(f"{told.newly_rejected} newly rejected, {told.newly_passed} newly passed")
+    if told.measured_again:
+        click.echo(f"{told.measured_again} measured again in their stored images")
     for why, number in told.undecidable.most_common(5):
         click.echo(f"cannot be known: {number}: {why}")
     if told.unfaithful:

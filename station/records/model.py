@@ -141,6 +141,7 @@ class AlarmRow:
     changed_utc_ms: int
     detail: str = ""
     shelved_until_utc_ms: int | None = None
+    shelved_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)

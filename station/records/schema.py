@@ -141,6 +141,17 @@ Index(
     "ix_holds_lot", holds.c.lot, unique=True, sqlite_where=holds.c.released_utc_ms.is_(None) & holds.c.lot.is_not(None)
 )
 
+marks = Table(
+    "marks",
+    metadata,
+    Column("sequence", ForeignKey("inspections.sequence", ondelete="CASCADE"), primary_key=True, autoincrement=False),
+    Column("mark", Text, nullable=False),
+    Column("by", Text, nullable=False),
+    Column("marked_utc_ms", Integer, nullable=False),
+    CheckConstraint("mark IN ('good', 'bad')", name="mark"),
+)
+"""What a person found of a fruit, to propose thresholds from; the audit trail has what it was before."""
+
 outbox = Table(
     "outbox",
     metadata,
@@ -200,6 +211,7 @@ alarms = Table(
     Column("changed_utc_ms", Integer, nullable=False),
     Column("detail", Text, nullable=False),
     Column("shelved_until_utc_ms", Integer),
+    Column("shelved_by", Text, nullable=False, server_default=""),
 )
 """Those not in their normal state."""
 

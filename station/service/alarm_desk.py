@@ -220,6 +220,7 @@ class AlarmDesk:
                     "since_s": row.raised_utc_ms / 1000,
                     "raised": 1,
                     "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
+                    "shelved_by": row.shelved_by,
                 }
                 for row in await records.load_alarms()
             ]
@@ -245,6 +246,7 @@ class AlarmDesk:
                     utc_ms(),
                     alarm.detail,
                     None if alarm.shelved_until_s is None else round(1000 * alarm.shelved_until_s),
+                    alarm.shelved_by,
                 )
                 for alarm in self._alarms.known.values()
             )

@@ -102,6 +102,7 @@ class Inspector:
             self._alarms.raise_(error.alarm, str(error))
             return False
         now.reference_image = Image("reference", None, image)
+        now.measures["gate_factor"] = self._calibrated.gate_factor  # without it no image can be measured again
         for alarm in ALARMS:
             self._alarms.clear(alarm)
         drift, most = looks.drift_levels, self._settings.reference.most_drift_levels

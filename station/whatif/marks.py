@@ -3,11 +3,10 @@
 import csv
 from io import StringIO
 from pathlib import Path
-from typing import Literal
 
 from station.errors import BadInputError
+from station.records.marks import Mark
 
-Mark = Literal["good", "bad"]
 _LARGEST_FILE_BYTES = 50_000_000
 
 

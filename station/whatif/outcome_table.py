@@ -25,6 +25,8 @@ class Counted:
     """Those whose stored outcome is not that of their own recipe judged again: of an older judge, or of a fault."""
     newly_rejected: int
     newly_passed: int
+    measured_again: int
+    """Of how many the stored images were measured by the draft."""
 
     @property
     def total(self) -> int:
@@ -56,6 +58,7 @@ class Counted:
             "newly_rejected": self.newly_rejected,
             "newly_passed": self.newly_passed,
             "not_reproduced": self.unfaithful,
+            "measured_again": self.measured_again,
             "outcomes": {f"{before} to {after}": self.pairs[before, after] for before in BEFORE for after in AFTER},
         }
 
@@ -69,14 +72,15 @@ def counted(results: Iterable[Replayed]) -> Counted:
     pairs: Counter[tuple[str, str]] = Counter()
     why: Counter[str] = Counter()
     sides: Counter[str] = Counter()
-    unfaithful = 0
+    unfaithful = measured_again = 0
     for each in results:
         pairs[each.before, each.after] += 1
         sides[each.changes_side] += 1
         unfaithful += not each.faithful
+        measured_again += bool(each.areas_mm2)
         if each.after == "UNDECIDABLE":
             why[_without_figures(each.why)] += 1
-    return Counted(pairs, why, unfaithful, sides["rejected"], sides["passes"])
+    return Counted(pairs, why, unfaithful, sides["rejected"], sides["passes"], measured_again)
 
 
 def as_csv(results: Sequence[Replayed]) -> str:

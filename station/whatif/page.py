@@ -11,15 +11,20 @@ import jinja2
 import numpy as np
 from sqlalchemy import Connection
 
+from station.calibration.gate import gated
 from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
+from station.settings.segmentation import Segmentation
+from station.vision.methods import make_method
 from station.whatif.outcome_table import AFTER, BEFORE, Counted
 from station.whatif.replay import Replayed
+from station.whatif.stored import read_gate_factor
 
 MOST_SHOWN = 60
 _WIDE, _HIGH, _EDGE = 260, 130, 22
 _PICTURE_PX = 150
+_WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +34,12 @@ class Shown:
     result: Replayed
     curve: str
     """An SVG picture's points: x,y x,y …"""
+    again: str
+    """Likewise, of the areas that the draft measures in the stored images; empty where it measures as then."""
     limits: tuple[tuple[float, float, str], ...]
     """x, y and `own` or `draft` of every area limit."""
     picture: str
-    """A data URI of its last image; empty where none was kept."""
+    """A data URI of its last image with the contact's outline; empty where none was kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,35 +96,50 @@ def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe |
     limits = [(each.closing_mm, each.area_mm2, "draft") for each in draft.damage.area]
     limits += [(each.closing_mm, each.area_mm2, "own") for each in own.damage.area] if own else []
     most_x = max([row[0] for row in rows] + [limit[0] for limit in limits])
-    most_y = max([row[1] for row in rows] + [limit[1] for limit in limits])
+    most_y = max([row[1] for row in rows] + [limit[1] for limit in limits] + list(result.areas_mm2))
 
     def place(closing_mm: float, area_mm2: float) -> tuple[float, float]:
         x = _EDGE + max(0.0, closing_mm) / most_x * (_WIDE - 2 * _EDGE)
         return round(x, 1), round(_HIGH - _EDGE - area_mm2 / most_y * (_HIGH - 2 * _EDGE), 1)
 
     curve = " ".join("{},{}".format(*place(*row)) for row in rows)
+    again = " ".join(
+        "{},{}".format(*place(row[0], area_mm2)) for row, area_mm2 in zip(rows, result.areas_mm2, strict=False)
+    )
     placed = tuple((*place(closing_mm, area_mm2), whose) for closing_mm, area_mm2, whose in limits)
-    return Shown(result, curve, placed, _picture(connection, folder, result.sequence))
+    measuring = draft.segmentation if result.areas_mm2 else None
+    return Shown(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
 
 
-def _picture(connection: Connection, folder: Path, sequence: int) -> str:
-    """The last step's image, with its stored outline where the mask was kept."""
+def _picture(connection: Connection, folder: Path, sequence: int, draft: Segmentation | None) -> str:
+    """The last step's image, with its stored outline where the mask was kept, and the draft's where one measures."""
     rows = connection.exec_driver_sql(
-        "SELECT kind, step, sha256 FROM images WHERE sequence = ? AND kind IN ('step', 'mask') ORDER BY step, id",
+        "SELECT kind, step, sha256 FROM images WHERE sequence = ? ORDER BY step, id",
         (sequence,),
     ).all()
     step = max((row[1] for row in rows if row[0] == "step"), default=None)
-    found = {kind: _image(folder, sha256) for kind, of_step, sha256 in rows if of_step == step}
-    image, mask = found.get("step"), found.get("mask")
+    wanted = ((kind, sha256) for kind, of_step, sha256 in rows if of_step == step or kind == "reference")
+    found = {kind: _image(folder, sha256) for kind, sha256 in wanted}
+    image, mask, reference = found.get("step"), found.get("mask"), found.get("reference")
     if image is None:
         return ""
+    by_draft = None
+    if draft is not None and reference is not None:
+        segmentation = gated(draft, read_gate_factor(connection, sequence))
+        by_draft = make_method([np.asarray(reference, np.uint8)], segmentation).measure(np.asarray(image, np.uint8))
     if mask is not None and mask.shape[:2] == image.shape[:2]:
-        outlines, _ = cv2.findContours(mask[:, :, 0], cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(image, outlines, -1, (255, 255, 255), 2)
+        _outline(image, mask[:, :, 0], _WHITE)
+    if by_draft is not None:
+        _outline(image, by_draft.mask, _ORANGE)
     scale = _PICTURE_PX / image.shape[0]
     small = cv2.resize(image, (round(scale * image.shape[1]), _PICTURE_PX), interpolation=cv2.INTER_AREA)
     data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, 85))[1].tobytes()
     return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+
+
+def _outline(image: cv2.typing.MatLike, mask: cv2.typing.MatLike, colour: tuple[int, int, int]) -> None:
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(image, outlines, -1, colour, 2)
 
 
 def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:

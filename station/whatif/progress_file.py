@@ -61,7 +61,8 @@ class ProgressFile:
         for line in lines[1:]:
             values = _parsed(line)
             if values is not None:
-                self.done[values["sequence"]] = Replayed(**values)
+                areas_mm2 = tuple(values.pop("areas_mm2"))
+                self.done[values["sequence"]] = Replayed(**values, areas_mm2=areas_mm2)
         if not lines:
             self._append([self._header])
         return self

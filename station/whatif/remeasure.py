@@ -1,40 +1,45 @@
 """A stored inspection's images measured again, by another segmentation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import cv2
 import numpy as np
 
+from station.calibration.gate import gated
 from station.errors import StationError
 from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Image, Method
 from station.vision.methods import make_method
+from station.whatif.stored import StoredPress
+
+_SAME_AREA, _SAME_PX = 0.02, 50
+"""So far may an area measured again be from the stored one, for another version of OpenCV; usually they are equal."""
 
 
 class CannotRemeasureError(StationError):
     """The images that were kept do not tell what the other segmentation would have seen."""
 
 
-def remeasured(
-    press: Press, images: Sequence[tuple[int | None, bytes]], own: Segmentation, draft: Segmentation
-) -> Press:
+def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> Press:
     """A press with the areas that another segmentation finds in the stored images.
 
     Stored is the mean of a step's frames. How far the frames disagreed is known from the stored confidence alone: it
     is a factor on the method's own, and is carried over.
 
     Args:
-        press: as stored.
-        images: PNG by step, None for the reference.
+        stored: with its images.
         own: the segmentation of then.
         draft: the segmentation to try.
 
     Raises:
-        CannotRemeasureError: an image is missing or no image, or the draft would have seen the onset elsewhere.
+        CannotRemeasureError: an image is missing or no image, the images do not give the stored areas, or the draft
+            would have seen the onset elsewhere.
     """
-    decoded = {step: _decoded(data) for step, data in images}
+    press = stored.press
+    own, draft = gated(own, stored.gate_factor), gated(draft, stored.gate_factor)
+    decoded = {step: _decoded(data) for step, data in stored.images}
     reference = decoded.get(None)
     missing = [step for step in range(len(press.points)) if step not in decoded]
     if reference is None or missing:
@@ -51,6 +56,8 @@ def _point(
 ) -> Measured:
     stored = press.points[step]
     then, now = before.measure(decoded[step]), after.measure(decoded[step])
+    if abs(then.area_px - stored.area_px) > max(_SAME_PX, _SAME_AREA * stored.area_px):
+        raise CannotRemeasureError("its images do not give its stored areas: they were measured by another program")
     confidence = now.confidence
     if confidence is not None and then.confidence and stored.confidence is not None:
         confidence *= min(1.0, stored.confidence / then.confidence)

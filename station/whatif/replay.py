@@ -33,6 +33,8 @@ class Replayed:
     """The draft's reasons in sentences, or why nothing can be known; empty for PASS."""
     faithful: bool
     """Judged again by its own recipe, the inspection has the outcome that is stored."""
+    areas_mm2: tuple[float, ...] = ()
+    """Of the steps, as the draft measures the stored images; empty where it measures as the recipe of then."""
 
     @property
     def changes_side(self) -> Literal["", "passes", "rejected"]:
@@ -71,12 +73,14 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
     if why := pressed_otherwise(own, draft):
         return _undecidable(stored, why, faithful=faithful)
     press = stored.press
+    if press.onset_mm is None or not measured_otherwise(own, draft):
+        return _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
     try:
-        if press.onset_mm is not None and measured_otherwise(own, draft):
-            press = remeasured(press, stored.images, own.segmentation, draft.segmentation)
+        press = remeasured(stored, own.segmentation, draft.segmentation)
     except CannotRemeasureError as error:
         return _undecidable(stored, str(error), faithful=faithful)
-    return _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
+    replayed = _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
+    return replace(replayed, areas_mm2=tuple(point.area_mm2 for point in press.points))
 
 
 def pressed_otherwise(own: Recipe, draft: Recipe) -> str:

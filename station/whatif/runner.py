@@ -6,6 +6,7 @@ import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
@@ -156,6 +157,11 @@ def _flow(
             done, under_way = wait(under_way, 0 if mine is not None else None, FIRST_COMPLETED)
             for future in done:
                 yield future.result()
+    except BrokenProcessPool as error:
+        raise StationError(
+            "a process of the what-if was ended from outside, perhaps for want of memory; the same command goes on "
+            "where it was, with --jobs 1 in this process alone"
+        ) from error
     finally:
         for future in under_way:
             future.cancel()

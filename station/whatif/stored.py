@@ -43,6 +43,8 @@ class StoredPress:
     recipe_sha256: str
     press: Press
     """With its points in the order of the steps."""
+    gate_factor: float = 1.0
+    """By which the sensor's calibration had raised the robust method's gate."""
     images: tuple[tuple[int | None, bytes], ...] = ()
     """PNG by step, None for the reference; only where they were asked for and kept."""
 
@@ -102,6 +104,17 @@ def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, 
     return [_stored(row, curves.get(row[0], []), images.get(row[0], ())) for row in rows]
 
 
+def read_gate_factor(connection: Connection, sequence: int) -> float:
+    """By which the sensor's calibration had raised the robust method's gate in an inspection; 1 where it did not.
+
+    Args:
+        connection: any.
+        sequence: which.
+    """
+    query = "SELECT json_extract(measures, '$.gate_factor') FROM inspections WHERE sequence = ?"
+    return connection.exec_driver_sql(query, (sequence,)).scalar() or 1.0
+
+
 def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, bytes], ...]) -> StoredPress:
     sequence, lot, judged, reasons, explanation, recipe_sha256, measures = row
     found = {Reason(reason) for reason in json.loads(reasons or "[]")}
@@ -112,7 +125,8 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
     told = json.loads(explanation or "[]")
     interruptions = tuple(_interruptions(found, points, told))
     press = Press(onset_mm, uncertainty_mm if onset_mm is not None else 0.0, points, interruptions)
-    return StoredPress(sequence, lot, judged, recipe_sha256, press, images)
+    gate_factor = measured.get("gate_factor") or 1.0
+    return StoredPress(sequence, lot, judged, recipe_sha256, press, gate_factor, images)
 
 
 def _points(curve: Iterable[Any]) -> Iterator[Measured]:

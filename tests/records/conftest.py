@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
+from station.cli import cli
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
@@ -43,6 +45,16 @@ def opened(folder: Path) -> Open:
             await records.close()
 
     return open_them
+
+
+@pytest.fixture
+def ask(folder: Path) -> Callable[..., Result]:
+    """Run `station records …` on this folder."""
+
+    def run(*arguments: object) -> Result:
+        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
+
+    return run
 
 
 @pytest.fixture

@@ -7,23 +7,13 @@ import sqlite3
 from dataclasses import replace
 
 import pytest
-from click.testing import CliRunner
 
-from station.cli import cli
 from station.records.backup import MANIFEST_NAME, make_backup
 from station.records.checking import check_records
 from station.records.database import FILE_NAME
 from station.records.errors import DamagedError, DiskFullError, LockedError, RecordsError
 from station.records.holds import hold, release
 from station.records.restoring import restore_backup
-
-
-@pytest.fixture
-def ask(folder):
-    def run(*arguments):
-        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
-
-    return run
 
 
 @pytest.fixture

@@ -62,7 +62,7 @@ def test_migrations_from_nothing_lead_to_the_tables_of_the_program(tmp_path):
         context = MigrationContext.configure(connection, opts={"compare_type": True, "target_metadata": metadata})
         assert compare_metadata(context, metadata) == []
         made = {row[0] for row in connection.exec_driver_sql("SELECT sql FROM sqlite_master WHERE sql LIKE '%CHECK%'")}
-    assert sum(text.count("CHECK") for text in made) == 9
+    assert sum(text.count("CHECK") for text in made) == 10
     engine.dispose()
 
 

@@ -9,21 +9,11 @@ from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
 
-from station.cli import cli
 from station.records import export as exporting
 from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
 from station.records.search import Query
-
-
-@pytest.fixture
-def ask(folder):
-    def run(*arguments):
-        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
-
-    return run
 
 
 @pytest.fixture

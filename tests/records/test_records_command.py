@@ -6,20 +6,10 @@ import sys
 from dataclasses import replace
 
 import pytest
-from click.testing import CliRunner
 
 from station.channel.line import Reason
-from station.cli import cli
 from station.records.wording import SENTENCES, sparkline
 from station.settings.recipe import find_recipe
-
-
-@pytest.fixture
-def ask(folder):
-    def run(*arguments):
-        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
-
-    return run
 
 
 @pytest.fixture

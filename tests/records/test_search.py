@@ -5,12 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.channel.line import Reason
-from station.cli import cli
 from station.records.changing import changing
 from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
@@ -132,14 +130,6 @@ def test_a_page_is_of_some_size(opened, scenario, folder):
     scenario(steps)
     with reading(folder) as connection, pytest.raises(RecordsError, match="ask for 1 to 1000"):
         find_page(connection, Query(), 1001)
-
-
-@pytest.fixture
-def ask(folder):
-    def run(*arguments):
-        return CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", *map(str, arguments)])
-
-    return run
 
 
 def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, ask, trigger, passed, failed):

@@ -63,6 +63,13 @@ def test_limits_are_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
     assert rates["bad"]["rejected"] == 5
     assert rates["good"]["rejected"] <= 4
     assert (out / "thresholds.html").read_text().count("data:image/png") == 2
+    again = ("thresholds", "--recipe", "strawberry", "--out", tmp_path / "again", "--false-rejects", "0.1")
+    code, told = station(*again)
+    assert (code, "no fruit is marked" in told) == (2, True)
+    for word, some in (("good", made[:40]), ("bad", made[40:])):
+        assert station("records", "mark", *some, word)[0] == 0
+    assert station(*again)[0] == 0
+    assert json.loads((tmp_path / "again" / "thresholds.json").read_text()) == figures, "as from the table"
 
 
 @pytest.mark.parametrize(

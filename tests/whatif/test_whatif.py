@@ -2,13 +2,17 @@
 
 import csv
 import json
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from station.errors import StationError
 from station.inspection.judge import judge
 from station.vocabulary import Reason
+from station.whatif import runner
 from station.whatif.replay import replay
 from station.whatif.stored import StoredPress
 
@@ -129,6 +133,16 @@ def test_two_processes_and_a_cluster_say_the_same_as_one(orchard, draft, station
     one, two, many = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("one", "two", "cluster"))
     assert one == two == many
     assert one["newly_rejected"] > 0
+
+
+def test_a_process_that_is_killed_is_told_with_how_to_go_on():
+    def lost(_part):
+        future = Future()
+        future.set_exception(BrokenProcessPool("killed"))
+        return future
+
+    with pytest.raises(StationError, match="the same command goes on where it was"):
+        list(runner._flow([None, None], lost, 1))  # type: ignore[list-item] (no part is looked at)
 
 
 @pytest.mark.parametrize(

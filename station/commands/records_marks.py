@@ -1,0 +1,46 @@
+"""`station records mark`: what a person found of a fruit, for the proposal of thresholds."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from station.commands.records_options import by_option, config_option, folder_of
+from station.records.audit import AuditEntry, append_audit
+from station.records.changing import changing
+from station.records.database import reading
+from station.records.marks import Mark, place_mark, read_marked
+from station.records.wording import printable
+
+_MARKS: dict[str, Mark | None] = {"good": "good", "bad": "bad", "none": None}
+
+
+@click.command()
+@click.argument("sequences", metavar="SEQUENCE...", nargs=-1, required=True, type=click.IntRange(1))
+@click.argument("word", metavar="good|bad|none", type=click.Choice(list(_MARKS)))
+@by_option
+@config_option
+def mark(sequences: tuple[int, ...], word: str, by: str, config: Path | None) -> None:
+    """Say that a person found these fruit good or bad, whatever the station judged; `none` takes a mark away.
+
+    `station thresholds` proposes limits from what is marked. All of the fruit are marked, or none.
+    """
+    wanted, changed = _MARKS[word], 0
+    with changing(folder_of(config)) as connection:
+        for sequence in sequences:
+            before = place_mark(connection, sequence, wanted, by)
+            if (was := None if before is None else before.mark) != wanted:
+                changed += 1
+                entry = AuditEntry(by, "command line", "fruit.marked", f"inspection {sequence}", old=was, new=wanted)
+                append_audit(connection, entry)
+    click.echo(f"{changed} of {len(sequences)} fruit newly marked {word}")
+
+
+@click.command()
+@config_option
+def marks(config: Path | None) -> None:
+    """List the fruit that people have marked, with who and when."""
+    with reading(folder_of(config)) as connection:
+        for each in read_marked(connection):
+            when = datetime.fromtimestamp(each.marked_utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+            click.echo(printable(f"{each.sequence}  {each.mark}  by {each.by}, {when}"))

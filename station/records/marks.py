@@ -1,0 +1,58 @@
+"""What a person found of inspected fruit, good or bad: the truth that thresholds are proposed from."""
+
+from typing import Literal, NamedTuple
+
+from sqlalchemy import Connection, delete, select
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from station.records.errors import UnknownInspectionError
+from station.records.schema import inspections, marks
+from station.records.writing import utc_ms
+
+Mark = Literal["good", "bad"]
+
+
+class Marked(NamedTuple):
+    """One fruit's mark."""
+
+    sequence: int
+    mark: Mark
+    by: str
+    marked_utc_ms: int
+
+
+def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str) -> Marked | None:
+    """Mark a fruit, or take its mark away. Idempotent: the same mark again leaves the first one, with who gave it.
+
+    Args:
+        connection: the writer's.
+        sequence: the inspection's.
+        mark: None for none.
+        by: who found it so.
+
+    Returns:
+        What stood before; None where nothing did.
+
+    Raises:
+        UnknownInspectionError: there is no such inspection.
+    """
+    if connection.scalar(select(inspections.c.sequence).where(inspections.c.sequence == sequence)) is None:
+        raise UnknownInspectionError(f"there is no inspection {sequence}", "`station records list` shows what there is")
+    row = connection.execute(select(marks).where(marks.c.sequence == sequence)).one_or_none()
+    before = None if row is None else Marked(*row)
+    if mark is None:
+        connection.execute(delete(marks).where(marks.c.sequence == sequence))
+    elif before is None or before.mark != mark:
+        values = {"mark": mark, "by": by, "marked_utc_ms": utc_ms()}
+        told = upsert(marks).values(sequence=sequence, **values)
+        connection.execute(told.on_conflict_do_update(["sequence"], set_=values))
+    return before
+
+
+def read_marked(connection: Connection) -> list[Marked]:
+    """All marks, in the order of the inspections.
+
+    Args:
+        connection: any.
+    """
+    return [Marked(*row) for row in connection.execute(select(marks).order_by(marks.c.sequence))]
