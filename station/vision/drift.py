@@ -28,6 +28,8 @@ _CELL_NOISE_LEVELS = 2.0
 _LEAST_SPREAD_LEVELS = 0.5
 _ITERATIONS = 5
 _LEAST_BACKGROUND = 0.05
+_WELL_KNOWN, _LEAST_KNOWN = 0.2, 0.05
+"""The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""
 _LATER_SHARE = 0.02
 """What a place counts that the first guess took for contact, once the fit has reached it."""
 _TUKEY_WIDTH = 3.0
@@ -103,12 +105,14 @@ class DriftModel:
         samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
         weight = resized(background, self._grid).ravel()
         trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
+        known = float(np.clip(weight.mean() / _WELL_KNOWN, _LEAST_KNOWN, 1))
+        ridge = self._ridge / known**2
         spread = 0.0
         coefficients = np.zeros((3, self._coarse.shape[2], 1), np.float32)
         fitted = np.zeros_like(samples)
         for _ in range(_ITERATIONS):
             weighted = self._transposed * weight
-            normal = weighted @ self._coarse + self._ridge
+            normal = weighted @ self._coarse + ridge
             coefficients = np.linalg.solve(normal, weighted @ samples[..., None]).astype(np.float32)
             fitted = (self._coarse @ coefficients)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
