@@ -40,6 +40,7 @@ _HALF_FROM_PX = 2.5
 _STIFFNESS = 0.05
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_LEVEL = 1e-3
+_LEAST_BACKGROUND, _LOWEST = 0.02, 0.03
 
 _Floats = npt.NDArray[np.float64]
 
@@ -71,19 +72,16 @@ class Body(NamedTuple):
     spread_levels: float
     """Of the level's root where nothing touches."""
     coherence: float
-    """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1."""
-    skin_coherence: float
-    """The same within a ninth of the radius, where the body has moved more than in a quarter of its region."""
+    """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1.
+
+    0 where hardly any background is left, since the slope of the whole body is then in the change as well."""
+    textured: bool
+    """Whether seeds or drupelets turn the change's direction within a ninth of the radius; a smooth body does not."""
 
     @property
     def radius_px(self) -> float:
         """Of a circle of the region's area, at half the working size."""
         return _radius(self.region)
-
-    @property
-    def textured(self) -> bool:
-        """Whether seeds or drupelets turn the change's direction within the window, which a smooth body does not."""
-        return self.skin_coherence < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(self.radius_px))
 
 
 def movement(half: FloatImage, background: FloatImage, evening: FloatImage) -> Movement:
@@ -118,7 +116,8 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         level *= moved.evening
         cap = max(_quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
         if last:
-            coherence = _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
+            if _is_seen(moved.background):
+                coherence = _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
             share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * coherence + _SHARE_OF_FIELD * region.mean()
             share = float(np.clip(share, *_SHARES))
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
@@ -133,7 +132,14 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         if not region.any():
             return None
     skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
-    return Body(region, middle, radii, level, spread, coherence, skin)
+    return Body(region, middle, radii, level, spread, coherence, skin < _smooth_from(moved, region))
+
+
+def _smooth_from(moved: Movement, region: Mask) -> float:
+    """The coherence from which on a body is smooth: the larger it is, the more places there are to disagree."""
+    if not _is_seen(moved.background):
+        return _SMOOTH_SMALL
+    return min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
 
 
 def evening(light: FloatImage) -> FloatImage:
@@ -162,9 +168,19 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     """
     mean = cv2.GaussianBlur(moved.squared, (0, 0), window_px)
     few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.background)
-    floor = weighted_median(few, weight)
-    spread = _NORMAL_OF_MEDIAN * weighted_median(np.abs(np.sqrt(few) - np.sqrt(floor)), weight)
+    floor = _floor(few, weight)
+    scatter = np.abs(np.sqrt(few) - np.sqrt(floor))
+    spread = _NORMAL_OF_MEDIAN * (weighted_median(scatter, weight) if _is_seen(weight) else _quantile(scatter, _LOWEST))
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
+
+
+def _is_seen(background: FloatImage) -> bool:
+    return float(background.mean()) >= _LEAST_BACKGROUND
+
+
+def _floor(field: FloatImage, background: FloatImage) -> float:
+    """What a field has where nothing touches: its median there, or nearly its least where hardly anything is free."""
+    return weighted_median(field, background) if _is_seen(background) else _quantile(thinned(field).ravel(), _LOWEST)
 
 
 def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float = 0.0) -> float:
@@ -183,7 +199,7 @@ def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float
     smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32)
     mean_square = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
     background = resized(moved.background, (smooth.shape[1], smooth.shape[0]))
-    floors = [weighted_median(one, background) for one in (length_squared(smooth), mean_square)]
+    floors = [_floor(one, background) for one in (length_squared(smooth), mean_square)]
     inside = region > 0
     within = smooth[inside]
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
@@ -229,5 +245,6 @@ def _radius(region: Mask) -> float:
 
 
 def _quantile(values: npt.NDArray[np.floating], share: float) -> float:
+    values = values.ravel()
     place = int(share * (values.size - 1))
     return float(np.partition(values, place)[place])

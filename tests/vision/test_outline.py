@@ -34,7 +34,7 @@ def hertz(radius, levels, x=120.0, y=160.0):
 
 def textured(coherence):
     nothing = np.zeros(HALF, np.uint8)
-    return Body(nothing, (60.0, 80.0), np.zeros(64), nothing.astype(np.float32), 1.0, coherence, coherence)
+    return Body(nothing, (60.0, 80.0), np.zeros(64), nothing.astype(np.float32), 1.0, coherence, textured=True)
 
 
 def test_few_drupelets_are_their_union_and_not_their_hull():
