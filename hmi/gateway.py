@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
@@ -43,7 +43,7 @@ class Gateway:
         self.recent = Recent(fruit=())
         """The last fruit in short."""
 
-    async def __aenter__(self) -> "Gateway":
+    async def __aenter__(self) -> Self:
         self._client = ChannelClient(self._endpoint, "the station")
         self._looking = asyncio.create_task(self._look(), name="looking at the station")
         return self
@@ -113,9 +113,14 @@ class Gateway:
 
     def _is_news(self, state: PanelState) -> bool:
         known = self.last
-        return known is None or self.state is None or (self.state.boot, known.short.sequence) != (
-            state.boot,
-            state.last_sequence,
+        return (
+            known is None
+            or self.state is None
+            or (self.state.boot, known.short.sequence)
+            != (
+                state.boot,
+                state.last_sequence,
+            )
         )
 
 
