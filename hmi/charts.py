@@ -7,8 +7,8 @@ from markupsafe import Markup, escape
 from hmi.words import Wording
 from station.channel.panel_live import Fruit, FruitShort
 
-WIDTH, HEIGHT = 460, 300
-_LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 14, 42
+WIDTH, HEIGHT = 360, 290
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 12, 16, 44
 TREND_BUCKET = 10
 _STEPS = (1, 2, 5)
 
@@ -80,7 +80,7 @@ def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
         wording: for the axis.
     """
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
-    width, height, left, low = 460, 120, 44, 96
+    width, height, left, low = 300, 118, 46, 92
     parts = []
     for share in (0.0, 0.5, 1.0):
         at = low - share * 80
@@ -111,6 +111,21 @@ def sketch(areas_mm2: Sequence[float]) -> Markup:
     return Markup('<svg class="sketch" viewBox="0 0 60 24" aria-hidden="true"><polyline points="{}"/></svg>').format(
         points
     )
+
+
+def bar(value: float, largest: float) -> Markup:
+    """How much of what is allowed was used; decoration beside its number.
+
+    Args:
+        value: used.
+        largest: allowed.
+    """
+    filled = 300 * min(1.0, max(0.0, value / largest)) if largest > 0 else 0.0
+    drawn = Markup(
+        '<svg class="chart bar" viewBox="0 0 300 16" aria-hidden="true">'
+        '<rect class="bar-room" width="300" height="16"/><rect class="bar-fail" width="{:.1f}" height="16"/></svg>'
+    )
+    return drawn.format(filled)
 
 
 def _axes(across: list[float], up: list[float], x: object, y: object, wording: Wording) -> str:

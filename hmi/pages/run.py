@@ -24,7 +24,7 @@ router = APIRouter()
 ENTRY = Entry("run", "/")
 SHOWN = 20
 ORDER_DEADLINE_S = 5.0
-_MOST_REASONS = 4
+_MOST_REASONS = 3
 _ORDERS = frozenset(
     {OrderName.START, OrderName.STOP, OrderName.CALL_OFF, OrderName.RECOVER, OrderName.START_LOT, OrderName.END_LOT}
 )
@@ -69,6 +69,7 @@ def _figures_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
         "rejected": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
         "reasons": reasons.most_common(_MOST_REASONS),
         "trend": charts.trend(fruit, wording),
+        "bar": charts.bar,
         "longest_s": max(times_s, default=None),
     }
 
