@@ -1,5 +1,6 @@
 """What every request has to pass before any page sees it, and the headers that every answer carries."""
 
+import contextlib
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -46,12 +47,18 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        begun = False
+        taken = 0
+
+        async def take() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > LARGEST_BODY_BYTES:
+                raise TooLargeError
+            return message
 
         async def told(message: Message) -> None:
-            nonlocal begun
             if message["type"] == "http.response.start":
-                begun = True
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
                     headers.setdefault(name, value)
@@ -62,11 +69,14 @@ class Guard:
         if refused := self._refusal(headers, scope["method"]):
             await refused(scope, receive, told)
             return
-        try:
-            await self._app(scope, _limited(receive), told)
-        except TooLargeError:
-            if begun:
-                raise
+
+        async def told_of_its_size(message: Message) -> None:
+            if taken <= LARGEST_BODY_BYTES:  # else whatever the framework made of it is not what was wrong
+                await told(message)
+
+        with contextlib.suppress(TooLargeError):
+            await self._app(scope, take, told_of_its_size)
+        if taken > LARGEST_BODY_BYTES:
             await _too_large()(scope, receive, told)
 
     def _refusal(self, headers: Headers, method: str) -> PlainTextResponse | None:
@@ -90,20 +100,6 @@ def _name_of(host: str) -> str:
     """A Host header's name without its port."""
     name = host[: host.rindex("]") + 1].strip("[]") if "]" in host else host.partition(":")[0]
     return name.lower()
-
-
-def _limited(receive: Receive) -> Receive:
-    taken = 0
-
-    async def take() -> Message:
-        nonlocal taken
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > LARGEST_BODY_BYTES:
-            raise TooLargeError
-        return message
-
-    return take
 
 
 def _too_large() -> PlainTextResponse:
