@@ -47,6 +47,22 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+
+        async def told(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in self._headers.items():
+                    headers.setdefault(name, value)
+                headers.setdefault("cache-control", "no-store")
+            await send(message)
+
+        if refused := self._refusal(Headers(scope=scope), scope["method"]):
+            await refused(scope, receive, told)
+        else:
+            await self._within_size(scope, receive, told)
+
+    async def _within_size(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request that may be larger than it says."""
         taken = 0
 
         async def take() -> Message:
@@ -57,27 +73,14 @@ class Guard:
                 raise TooLargeError
             return message
 
-        async def told(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in self._headers.items():
-                    headers.setdefault(name, value)
-                headers.setdefault("cache-control", "no-store")
-            await send(message)
-
-        headers = Headers(scope=scope)
-        if refused := self._refusal(headers, scope["method"]):
-            await refused(scope, receive, told)
-            return
-
-        async def told_of_its_size(message: Message) -> None:
+        async def tell(message: Message) -> None:
             if taken <= LARGEST_BODY_BYTES:  # else whatever the framework made of it is not what was wrong
-                await told(message)
+                await send(message)
 
         with contextlib.suppress(TooLargeError):
-            await self._app(scope, take, told_of_its_size)
+            await self._app(scope, take, tell)
         if taken > LARGEST_BODY_BYTES:
-            await _too_large()(scope, receive, told)
+            await _too_large()(scope, receive, send)
 
     def _refusal(self, headers: Headers, method: str) -> PlainTextResponse | None:
         host = headers.get("host", "")

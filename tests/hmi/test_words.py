@@ -22,9 +22,8 @@ HMI = FOLDER.parent
 LANGUAGES = ("en", "de", "es")
 STATIONS_OWN = "station"
 """The catalogue of what the station says in English itself."""
-USED = re.compile(
-    r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])|["']((?:problem|people|change)\.[a-z_]+)["']"""
-)
+IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
+IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |PeopleError\()["']([a-z_]+\.[a-z_]+)["']""")
 
 
 def fields(text):
