@@ -101,7 +101,7 @@ def until(what: Callable[[], Any]) -> None:
     while not what():
         if time.monotonic() > deadline_s:
             raise SystemExit(f"it did not come about within {START_S:g} s")
-        time.sleep(0.2)
+        time.sleep(0.05)
 
 
 def first_load(browser: Browser, address: str) -> Load:
@@ -115,7 +115,8 @@ def first_load(browser: Browser, address: str) -> Load:
     watching.on("Network.loadingFinished", lambda told: sizes.append(told["encodedDataLength"]))
     began_s = time.monotonic()
     page.goto(address)
-    page.wait_for_function("document.querySelector('.fruit-picture')?.naturalWidth > 0")
+    picture = page.locator("img.fruit-picture")
+    until(lambda: picture.count() and picture.evaluate("picture => picture.naturalWidth"))
     shown_s = time.monotonic() - began_s
     page.wait_for_timeout(500)
     context.close()
@@ -223,7 +224,7 @@ def draw(running: Demo, browser: Browser) -> None:
     page.goto(address)
     settled(page)
     running.part("hmi").suspend()
-    page.wait_for_function("document.body.classList.contains('stale')")
+    page.locator("body.stale").wait_for()
     page.wait_for_timeout(2500)
     page.screenshot(path=PICTURES / "hmi-stale.png")
     running.part("hmi").resume()
