@@ -123,4 +123,4 @@ def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> La
     wished = (part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])
     order = [cookie, *wished]
     known = [language for language in languages if str(language) in order]
-    return min(known, key=lambda language: order.index(language), default=languages[0])
+    return min(known, key=order.index, default=languages[0])
