@@ -122,5 +122,5 @@ def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> La
     """
     wished = (part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])
     order = [cookie, *wished]
-    known = [language for language in languages if str(language) in order]
-    return min(known, key=order.index, default=languages[0])
+    places = {language: order.index(language) for language in languages if str(language) in order}
+    return min(places, key=places.__getitem__, default=languages[0])

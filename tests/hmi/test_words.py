@@ -157,7 +157,7 @@ def test_a_curve_is_drawn_with_every_point_and_limit(areas):
 
 def test_a_trend_counts_tens():
     outcomes: list[OutcomeName] = ["PASS", "PASS", "FAIL", "FAIL", "NO_RESULT"]
-    outcomes += [outcomes[0]] * 19
+    outcomes.extend(outcomes[0] for _ in range(19))
     many = [fruit(outcome).short for outcome in outcomes]
     drawn = ET.fromstring(charts.trend(many, Wording("en")))
     assert drawn.attrib["aria-label"].endswith("0, 3")
