@@ -123,4 +123,4 @@ def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> La
     wished = (part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])
     order = [cookie, *wished]
     places: dict[Language, int] = {language: order.index(language) for language in languages if str(language) in order}
-    return min(places, key=places.__getitem__, default=languages[0])
+    return min(places, key=places.__getitem__) if places else languages[0]
