@@ -55,14 +55,6 @@ class Wording:
         text = catalogue(SOURCE)[key] if known is None else known
         return text.format(**values) if values else text
 
-    def has(self, key: str) -> bool:
-        """Whether the language itself has a text.
-
-        Args:
-            key: as in the catalogue.
-        """
-        return key in catalogue(self.language)
-
     def own(self, key: str, english: str) -> str:
         """A text that comes from the station in English, in this language where the catalogue has it.
 

@@ -185,8 +185,8 @@ class Orders:
         service.stop_wanted = True
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.conductor.post(Event.STOP, "a person stops the station at the panel")
-        await service.conductor.until(lambda state: state is State.STOPPED or state in WAITING)
-        return ""
+        reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
+        return "" if reached in WAITING else "the station was started again meanwhile"
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
