@@ -30,7 +30,7 @@ DOCUMENT, PICTURES = ROOT / "docs" / "hmi-speed.md", ROOT / "docs" / "images"
 HOST, PIN = "127.83.0.1", "482915"
 BROWSERS, REFRESH_S, ROUNDS = 3, 0.1, 3
 SCAN_US = 10_000
-FRUIT_FIRST, START_S = 12, 240.0
+FRUIT_FIRST, START_S = 8, 400.0
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 
