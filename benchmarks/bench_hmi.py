@@ -204,14 +204,16 @@ def draw(running: Demo, browser: Browser) -> None:
             page.screenshot(path=PICTURES / "hmi-first-start.png")
             page.fill("#pin", PIN)
             page.fill("#again", PIN)
-            page.locator("form[action='/people/begin'] .main").click()
-            page.locator(".who form button").click()
+            with page.expect_navigation():
+                page.locator("form[action='/people/begin'] .main").click()
+            with page.expect_navigation():
+                page.locator(".who form button").click()
             page.goto(f"{address}/people")
         page.screenshot(path=PICTURES / f"hmi-people{size}.png")
         page.locator("input[name=name]").first.check(force=True)
         page.fill("#pin", PIN)
-        page.locator(".log-in .main").click()
-        page.wait_for_url(f"{address}/")
+        with page.expect_navigation():
+            page.locator(".log-in .main").click()
         for name, path in {"run": "/", "change": "/change", "confirm": "/change/2", "alarms": "/alarms"}.items():
             page.goto(address + path)
             settled(page)

@@ -20,6 +20,7 @@ from urllib.parse import urlencode
 import psutil
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Error as BrowserError
 
 from hmi.app import make_app, make_context
 from station.channel.client import ChannelClient
@@ -292,7 +293,18 @@ class Panel:
     complaints: list[str]
 
     def open(self, path: str) -> None:
-        self.page.goto(self.address + path)
+        """Go to a page; on a machine with other work the pages' process may just be started again."""
+
+        def gone() -> bool:
+            try:
+                self.page.goto(self.address + path)
+            except BrowserError as error:
+                if "ERR_CONNECTION_REFUSED" not in str(error):
+                    raise
+                return False
+            return True
+
+        eventually(gone)
 
     def order(self, name: str) -> None:
         """Press a button."""
