@@ -101,7 +101,7 @@ async def _run(
     ended, ready = asyncio.Event(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    click.echo(f"starting the twin, the station and the PLC interface; their logs: {site.home / 'logs'}")
+    click.echo(f"starting the twin, the station, the PLC interface and the pages; their logs: {site.home / 'logs'}")
     supervising = asyncio.create_task(supervisor.run(ready.set, ended))
     waiting = asyncio.create_task(ready.wait())
     try:
