@@ -1,7 +1,7 @@
 """What the operators' pages ask of the past: inspections, pictures, lots, the audit trail, and files made of them.
 
-Every answer is bounded: lists come a page at a time, files piece by piece. What takes long is a job: it is begun, looked
-at, and its files are then read.
+Every answer is bounded: lists come a page at a time, files piece by piece. What takes long is a job: it is begun,
+looked at, and its files are then read.
 """
 
 from typing import Annotated, Any, ClassVar, Literal
