@@ -4,6 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
+from station.channel.line import RegisterTold
 from station.channel.messages import Message
 from station.channel.panel_queries import Actor, Picture
 
@@ -57,7 +58,7 @@ class JogGripper(Message):
     """Move the fingers, slowly and with the least force; in manual mode only. Answered with `Jogged`."""
 
     asked: ClassVar[str] = "to jog the gripper"
-    to: Literal["open", "width", "stop", "activate"]
+    to: Literal["open", "width", "stop"]
     width_mm: float | None = Field(default=None, ge=0.0, le=85.0, allow_inf_nan=False)
     """Where `to` is `width`."""
     actor: Actor
@@ -225,18 +226,6 @@ class GetRegisters(Message):
     """The PLC's registers as the PLC interface has them; asked of it with its next beat."""
 
     asked: ClassVar[str] = "for the PLC's registers"
-
-
-class RegisterTold(Message):
-    """One register by its name."""
-
-    name: str
-    address: int
-    value: str
-    """As a person reads it: a code's or the set bits' names beside the number."""
-    unit: str
-    writable: bool
-    meaning: str
 
 
 class Registers(Message):
