@@ -149,15 +149,18 @@ class Orders:
             case CommandName.CALL_OFF:
                 return await self._call_off()
             case CommandName.SET_MODE:
-                if command.argument not in MODES:
-                    return f"mode {command.argument}: expected 1 (production), 2 (maintenance) or 3 (manual)"
-                if self.kept_manual and command.argument != self.mode:
-                    return f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there"
-                self.mode = command.argument
-                return ""
+                return self._set_mode(command.argument)
             case CommandName.CLEAR_ALARMS:
                 self._service.alarms.acknowledge_returned()
                 return ""
+
+    def _set_mode(self, mode: int) -> str:
+        if mode not in MODES:
+            return f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)"
+        if self.kept_manual and mode != self.mode:
+            return f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there"
+        self.mode = mode
+        return ""
 
     async def _change_recipe(self, number: int) -> str:
         await asyncio.to_thread(self._book.read)
