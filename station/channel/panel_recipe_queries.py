@@ -226,6 +226,12 @@ class PastCurve(Message):
     outcome: str
     closings_mm: tuple[float, ...]
     areas_mm2: tuple[float, ...]
+    growth_mm2_per_mm: float | None
+    """The steepest, as the judge reckons it; None with too few points."""
+    onset_mm: float | None
+    """The fruit's width."""
+    confidence: float | None
+    """The least of its points."""
 
 
 class PastCurves(Message):

@@ -1,8 +1,9 @@
 """What the pages ask about recipes, and a person's changes to them; the recipe store does the work."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from station.channel.messages import Message
 from station.channel.panel_queries import Actor, JobTold
@@ -33,6 +34,8 @@ from station.channel.panel_recipe_queries import (
 )
 from station.channel.server import Handler
 from station.errors import BadInputError, StationError
+from station.inspection.evidence import Evidence
+from station.inspection.press import Measured, Press, usual_uncertainty_mm2
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
@@ -50,12 +53,13 @@ _REVISIONS = 20
 """Of one page of a history."""
 _LONGEST_VALUE = 400
 _JUDGED = (
-    "SELECT i.sequence, i.outcome FROM inspections i JOIN recipe_snapshots r ON r.sha256 = i.recipe_sha256 "
+    "SELECT i.sequence, i.outcome, json_extract(i.measures, '$.onset_mm') FROM inspections i "
+    "JOIN recipe_snapshots r ON r.sha256 = i.recipe_sha256 "
     "WHERE r.name = ? AND i.judged IN ('PASS', 'FAIL') ORDER BY i.sequence DESC LIMIT ?"
 )
 _POINTS = (
-    "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm >= 0 AND area_mm2 NOT NULL "
-    "ORDER BY step"
+    "SELECT closing_mm, area_mm2, area_px, confidence FROM curve_points WHERE sequence = ? AND closing_mm >= 0 "
+    "AND area_mm2 NOT NULL ORDER BY step"
 )
 
 
@@ -208,14 +212,13 @@ class PanelRecipes:
         """The last judged curves of a recipe's fruit."""
 
         def read() -> PastCurves:
-            curves = []
+            recipe = self._store.good_file(request.name).recipe
             with reading(self._records) as connection:
                 ask = plain(connection).execute
-                for number, outcome in ask(_JUDGED, (request.name, request.limit)).fetchall():
-                    points = ask(_POINTS, (number,)).fetchall()
-                    xs, ys = tuple(point[0] for point in points), tuple(point[1] for point in points)
-                    curves.append(PastCurve(sequence=number, outcome=outcome, closings_mm=xs, areas_mm2=ys))
-            return PastCurves(curves=tuple(curves))
+                judged = ask(_JUDGED, (request.name, request.limit)).fetchall()
+                return PastCurves(
+                    curves=tuple(_curve(*row, ask(_POINTS, row[:1]).fetchall(), recipe) for row in judged)
+                )
 
         return await self._worker.do(read)
 
@@ -302,3 +305,22 @@ def _shown(value: object) -> str:
 
 def _person(actor: Actor, reason: str) -> Person:
     return Person(actor.who, actor.role, reason)
+
+
+def _curve(
+    number: int, outcome: str, onset_mm: float | None, points: Sequence[tuple[Any, ...]], recipe: Recipe
+) -> PastCurve:
+    measured = tuple(
+        Measured(closing_mm, area_mm2, area_px or 0, usual_uncertainty_mm2(area_mm2), confidence, frozenset())
+        for closing_mm, area_mm2, area_px, confidence in points
+    )
+    growths = Evidence(Press(onset_mm, 0.0, measured, ()), recipe).growths if measured else ()
+    return PastCurve(
+        sequence=number,
+        outcome=outcome,
+        closings_mm=tuple(point.closing_mm for point in measured),
+        areas_mm2=tuple(point.area_mm2 for point in measured),
+        growth_mm2_per_mm=max((growth.mm2_per_mm for growth in growths), default=None),
+        onset_mm=onset_mm,
+        confidence=min((point.confidence for point in measured if point.confidence is not None), default=None),
+    )
