@@ -217,7 +217,10 @@ class PanelRecipes:
                 ask = plain(connection).execute
                 judged = ask(_JUDGED, (request.name, request.limit)).fetchall()
                 return PastCurves(
-                    curves=tuple(_curve(*row, ask(_POINTS, row[:1]).fetchall(), recipe) for row in judged)
+                    curves=tuple(
+                        _curve(number, outcome, onset_mm, ask(_POINTS, (number,)).fetchall(), recipe)
+                        for number, outcome, onset_mm in judged
+                    )
                 )
 
         return await self._worker.do(read)
