@@ -101,8 +101,8 @@ def one_kill(folder: Path, round_number: int) -> list[list[object]]:
 
 
 async def opened_once(folder: Path) -> None:
-    """A last start puts right what the last kill left, and ends in order."""
-    records = await Records.open(folder, SETTINGS, "last")
+    """A start that puts right what a kill left, and ends in order."""
+    records = await Records.open(folder, SETTINGS, "orderly")
     await records.close()
 
 
@@ -149,6 +149,7 @@ def main() -> int:
     repeated, began_s = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "records"
+        asyncio.run(opened_once(folder))  # so that each station is forked with all that it needs loaded
         for number in range(arguments.rounds):
             for word, row, tag in one_kill(folder, number):
                 repeated += row in told[str(word)]

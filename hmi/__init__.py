@@ -1,1 +1,1 @@
-"""The operator panel, served to a browser."""
+"""The operators' pages: a process of its own that reaches the station through the channel only."""

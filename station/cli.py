@@ -20,6 +20,7 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
+    "alarms": Entry("station.commands.alarms:alarms", "See, acknowledge and shelve the station's alarms."),
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
@@ -27,6 +28,7 @@ COMMANDS = {
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
+    "hmi": Entry("hmi.command:hmi", "Serve the operators' pages."),
     "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
     "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),

@@ -15,6 +15,7 @@ from station.errors import StationError
 
 Handler = Callable[[Any], Awaitable[Message]]
 """Takes the request that it is registered for and gives the reply."""
+Handlers = Mapping[type[Message], Handler]
 
 log = logging.getLogger(__name__)
 
@@ -22,7 +23,7 @@ log = logging.getLogger(__name__)
 class ChannelServer:
     """Answers any number of clients, each request in a task of its own."""
 
-    def __init__(self, endpoint: str, handlers: Mapping[type[Message], Handler]) -> None:
+    def __init__(self, endpoint: str, handlers: Handlers) -> None:
         """Bind the endpoint.
 
         Args:

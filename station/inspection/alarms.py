@@ -191,10 +191,15 @@ class Alarms:
         ticked = (_ticked(alarm, now_s) for alarm in self.known.values())
         return type(self)({alarm.id: alarm for alarm in ticked if not alarm.forgotten(now_s)})
 
+    @property
+    def standing(self) -> tuple[Alarm, ...]:
+        """All that are not normal, also those that are shelved, most urgent first: by priority, the older first."""
+        standing = [alarm for alarm in self.known.values() if alarm.state is not AlarmState.NORMAL]
+        return tuple(sorted(standing, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
+
     def shown(self) -> tuple[Alarm, ...]:
-        """What an operator sees, most urgent first: by priority, the older first."""
-        shown = [alarm for alarm in self.known.values() if alarm.state in SHOWN]
-        return tuple(sorted(shown, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
+        """What an operator sees, most urgent first."""
+        return tuple(alarm for alarm in self.standing if alarm.state in SHOWN)
 
     @property
     def active(self) -> tuple[Alarm, ...]:

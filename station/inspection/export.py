@@ -104,7 +104,8 @@ def alarms_document() -> str:
         (
             f"Shelving ends by itself, after {LONGEST_SHELVED_S / 3600:g} h at the latest. An alarm that is raised "
             f"{CHATTER_RAISES} times within {CHATTER_S:g} s is told once, counted, and stays until it was quiet for "
-            f"{CHATTER_S:g} s. All of it is remembered over a restart.\n"
+            f"{CHATTER_S:g} s. All of it is remembered over a restart. `station alarms list` shows what stands, "
+            "`station alarms acknowledge`, `shelve` and `unshelve` change it; the audit trail tells who did so.\n"
         ),
         _life(LIFE),
         "Latched alarms are never shelved, and end only when a person has reset them after their cause is gone:\n",

@@ -82,7 +82,7 @@ def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
     Raises:
         BadRecordError: a text is empty, too long or not printable, or a value has no JSON.
     """
-    _check(entry)
+    check_entry(entry)
     return _append(connection, entry, last_row(connection), None)
 
 
@@ -190,7 +190,15 @@ def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, se
     return row
 
 
-def _check(entry: AuditEntry) -> None:
+def check_entry(entry: AuditEntry) -> None:
+    """Whether the trail can hold an entry's texts: for who has to know before something is done.
+
+    Args:
+        entry: what is to be done.
+
+    Raises:
+        BadRecordError: a text is empty, too long or not printable.
+    """
     words = {"who": entry.who, "role": entry.role, "action": entry.action}
     for name, text in words.items():
         if not text.strip() or len(text) > LONGEST_WORD or not text.isprintable():

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, func, select, true
 
 from station.channel.line import Outcome
+from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
 from station.records.model import (
@@ -21,7 +22,7 @@ from station.records.model import (
     StoredImage,
     Trigger,
 )
-from station.records.schema import alarms, curve_points, images, inspections, lots, recipe_snapshots
+from station.records.schema import alarms, curve_points, images, inspections, recipe_snapshots
 
 
 class Summary(NamedTuple):
@@ -103,6 +104,19 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
     )
 
 
+_SUMMARIES = """
+SELECT i.sequence, i.trigger_id, i.began_utc_ms, i.lot, coalesce(l.grower, ''), coalesce(r.name, 'none'), i.outcome,
+    json_extract(i.standing, '$.reasons'), i.duration_ms
+FROM inspections AS i
+LEFT JOIN recipe_snapshots AS r ON r.sha256 = i.recipe_sha256
+LEFT JOIN lots AS l ON l.name = i.lot
+WHERE i.sequence IN (SELECT value FROM json_each(?)) ORDER BY i.sequence DESC
+"""
+_AREAS = """
+SELECT sequence, area_mm2 FROM curve_points WHERE sequence IN (SELECT value FROM json_each(?)) ORDER BY sequence, step
+"""
+
+
 def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Summary]:
     """Some inspections for a list, highest number first.
 
@@ -110,45 +124,13 @@ def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Sum
         connection: any.
         sequences: which; those that are not there are left out.
     """
-    table, points = inspections.c, curve_points.c
-    rows = connection.execute(
-        select(
-            table.sequence,
-            table.trigger_id,
-            table.began_utc_ms,
-            table.lot,
-            lots.c.grower,
-            recipe_snapshots.c.name,
-            table.outcome,
-            table.standing,
-            table.duration_ms,
-        )
-        .outerjoin(recipe_snapshots, recipe_snapshots.c.sha256 == table.recipe_sha256)
-        .outerjoin(lots, lots.c.name == table.lot)
-        .where(table.sequence.in_(sequences))
-        .order_by(table.sequence.desc())
-    ).all()
+    database, wanted = plain(connection), (json.dumps(list(sequences)),)  # through SQLAlchemy it takes several times as long
     areas: defaultdict[int, list[float | None]] = defaultdict(list)
-    for point in connection.execute(
-        select(points.sequence, points.area_mm2)
-        .where(points.sequence.in_(sequences))
-        .order_by(points.sequence, points.step)
-    ):
-        areas[point.sequence].append(point.area_mm2)
+    for sequence, area_mm2 in database.execute(_AREAS, wanted):
+        areas[sequence].append(area_mm2)
     return [
-        Summary(
-            row.sequence,
-            row.trigger_id,
-            row.began_utc_ms,
-            row.lot,
-            row.grower or "",
-            row.name or "none",
-            row.outcome,
-            tuple(json.loads(row.standing or "{}").get("reasons", ())),
-            tuple(areas[row.sequence]),
-            row.duration_ms,
-        )
-        for row in rows
+        Summary(*told, tuple(json.loads(reasons)) if reasons else (), tuple(areas[told[0]]), duration_ms)
+        for *told, reasons, duration_ms in database.execute(_SUMMARIES, wanted)
     ]
 
 

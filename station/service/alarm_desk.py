@@ -149,6 +149,43 @@ class AlarmDesk:
         if told is not None:
             self.raise_(told, str(fault))
 
+    def acknowledge(self, alarm: AlarmId) -> bool:
+        """A person has seen it.
+
+        Args:
+            alarm: which.
+
+        Returns:
+            Whether that changed anything.
+        """
+        return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged", "")
+
+    def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
+        """Hide it for a time.
+
+        Args:
+            alarm: which; a latched one, and one that is shelved, stays as it is.
+            for_s: how long, `LONGEST_SHELVED_S` at most.
+            by: who.
+            reason: why.
+
+        Returns:
+            Whether that changed anything.
+        """
+        detail = f"for {for_s:.0f} s by {by}: {reason}"
+        return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
+
+    def unshelve(self, alarm: AlarmId) -> bool:
+        """Show it again; one whose cause is there has to be acknowledged anew.
+
+        Args:
+            alarm: which.
+
+        Returns:
+            Whether that changed anything.
+        """
+        return self._set(self._alarms.unshelve(alarm), alarm, "unshelved", "")
+
     def acknowledge_returned(self) -> None:
         """Acknowledge every alarm whose cause is gone: what the PLC's command does."""
         self._set_all(self._alarms.acknowledge_returned(), "acknowledged")
@@ -217,14 +254,15 @@ class AlarmDesk:
             else:
                 del self._unsaved[: len(entries)]
 
-    def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: str) -> None:
-        if alarms == self._alarms:
-            return
+    def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: str) -> bool:
+        if alarms.get(alarm) == self._alarms.get(alarm):
+            return False
         self._alarms = alarms
         self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, detail)][-_MOST_UNSAVED:]
         level = logging.WARNING if change == "raised" else logging.INFO
         log.log(level, "alarm %s %s%s", alarm, change, f": {detail}" if detail else "")
         self._show()
+        return True
 
     def _set_all(self, alarms: Alarms, change: str) -> None:
         for alarm, before in self._alarms.known.items():

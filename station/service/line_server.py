@@ -17,6 +17,7 @@ from station.channel.line import (
 )
 from station.channel.panel import Recover
 from station.channel.server import ChannelServer
+from station.service.alarm_orders import AlarmOrders
 from station.service.lot import LotKeeper
 from station.service.orders import Orders
 from station.service.readiness import Gate
@@ -33,9 +34,12 @@ class LineServer:
         orders: the commands, and what the line says of itself.
         gate: whether a trigger is accepted.
         lots: freezes the recipe at a lot's first trigger.
+        alarms: what people do with alarms.
     """
 
-    def __init__(self, endpoint: str, service: Service, orders: Orders, gate: Gate, lots: LotKeeper) -> None:
+    def __init__(
+        self, endpoint: str, service: Service, orders: Orders, gate: Gate, lots: LotKeeper, alarms: AlarmOrders
+    ) -> None:
         self._service, self._orders, self._gate, self._lots = service, orders, gate, lots
         self._server = ChannelServer(
             endpoint,
@@ -48,6 +52,7 @@ class LineServer:
                 Line: self._line,
                 Command: self._command,
                 Recover: self._recover,
+                **alarms.handlers,
             },
         )
 

@@ -15,6 +15,7 @@ from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_desk import AlarmDesk
+from station.service.alarm_orders import AlarmOrders
 from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.eye import Eye
@@ -134,7 +135,12 @@ class Station:
             longest_pause_s=settings.retry_longest_s,
         )
         line = LineServer(
-            _made_room_for(line_endpoint(configuration.handshake, configuration.home)), service, orders, gate, lots
+            _made_room_for(line_endpoint(configuration.handshake, configuration.home)),
+            service,
+            orders,
+            gate,
+            lots,
+            AlarmOrders(alarms, trail),
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
         address = configuration.metrics

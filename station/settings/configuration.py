@@ -14,6 +14,7 @@ from station.settings.camera import CameraSettings
 from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.gripper import GripperSettings
+from station.settings.hmi import HmiSettings
 from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
 from station.settings.network import Host
@@ -29,18 +30,6 @@ from station.settings.validation import validated
 from station.settings.yaml_loader import Document, read_document
 
 FILE_NAME = "station.yaml"
-
-
-class HmiSettings(Settings):
-    """Where operators' browsers reach the station."""
-
-    host: Host = setting(
-        "127.0.0.1",
-        title="Address",
-        description="Network address on which the operators' pages are served.",
-        max_length=253,
-    )
-    port: int = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.", ge=1, le=65_535)
 
 
 class MetricsSettings(Settings):

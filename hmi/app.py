@@ -1,0 +1,146 @@
+"""The web application: every page behind the guard, over one gateway to the station."""
+
+import asyncio
+import contextlib
+import logging
+import uuid
+from collections.abc import AsyncIterator
+
+from fastapi import FastAPI, Request
+from fastapi.exception_handlers import request_validation_exception_handler
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from hmi.access import wording_of
+from hmi.assets import Assets
+from hmi.context import Hmi
+from hmi.gateway import Gateway, person
+from hmi.guard import Guard
+from hmi.live import Live
+from hmi.navigation import modules, parts
+from hmi.page import show
+from hmi.people_file import PeopleFile
+from hmi.pin_limit import PinLimit
+from hmi.problem import Problem
+from hmi.render import Renderer
+from hmi.sessions import Sessions
+from station.channel.messages import ChannelError, DeadlineError
+from station.channel.panel_live import PersonNoted
+from station.settings.configuration import Configuration
+from station.settings.hmi import panel_endpoint
+
+FOLDER = "hmi"
+_SWEEP_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+def make_context(site: Configuration) -> Hmi:
+    """All that the pages work with; the gateway is not entered yet.
+
+    Args:
+        site: the site's configuration.
+
+    Raises:
+        StationError: the people's file cannot be read, or the endpoint is none.
+    """
+    settings, boot = site.hmi, uuid.uuid4().hex[:12]
+    assets, gateway = Assets(), Gateway(panel_endpoint(site.hmi, site.home), site.hmi.refresh_s)
+    renderer = Renderer(assets)
+    return Hmi(
+        settings=settings,
+        gateway=gateway,
+        sessions=Sessions(settings.idle_s),
+        people=PeopleFile(site.home / FOLDER),
+        pins=PinLimit(),
+        assets=assets,
+        renderer=renderer,
+        live=Live(parts(), renderer, gateway, boot),
+        boot=boot,
+    )
+
+
+def make_app(hmi: Hmi) -> Guard:
+    """The application.
+
+    Args:
+        hmi: its parts.
+    """
+
+    @contextlib.asynccontextmanager
+    async def running(_: FastAPI) -> AsyncIterator[None]:
+        async with hmi.gateway:
+            sweeping = asyncio.create_task(_sweep(hmi), name="logging out who is idle")
+            try:
+                yield
+            finally:
+                sweeping.cancel()
+                await asyncio.gather(sweeping, return_exceptions=True)
+
+    app = FastAPI(
+        title="Fruit station",
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        lifespan=running,
+        routes=[Route("/static/{digest}/{name}", hmi.assets.serve)],
+        exception_handlers={
+            Problem: _problem,
+            HTTPException: _http,
+            RequestValidationError: _bad_form,
+            ChannelError: _away,
+            Exception: _broken,
+        },
+    )
+    app.state.hmi = hmi
+    for module in modules():
+        app.include_router(module.router, include_in_schema=getattr(module, "IN_SCHEMA", False))
+    return Guard(app, (*hmi.settings.names, hmi.settings.host), secure=hmi.settings.tls.enabled)
+
+
+async def _sweep(hmi: Hmi) -> None:
+    while True:
+        await asyncio.sleep(_SWEEP_S)
+        for caller in hmi.sessions.sweep():
+            await hmi.gateway.note(PersonNoted(person=person(caller.name, caller.role), what="idle"))
+
+
+async def _problem(request: Request, error: Exception) -> Response:
+    assert isinstance(error, Problem)  # noqa: S101 (what it is registered for)
+    values = dict(error.values)
+    wording = wording_of(request)
+    if "role" in values:
+        values["role"] = wording.text(f"role.{values['role']}")
+    return _told(request, error.status, wording.text(error.key, **values))
+
+
+async def _http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101 (what it is registered for)
+    key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
+    return _told(request, error.status_code, wording_of(request).text(key) if key else str(error.detail))
+
+
+async def _bad_form(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)  # noqa: S101 (what it is registered for)
+    if request.url.path.startswith("/api/"):
+        return await request_validation_exception_handler(request, error)
+    return _told(request, 400, wording_of(request).text("problem.bad_form"))
+
+
+async def _away(request: Request, error: Exception) -> Response:
+    """The station did not answer, or refused; whether an order was carried out is said as far as it is known."""
+    if isinstance(error, DeadlineError):
+        return _told(request, 503, wording_of(request).text("problem.no_answer"), str(error))
+    return _told(request, 409, wording_of(request).text("problem.refused"), str(error))
+
+
+async def _broken(request: Request, _: Exception) -> Response:
+    return _told(request, 500, wording_of(request).text("problem.broken"))
+
+
+def _told(request: Request, status: int, text: str, detail: str = "") -> Response:
+    if request.url.path.startswith("/api/"):
+        return JSONResponse({"detail": f"{text} {detail}".strip()}, status)
+    return show(request, "problem.html.j2", status=status, text=text, detail=detail)

@@ -1,0 +1,27 @@
+"""All that a page works with."""
+
+from dataclasses import dataclass
+
+from hmi.assets import Assets
+from hmi.gateway import Gateway
+from hmi.live import Live
+from hmi.people_file import PeopleFile
+from hmi.pin_limit import PinLimit
+from hmi.render import Renderer
+from hmi.sessions import Sessions
+from station.settings.hmi import HmiSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Hmi:
+    """One process's parts; `request.app.state.hmi`."""
+
+    settings: HmiSettings
+    gateway: Gateway
+    sessions: Sessions
+    people: PeopleFile
+    pins: PinLimit
+    assets: Assets
+    renderer: Renderer
+    live: Live
+    boot: str

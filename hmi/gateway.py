@@ -1,0 +1,129 @@
+"""The HMI's one way to the station: asked with deadlines, and looked at all the time."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from typing import TypeVar
+
+from station.channel.client import ChannelClient
+from station.channel.line import Noted
+from station.channel.messages import ChannelError, DeadlineError, Message
+from station.channel.panel_live import AskFruit, AskPanel, AskRecent, Fruit, PanelState, Person, PersonNoted, Recent
+from station.errors import StationError
+
+ReplyT = TypeVar("ReplyT", bound=Message)
+STALE_S = 2.0
+"""What is older is not shown as live."""
+DEADLINE_S = 2.0
+_LOOK_DEADLINE_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+class Gateway:
+    """The station as the pages know it. Belongs to the event loop in which it is entered.
+
+    Args:
+        endpoint: the panel's channel.
+        period_s: how often the station is looked at; once for all pages, however many are open.
+    """
+
+    def __init__(self, endpoint: str, period_s: float) -> None:
+        self._endpoint, self._period_s = endpoint, period_s
+        self._client: ChannelClient | None = None
+        self._looking: asyncio.Task[None] | None = None
+        self._looked = asyncio.Event()
+        self.state: PanelState | None = None
+        """As it was last heard; None before the first answer."""
+        self.heard_s: float | None = None
+        """When that was, monotonic."""
+        self.last: Fruit | None = None
+        """The last fruit."""
+        self.recent = Recent(fruit=())
+        """The last fruit in short."""
+
+    async def __aenter__(self) -> "Gateway":
+        self._client = ChannelClient(self._endpoint, "the station")
+        self._looking = asyncio.create_task(self._look(), name="looking at the station")
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._looking is not None:
+            self._looking.cancel()
+            await asyncio.gather(self._looking, return_exceptions=True)
+        if self._client is not None:
+            await self._client.close()
+
+    @property
+    def age_s(self) -> float | None:
+        """Age of `state`; None where there never was one."""
+        return None if self.heard_s is None else time.monotonic() - self.heard_s
+
+    @property
+    def fresh(self) -> bool:
+        """Whether `state` may be shown as live."""
+        return self.age_s is not None and self.age_s <= STALE_S
+
+    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
+        """Ask the station.
+
+        Args:
+            request: a message of the panel's channel.
+            reply: the type of its answer.
+            deadline_s: how long to wait in all.
+
+        Raises:
+            DeadlineError: no answer came in time; of an order it is unknown whether it was carried out.
+            RefusedError: the station refused; its words are the message.
+        """
+        if self._client is None:
+            raise DeadlineError("the channel to the station is not open")
+        return await self._client.ask(request, reply, deadline_s=deadline_s)
+
+    async def note(self, what: PersonNoted) -> None:
+        """Have something written into the audit trail; where the station is away, the log has it.
+
+        Args:
+            what: who did what.
+        """
+        log.info("%s (%s): %s %s", what.person.who, what.person.role, what.what, what.subject)
+        try:
+            await self.ask(what, Noted)
+        except StationError as error:
+            log.warning("the audit trail does not have it: %s", error)
+
+    async def looked(self) -> None:
+        """Wait until the station was looked at again, whether it answered or not."""
+        await self._looked.wait()
+
+    async def _look(self) -> None:
+        while True:
+            began_s = time.monotonic()
+            with contextlib.suppress(ChannelError):
+                state = await self.ask(AskPanel(), PanelState, deadline_s=_LOOK_DEADLINE_S)
+                if state.last_sequence is not None and self._is_news(state):
+                    recent = await self.ask(AskRecent(), Recent)
+                    self.last = await self.ask(AskFruit(sequence=state.last_sequence), Fruit)
+                    self.recent = recent
+                self.state, self.heard_s = state, time.monotonic()
+            looked, self._looked = self._looked, asyncio.Event()
+            looked.set()
+            await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
+
+    def _is_news(self, state: PanelState) -> bool:
+        known = self.last
+        return known is None or self.state is None or (self.state.boot, known.short.sequence) != (
+            state.boot,
+            state.last_sequence,
+        )
+
+
+def person(name: str, role: str) -> Person:
+    """Who gives an order.
+
+    Args:
+        name: as logged in.
+        role: theirs.
+    """
+    return Person(who=name or "panel", role=role)

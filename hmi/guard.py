@@ -1,0 +1,112 @@
+"""What every request has to pass before any page sees it, and the headers that every answer carries."""
+
+from collections.abc import Iterable
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+LARGEST_BODY_BYTES = 256 * 1024
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; font-src 'self'; "
+    "manifest-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "content-security-policy": POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "same-origin",  # with no-referrer a browser would send its forms with "Origin: null"
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=(), usb=(), serial=()",
+}
+_SECURE = {"strict-transport-security": "max-age=31536000"}
+
+
+class TooLargeError(Exception):
+    """More came than a request may hold."""
+
+
+class Guard:
+    """Refuses requests for a foreign host's name, from a foreign page, or too large, before they are read.
+
+    Args:
+        app: what is guarded.
+        names: the host names that are ours.
+        secure: whether TLS is served.
+    """
+
+    def __init__(self, app: ASGIApp, names: Iterable[str], *, secure: bool) -> None:
+        self._app, self._names = app, frozenset(name.lower() for name in names)
+        self._scheme = "https" if secure else "http"
+        self._headers = {**HEADERS, **(_SECURE if secure else {})}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun = False
+
+        async def told(message: Message) -> None:
+            nonlocal begun
+            if message["type"] == "http.response.start":
+                begun = True
+                headers = MutableHeaders(scope=message)
+                for name, value in self._headers.items():
+                    headers.setdefault(name, value)
+                headers.setdefault("cache-control", "no-store")
+            await send(message)
+
+        headers = Headers(scope=scope)
+        if refused := self._refusal(headers, scope["method"]):
+            await refused(scope, receive, told)
+            return
+        try:
+            await self._app(scope, _limited(receive), told)
+        except TooLargeError:
+            if begun:
+                raise
+            await _too_large()(scope, receive, told)
+
+    def _refusal(self, headers: Headers, method: str) -> PlainTextResponse | None:
+        host = headers.get("host", "")
+        if _name_of(host) not in self._names:
+            return PlainTextResponse(f"{host!r} is not a name of this station: see hmi.names", 421)
+        if method not in SAFE_METHODS and not self._own(headers, host):
+            return PlainTextResponse("this order comes from a page that is not this station's", 403)
+        length = headers.get("content-length", "0")
+        if not length.isascii() or not length.isdigit() or int(length[:12]) > LARGEST_BODY_BYTES:
+            return _too_large()
+        return None
+
+    def _own(self, headers: Headers, host: str) -> bool:
+        """Whether the browser says that one of our pages asks; a program that is no browser says nothing."""
+        site, origin = headers.get("sec-fetch-site"), headers.get("origin")
+        return site in {None, "same-origin", "none"} and origin in {None, f"{self._scheme}://{host}"}
+
+
+def _name_of(host: str) -> str:
+    """A Host header's name without its port."""
+    name = host[: host.rindex("]") + 1].strip("[]") if "]" in host else host.partition(":")[0]
+    return name.lower()
+
+
+def _limited(receive: Receive) -> Receive:
+    taken = 0
+
+    async def take() -> Message:
+        nonlocal taken
+        message = await receive()
+        taken += len(message.get("body", b""))
+        if taken > LARGEST_BODY_BYTES:
+            raise TooLargeError
+        return message
+
+    return take
+
+
+def _too_large() -> PlainTextResponse:
+    return PlainTextResponse(
+        f"a request may hold {LARGEST_BODY_BYTES} bytes at most", 413, headers={"connection": "close"}
+    )

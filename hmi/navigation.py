@@ -1,0 +1,43 @@
+"""The pages that there are, in the order of the navigation. A new page is one more line here."""
+
+import importlib
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+from typing import NamedTuple
+
+from hmi.live import Part
+
+PAGES = (
+    "hmi.pages.frame",
+    "hmi.pages.run",
+    "hmi.pages.change",
+    "hmi.pages.alarms",
+    "hmi.pages.people",
+)
+"""Modules with `router`; where they have them, `ENTRY`, their place in the navigation, and `PARTS`."""
+
+
+class Entry(NamedTuple):
+    """A page's place in the navigation."""
+
+    name: str
+    """Its text is `nav.NAME` of the catalogue, its icon `NAME` of `icons.html.j2`."""
+    path: str
+
+
+@cache
+def modules() -> tuple[ModuleType, ...]:
+    """The pages' modules."""
+    return tuple(importlib.import_module(name) for name in PAGES)
+
+
+@cache
+def entries() -> tuple[Entry, ...]:
+    """The navigation."""
+    return tuple(module.ENTRY for module in modules() if hasattr(module, "ENTRY"))
+
+
+def parts() -> Mapping[str, Part]:
+    """All parts that change by themselves."""
+    return {name: part for module in modules() for name, part in getattr(module, "PARTS", {}).items()}

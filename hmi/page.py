@@ -1,0 +1,77 @@
+"""A whole page: its template within the frame that all pages share."""
+
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from markupsafe import Markup
+from starlette.responses import Response
+
+from hmi.access import SESSION_COOKIE, caller_of, hmi_of, wording_of
+from hmi.context import Hmi
+from hmi.navigation import entries
+from hmi.roles import Right
+from hmi.words import Wording
+
+FRAME_PARTS = ("frame.alarm", "frame.state")
+"""On every page."""
+
+
+def show(request: Request, template: str, *, status: int = 200, **values: Any) -> Response:
+    """Answer with a page.
+
+    Args:
+        request: the browser's.
+        template: it extends `base.html.j2`.
+        status: of HTTP.
+        values: what it needs, beside what every page has: `caller`, `Right`, `state` (the station's, or None), `token()`
+            for a form, and `live(name)`, which puts a part that changes by itself.
+    """
+    hmi, caller, wording = hmi_of(request), caller_of(request), wording_of(request)
+    age_s = hmi.gateway.age_s
+    frame = {
+        "caller": caller,
+        "Right": Right,
+        "state": hmi.gateway.state,
+        "fresh": hmi.gateway.fresh,
+        "age_ms": -1 if age_s is None else round(1000 * age_s),
+        "boot": hmi.boot,
+        "settings": hmi.settings,
+        "entries": entries(),
+        "path": request.url.path,
+        "first_start": not hmi.people.names(),
+        "token": lambda: hmi.sessions.token(caller.session),
+        "live": lambda name: _live(hmi, wording, name),
+    }
+    answer = HTMLResponse(hmi.renderer.render(template, wording, {**frame, **values}), status)
+    give_session(request, answer, getattr(request.state, "new_session", ""))
+    if caller.name and request.method == "GET":
+        hmi.sessions.touch(caller.session)
+    return answer
+
+
+def give_session(request: Request, answer: Response, session: str) -> None:
+    """Give the browser its cookie, where it is a new one.
+
+    Args:
+        request: the browser's.
+        answer: that carries it.
+        session: the cookie; empty for none.
+    """
+    if session:
+        secure = hmi_of(request).settings.tls.enabled
+        answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="strict", path="/")
+
+
+def go_to(address: str) -> RedirectResponse:
+    """Answer an order: the browser goes to a page, whose reloading repeats nothing.
+
+    Args:
+        address: of a page of ours.
+    """
+    return RedirectResponse(address, 303)
+
+
+def _live(hmi: Hmi, wording: Wording, name: str) -> Markup:
+    filled = hmi.live.part(name, wording)
+    return Markup('<div data-live="{}" data-digest="{}">{}</div>').format(name, filled.digest, filled.html)

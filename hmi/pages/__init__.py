@@ -1,0 +1,1 @@
+"""The pages, each a router with its templates; `hmi.navigation` lists them."""

@@ -1,0 +1,95 @@
+"""What every page has around it: the alarm line, the station's state, the stream of what changes, the language."""
+
+from collections.abc import AsyncIterator, Hashable, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Form, Query, Request
+from starlette.responses import Response, StreamingResponse
+
+from hmi.access import LANGUAGE_COOKIE, GenuineCaller, HmiNow, WordingNow, caller_of
+from hmi.gateway import Gateway
+from hmi.live import Part
+from hmi.page import go_to
+from hmi.problem import Problem
+from hmi.words import Wording
+
+router = APIRouter()
+MOST_PARTS = 20
+MOST_STREAMS = 40
+_A_YEAR_S = 365 * 24 * 3600
+
+
+def _alarms(gateway: Gateway) -> Hashable:
+    return None if gateway.state is None else gateway.state.alarms
+
+
+def _alarm_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    state = gateway.state
+    shown = [] if state is None else [each for each in state.alarms if each.shelved_until_utc_ms is None]
+    return {"alarms": shown, "heard": state is not None}
+
+
+def _state(gateway: Gateway) -> Hashable:
+    state = gateway.state
+    return None if state is None else (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)
+
+
+def _state_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    return {"state": gateway.state}
+
+
+PARTS = {
+    "frame.alarm": Part("frame_alarm.html.j2", _alarms, _alarm_values),
+    "frame.state": Part("frame_state.html.j2", _state, _state_values),
+}
+
+
+@router.get("/live")
+async def live(
+    request: Request, hmi: HmiNow, wording: WordingNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
+) -> Response:
+    """Server-sent events with a page's parts; see `hmi.live`."""
+    if hmi.live.unknown(part):
+        raise Problem(404, "problem.not_found")
+    if hmi.live.open >= MOST_STREAMS:
+        raise Problem(503, "problem.too_many")
+
+    def caller() -> str:
+        now = hmi.sessions.caller(session)
+        return f"{now.name}|{now.role}"
+
+    session = caller_of(request).session
+
+    async def stream() -> AsyncIterator[bytes]:
+        hmi.live.open += 1
+        try:
+            async for event in hmi.live.stream(tuple(dict.fromkeys(part)), wording, caller):
+                yield event
+        finally:
+            hmi.live.open -= 1
+
+    return StreamingResponse(stream(), media_type="text/event-stream")
+
+
+@router.post("/here")
+async def here(request: Request, hmi: HmiNow) -> Response:
+    """A person has touched the page; all that it does is that the idle time begins anew."""
+    hmi.sessions.touch(caller_of(request).session)
+    return Response(status_code=204)
+
+
+@router.post("/language")
+async def language(
+    _: GenuineCaller,
+    hmi: HmiNow,
+    language: Annotated[str, Form(max_length=8)],
+    back: Annotated[str, Form(max_length=200)] = "/",
+) -> Response:
+    """Choose the language of this browser."""
+    if language not in hmi.settings.languages:
+        raise Problem(400, "problem.bad_form")
+    answer = go_to(back if back.startswith("/") and not back.startswith(("//", "/\\")) else "/")
+    answer.set_cookie(
+        LANGUAGE_COOKIE, language, max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
+    )
+    return answer

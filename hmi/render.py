@@ -1,0 +1,47 @@
+"""Templates into pages and into parts of pages."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from hmi.assets import Assets
+from hmi.words import Wording
+
+
+class Renderer:
+    """The templates of the folder `templates`; whatever is put into them is text, never markup.
+
+    In every template: `t(key, **values)` a text of the catalogue, `w` the `Wording` with numbers and times,
+    `static(name)` a file's address.
+
+    Args:
+        assets: the files of the folder `static`.
+    """
+
+    def __init__(self, assets: Assets) -> None:
+        self._environment = Environment(
+            loader=PackageLoader("hmi"),
+            autoescape=True,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            auto_reload=False,
+            extensions=["jinja2.ext.do"],
+        )
+        self._environment.globals["static"] = assets.address
+
+    def render(self, template: str, wording: Wording, values: Mapping[str, Any]) -> Markup:
+        """Fill a template in.
+
+        Args:
+            template: its name.
+            wording: the language.
+            values: what it needs.
+
+        Raises:
+            jinja2.UndefinedError: it needs more.
+        """
+        filled = self._environment.get_template(template).render({**values, "t": wording.text, "w": wording})
+        return Markup(filled)  # noqa: S704 (a template's output, escaped as it was filled in)

@@ -1,0 +1,54 @@
+"""Who may do what at the panel."""
+
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """In what capacity a person stands at the panel."""
+
+    VIEWER = "viewer"
+    """Whoever is not logged in."""
+    OPERATOR = "operator"
+    QUALITY = "quality"
+    MAINTENANCE = "maintenance"
+    ADMIN = "admin"
+
+
+class Right(StrEnum):
+    """What asks for a role."""
+
+    RUN = "run"
+    """Start, stop and call off; lots; recover after a stop."""
+    CHANGE_FRUIT = "change_fruit"
+    HANDLE_ALARMS = "handle_alarms"
+    """Acknowledge and shelve."""
+    CLEAN = "clean"
+    """Lock the screen for cleaning."""
+    EDIT_RECIPES = "edit_recipes"
+    """Drafts, import and export."""
+    APPROVE_RECIPES = "approve_recipes"
+    """Never of one's own draft, which the station itself checks."""
+    MAINTAIN = "maintain"
+    """Mode, jog, lights, calibration and verification."""
+    MANAGE_PEOPLE = "manage_people"
+
+
+_OPERATING = frozenset({Right.RUN, Right.CHANGE_FRUIT, Right.HANDLE_ALARMS, Right.CLEAN})
+
+RIGHTS: dict[Role, frozenset[Right]] = {
+    Role.VIEWER: frozenset(),
+    Role.OPERATOR: _OPERATING,
+    Role.QUALITY: _OPERATING | {Right.EDIT_RECIPES, Right.APPROVE_RECIPES},
+    Role.MAINTENANCE: _OPERATING | {Right.MAINTAIN},
+    Role.ADMIN: frozenset(Right),
+}
+"""Everything may be looked at by a viewer; what changes anything asks for one of these."""
+
+
+def least_role(right: Right) -> Role:
+    """The first role that has a right, for telling who may.
+
+    Args:
+        right: any.
+    """
+    return next(role for role in Role if right in RIGHTS[role])

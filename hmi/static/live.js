@@ -1,0 +1,131 @@
+// What changes on a page by itself: parts sent by the station's pages, their age, times that go on, and pictures.
+"use strict";
+
+(() => {
+  const STALE_MS = 2000;
+  const AGAIN_MS = 1000;
+  const body = document.body;
+  const line = document.querySelector("[data-stale]");
+  const parts = new Map([...document.querySelectorAll("[data-live]")].map((part) => [part.dataset.live, part]));
+  let source = null;
+  let heardAt = performance.now();
+  let ageThen = Number(body.dataset.ageMs);
+  let clockOffset = null;
+
+  const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
+
+  function take(told) {
+    if (told.boot !== body.dataset.boot || told.caller !== body.dataset.caller) {
+      location.reload();
+      return;
+    }
+    heardAt = performance.now();
+    ageThen = told.age_ms === null ? -1 : told.age_ms;
+    if (told.utc_ms) {
+      clockOffset = told.utc_ms + Math.max(0, ageThen) - Date.now();
+    }
+    for (const [name, [digest, html]] of Object.entries(told.parts)) {
+      const part = parts.get(name);
+      if (part && part.dataset.digest !== digest) {
+        const focused = part.contains(document.activeElement) ? document.activeElement.id : "";
+        part.innerHTML = html;
+        part.dataset.digest = digest;
+        if (focused && document.getElementById(focused)) {
+          document.getElementById(focused).focus();
+        }
+        part.dispatchEvent(new CustomEvent("renewed", { bubbles: true }));
+      }
+    }
+    look();
+  }
+
+  function open() {
+    if (source || document.hidden) {
+      return;
+    }
+    const query = [...parts.keys()].map((name) => `part=${encodeURIComponent(name)}`).join("&");
+    source = new EventSource(`/live?${query}`);
+    source.onmessage = (event) => take(JSON.parse(event.data));
+    source.onerror = () => {
+      if (source && source.readyState === EventSource.CLOSED) {
+        close();
+        setTimeout(open, AGAIN_MS);
+      }
+    };
+  }
+
+  function close() {
+    if (source) {
+      source.close();
+      source = null;
+    }
+  }
+
+  // Never a stale value shown as live: older than two seconds, and the page is greyed and says how old it is.
+  function look() {
+    const old = age();
+    const stale = old > STALE_MS;
+    body.classList.toggle("stale", stale);
+    for (const part of parts.values()) {
+      part.inert = stale;
+    }
+    if (line) {
+      const text = !stale
+        ? ""
+        : old === Infinity
+          ? line.dataset.never
+          : line.dataset.text
+              .replace("{age}", Math.floor(old / 1000))
+              .replace("{clock}", new Date(Date.now() - old).toLocaleTimeString(document.documentElement.lang));
+      if (line.textContent !== text) {
+        line.textContent = text;
+      }
+    }
+    for (const time of stale ? [] : document.querySelectorAll("[data-since]")) {
+      const seconds = Math.max(0, Math.floor((Date.now() + (clockOffset || 0) - Number(time.dataset.since)) / 1000));
+      const text = spoken(seconds);
+      if (time.textContent !== text) {
+        time.textContent = text;
+      }
+    }
+  }
+
+  function spoken(seconds) {
+    if (seconds < 60) {
+      return `${seconds} s`;
+    }
+    const minutes = Math.floor(seconds / 60);
+    return minutes < 60 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+  }
+
+  // A picture that is renewed for ever, the next only when the one before has come: never faster than it is taken.
+  function stream(picture) {
+    const again = (pause) => setTimeout(next, pause);
+    const next = () => {
+      if (!picture.isConnected) {
+        return;
+      }
+      if (document.hidden) {
+        again(AGAIN_MS);
+        return;
+      }
+      const coming = new Image();
+      coming.onload = () => {
+        picture.src = coming.src;
+        picture.dataset.at = Date.now();
+        again(Number(picture.dataset.pauseMs || 200));
+      };
+      coming.onerror = () => again(AGAIN_MS);
+      coming.src = `${picture.dataset.stream}?${Date.now()}`;
+    };
+    next();
+  }
+
+  document.querySelectorAll("img[data-stream]").forEach(stream);
+  document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
+  window.addEventListener("pagehide", close);
+  window.addEventListener("pageshow", (event) => event.persisted && location.reload());
+  setInterval(look, 250);
+  look();
+  open();
+})();

@@ -1,0 +1,90 @@
+// What a person's hand does: orders are sent once, some have to be held, and every touch keeps the person logged in.
+"use strict";
+
+(() => {
+  const HOLD_MS = 1000;
+  const AGAIN_MS = 5000;
+  const HERE_MS = 5000;
+  let toldHere = 0;
+
+  // An order is sent once, however often the button is pressed.
+  document.addEventListener("submit", (event) => {
+    const form = event.target;
+    if (form.method !== "post") {
+      return;
+    }
+    if (form.dataset.sent) {
+      event.preventDefault();
+      return;
+    }
+    form.dataset.sent = "yes";
+    form.setAttribute("aria-busy", "true");
+  });
+
+  // Held for a second, by finger, mouse or key. A screen reader, which can only click, presses twice.
+  function holdable(button) {
+    let timer = 0;
+    let held = false;
+    let label = "";
+    const begin = () => {
+      if (timer || held) {
+        return;
+      }
+      button.classList.add("holding");
+      timer = setTimeout(() => {
+        held = true;
+        end();
+        button.form.requestSubmit();
+      }, HOLD_MS);
+    };
+    const end = () => {
+      clearTimeout(timer);
+      timer = 0;
+      button.classList.remove("holding");
+    };
+    button.addEventListener("pointerdown", (event) => event.button === 0 && begin());
+    for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) {
+      button.addEventListener(name, end);
+    }
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    button.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === " ") {
+        event.preventDefault();
+        begin();
+      }
+    });
+    button.addEventListener("keyup", end);
+    button.addEventListener("click", (event) => {
+      event.preventDefault();
+      if (held || event.pointerType) {
+        return;
+      }
+      if (button.dataset.armed) {
+        button.form.requestSubmit();
+        return;
+      }
+      button.dataset.armed = "yes";
+      label = button.innerHTML;
+      button.textContent = button.dataset.again;
+      setTimeout(() => {
+        delete button.dataset.armed;
+        button.innerHTML = label;
+      }, AGAIN_MS);
+    });
+  }
+
+  function here() {
+    const now = performance.now();
+    if (document.body.dataset.caller.startsWith("|") || now - toldHere < HERE_MS) {
+      return;
+    }
+    toldHere = now;
+    fetch("/here", { method: "POST" }).catch(() => undefined);
+  }
+
+  const wire = (root) => root.querySelectorAll("[data-hold]").forEach(holdable);
+  wire(document);
+  document.addEventListener("renewed", (event) => wire(event.target));
+  document.addEventListener("pointerdown", here);
+  document.addEventListener("keydown", here);
+})();

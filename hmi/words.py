@@ -1,0 +1,124 @@
+"""What the pages say, in each language: catalogues of the folder `words`, one file for each page."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cache
+from pathlib import Path
+
+from station.settings.hmi import Language
+
+FOLDER = Path(__file__).with_name("words")
+SOURCE: Language = "en"
+_DECIMAL = {"en": ".", "de": ",", "es": ","}
+_DAY = {"en": "%Y-%m-%d", "de": "%d.%m.%Y", "es": "%d/%m/%Y"}
+NO_VALUE = "–"  # noqa: RUF001 (what is shown where nothing was measured)
+
+
+@cache
+def catalogue(language: Language) -> Mapping[str, str]:
+    """All texts of a language by their keys, `page.what`; a key begins with its file's name.
+
+    Args:
+        language: one of the folder's.
+
+    Raises:
+        ValueError: a key is in another page's file.
+    """
+    texts: dict[str, str] = {}
+    for file in sorted((FOLDER / language).glob("*.json")):
+        for key, text in json.loads(file.read_text(encoding="utf-8")).items():
+            if key.partition(".")[0] != file.stem:
+                raise ValueError(f"{file}: the key {key} belongs into {key.partition('.')[0]}.json")
+            texts[key] = text
+    return texts
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """One language's texts, numbers and times."""
+
+    language: Language
+
+    def text(self, key: str, **values: object) -> str:
+        """A text; in English where the language has none, which a test refuses.
+
+        Args:
+            key: as in the catalogue.
+            values: what its braces stand for.
+
+        Raises:
+            KeyError: no language has it.
+        """
+        known = catalogue(self.language).get(key)
+        text = catalogue(SOURCE)[key] if known is None else known
+        return text.format(**values) if values else text
+
+    def has(self, key: str) -> bool:
+        """Whether the language itself has a text.
+
+        Args:
+            key: as in the catalogue.
+        """
+        return key in catalogue(self.language)
+
+    def own(self, key: str, english: str) -> str:
+        """A text that comes from the station in English, in this language where the catalogue has it.
+
+        Args:
+            key: as in the catalogue.
+            english: as it came.
+        """
+        return catalogue(self.language).get(key, english)
+
+    def number(self, value: float | None, digits: int = 0) -> str:
+        """A number with the language's decimal sign; thousands stand apart by a thin space.
+
+        Args:
+            value: None is shown as a dash.
+            digits: behind the decimal sign.
+        """
+        if value is None:
+            return NO_VALUE
+        return f"{value:,.{digits}f}".replace(".", "\0").replace(",", "\u202f").replace("\0", _DECIMAL[self.language])
+
+    def percent(self, share: float | None, digits: int = 0) -> str:
+        """A share of one as a percentage.
+
+        Args:
+            share: None is shown as a dash.
+            digits: behind the decimal sign.
+        """
+        if share is None:
+            return NO_VALUE
+        return f"{self.number(100 * share, digits)}{'' if self.language == 'en' else chr(0xA0)}%"
+
+    @staticmethod
+    def clock(utc_ms: int) -> str:
+        """A time of day, in the machine's zone.
+
+        Args:
+            utc_ms: since 1970.
+        """
+        return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime("%H:%M:%S")
+
+    def day(self, utc_ms: int) -> str:
+        """A date, in the machine's zone.
+
+        Args:
+            utc_ms: since 1970.
+        """
+        return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime(_DAY[self.language])
+
+
+def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> Language:
+    """The language to show.
+
+    Args:
+        languages: the site's.
+        cookie: what the person chose; may be anything.
+        accepted: the browser's Accept-Language.
+    """
+    asked = [cookie, *(part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])]
+    return next((language for each in asked for language in languages if language == each), languages[0])

@@ -1,0 +1,289 @@
+"""What the HMI's pages show of the running station, and what a person orders there.
+
+Every order says who gives it and in what role, for the audit trail.
+"""
+
+from enum import StrEnum
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from station.channel.messages import Message
+from station.channel.panel import ListedAlarm, RecoveryName
+from station.vocabulary import OutcomeName, PackmlState
+
+LONGEST_LOT = 32
+"""As in the PLC's registers."""
+
+
+class OrderName(StrEnum):
+    """What a person at the panel may order."""
+
+    CHOOSE_RECIPE = "choose_recipe"
+    """Argument: the recipe's PLC number. Takes effect between fruits."""
+    START = "start"
+    """Make a stopped station ready, and confirm that the cell is safe where a stop stands: the PLC's reset."""
+    STOP = "stop"
+    """Take no more triggers; the fruit under way becomes NO_RESULT unless its images are all taken."""
+    CALL_OFF = "call_off"
+    """End the running inspection with NO_RESULT."""
+    RECOVER = "recover"
+    """Argument: one of `RecoveryName`."""
+    SET_MODE = "set_mode"
+    """Argument: PackML mode, 1 production, 2 maintenance, 3 manual."""
+    START_LOT = "start_lot"
+    """Argument: its name, for fruit of which the PLC names no lot."""
+    END_LOT = "end_lot"
+    """What comes next belongs to another lot, and gets the recipe that is then in force."""
+
+
+class Person(Message):
+    """Who stands at the panel."""
+
+    who: str = Field(min_length=1, max_length=64)
+    role: str = Field(min_length=1, max_length=64)
+
+
+class PanelOrder(Message):
+    """Carry out an order of a person's. Answered with `OrderShown`: at once where it is done or cannot be, else with
+    its state so far; `PanelState` goes on telling it. Not idempotent, except that an order that is under way already is
+    not begun twice.
+    """
+
+    asked: ClassVar[str] = "to carry out an order"
+    person: Person
+    order: OrderName
+    argument: str = Field(default="", max_length=64)
+
+
+class OrderShown(Message):
+    """An order, on its way or ended."""
+
+    ticket: int
+    """Rises by one with each order of this start of the station."""
+    order: OrderName
+    argument: str
+    state: Literal["executing", "done", "failed"]
+    why: str
+    """Why it failed; else empty."""
+    who: str
+    began_utc_ms: int
+    ended_utc_ms: int | None
+
+
+class PersonNoted(Message):
+    """Something happened with a person's right to be here; the trail is to have it. Answered with `line.Noted`."""
+
+    asked: ClassVar[str] = "to note who is at the panel"
+    person: Person
+    what: Literal[
+        "logged_in", "log_in_refused", "logged_out", "idle", "added", "changed", "removed", "cleaning", "unlocked"
+    ]
+    subject: str = Field(default="", max_length=200)
+
+
+class AskPanel(Message):
+    """What an operator sees at a glance. Answered with `PanelState`."""
+
+    asked: ClassVar[str] = "for its state"
+
+
+class RecipeShown(Message):
+    """A recipe that is in force."""
+
+    number: int
+    name: str
+    title: str
+    revision: str
+    values: str
+    """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
+
+
+class DeviceShown(Message):
+    """How a device does."""
+
+    name: str
+    fault: str
+    """Empty where it is well."""
+    age_s: float | None
+    """Since it was last found well; None where it never was."""
+
+
+class FruitShort(Message):
+    """One fruit's outcome in a list."""
+
+    sequence: int
+    outcome: OutcomeName
+    reasons: tuple[str, ...]
+    """As `station.vocabulary.Reason`; one of a later program may be unknown here."""
+    ended_utc_ms: int
+    duration_ms: int
+    recipe: str
+    lot: str
+    area_mm2: float | None
+    closing_mm: float | None
+    areas_mm2: tuple[float, ...]
+    """The curve's areas in the steps' order."""
+
+
+class Counts(Message):
+    """How many fruit ended how."""
+
+    passed: int = 0
+    failed: int = 0
+    unjudged: int = 0
+
+
+class PanelState(Message):
+    """What an operator sees at a glance."""
+
+    boot: str
+    """Another one after each start of the station."""
+    utc_ms: int
+    state: str
+    """As `station.inspection.states.State` has it."""
+    sentence: str
+    """What is going on, in English."""
+    packml_state: PackmlState | None
+    mode: int
+    ready: bool
+    why_not_ready: str
+    """One sentence with the remedy; empty where ready."""
+    busy: bool
+    """A fruit is being inspected."""
+    needs_person: bool
+    """Nothing but a person's confirmation leads on."""
+    stopped_by_person: bool
+    simulated: bool
+    recipe: RecipeShown | None
+    lot: str | None
+    """None before the first fruit of one."""
+    named_lot: str
+    """The lot that was started at the panel; empty where none was."""
+    plc_names_lots: bool
+    plc_connected: bool
+    plc_alive: bool
+    line_trouble: str
+    alarms: tuple[ListedAlarm, ...]
+    """Those that are not normal, most urgent first; those that are shelved are among them."""
+    devices: tuple[DeviceShown, ...]
+    orders: tuple[OrderShown, ...]
+    """The last ones, newest first."""
+    may: tuple[OrderName, ...]
+    """What would be begun now."""
+    recoveries: tuple[RecoveryName, ...]
+    """What stands to be recovered from."""
+    last_sequence: int | None
+    """Of the last fruit with an outcome."""
+    lot_counts: Counts
+    deadline_s: float | None
+    """The longest that an inspection may take by the active recipe and settings."""
+
+
+class AskRecent(Message):
+    """The last fruit. Answered with `Recent`."""
+
+    asked: ClassVar[str] = "for the last fruit"
+    most: int = Field(default=20, ge=1, le=200)
+
+
+class Recent(Message):
+    """Fruit, newest first."""
+
+    fruit: tuple[FruitShort, ...]
+
+
+class AskFruit(Message):
+    """One of the last fruit in full. Answered with `Fruit`; refused where it is not among the last any more."""
+
+    asked: ClassVar[str] = "for a fruit"
+    sequence: int = Field(ge=1, lt=2**32)
+
+
+class CurveShown(Message):
+    """A point of the area curve."""
+
+    closing_mm: float
+    area_mm2: float
+    flagged: bool
+
+
+class LimitShown(Message):
+    """An area limit of the recipe."""
+
+    closing_mm: float
+    area_mm2: float
+    least_area_mm2: float
+
+
+class Fruit(Message):
+    """One fruit in full."""
+
+    short: FruitShort
+    explanation: tuple[str, ...]
+    """Sentences, English."""
+    recipe_title: str
+    revision: str
+    onset_mm: float | None
+    curve: tuple[CurveShown, ...]
+    limits: tuple[LimitShown, ...]
+    early_stop_mm2: float
+    growth_mm2_per_mm: float
+    """The largest of a good fruit."""
+    deadline_s: float
+    phases_s: dict[str, float]
+    picture_step: int | None
+    """Of which step there is a picture; None for none."""
+
+
+class AskPicture(Message):
+    """A fruit's picture. Answered with `Picture`; refused where there is none any more."""
+
+    asked: ClassVar[str] = "for a picture"
+    sequence: int = Field(ge=1, lt=2**32)
+
+
+class Picture(Message):
+    """An image with the contact's outline."""
+
+    jpeg: str
+    """Base64."""
+    width_px: int
+    height_px: int
+    outline: tuple[tuple[int, int], ...]
+    """Corners of the contact's outer edge, x and y; empty where no contact was found."""
+
+
+class AskRecipes(Message):
+    """The recipes that can be chosen. Answered with `Recipes`."""
+
+    asked: ClassVar[str] = "for the recipes"
+
+
+class Recipes(Message):
+    """The recipes in force, by their number."""
+
+    recipes: tuple[RecipeShown, ...]
+    problems: tuple[str, ...]
+
+
+class AskAlarmHistory(Message):
+    """What alarms did lately. Answered with `AlarmHistory`."""
+
+    asked: ClassVar[str] = "for the alarms' history"
+    most: int = Field(default=100, ge=1, le=1000)
+
+
+class AlarmChange(Message):
+    """One change of one alarm."""
+
+    utc_ms: int
+    id: str
+    change: str
+    detail: str
+
+
+class AlarmHistory(Message):
+    """Changes, newest first."""
+
+    changes: tuple[AlarmChange, ...]

@@ -1,0 +1,126 @@
+"""What people do with alarms, from the panel or by a command: each told to the audit trail."""
+
+from datetime import UTC, datetime
+
+from station.channel.line import CommandDone
+from station.channel.panel import (
+    AcknowledgeAlarm,
+    AlarmList,
+    ListAlarms,
+    ListedAlarm,
+    OfAlarm,
+    ShelveAlarm,
+    UnshelveAlarm,
+)
+from station.channel.server import Handlers
+from station.errors import BadInputError
+from station.inspection.alarm_table import ALARMS, AlarmId, anchor
+from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
+from station.records.audit import AuditEntry, check_entry
+from station.service.alarm_desk import AlarmDesk
+from station.service.trail import Trail, alarm_changed
+
+
+class AlarmOrders:
+    """Answers what a person asks of the alarms.
+
+    Args:
+        desk: the alarms.
+        trail: told of every change.
+    """
+
+    def __init__(self, desk: AlarmDesk, trail: Trail) -> None:
+        self._desk, self._trail = desk, trail
+        self.handlers: Handlers = {
+            ListAlarms: self.listed,
+            AcknowledgeAlarm: self.acknowledge,
+            ShelveAlarm: self.shelve,
+            UnshelveAlarm: self.unshelve,
+        }
+        """For a channel's server."""
+
+    async def listed(self, _request: ListAlarms) -> AlarmList:
+        """Which alarms are not in their normal state."""
+        alarms = tuple(_listed(alarm) for alarm in self._desk.alarms.standing)
+        return AlarmList(alarms=alarms, longest_shelved_s=LONGEST_SHELVED_S)
+
+    async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:
+        """A person has seen an alarm.
+
+        Raises:
+            BadInputError: there is no such alarm.
+            BadRecordError: who or the role is nothing that the audit trail can hold.
+        """
+        alarm, entry = self._taken(request, "acknowledged")
+        if self._desk.alarms.get(alarm).state is AlarmState.NORMAL:
+            return _refused(f"alarm {alarm} does not stand")
+        return self._done(self._desk.acknowledge(alarm), entry)
+
+    async def shelve(self, request: ShelveAlarm) -> CommandDone:
+        """Hide an alarm for a time.
+
+        Raises:
+            BadInputError: there is no such alarm.
+            BadRecordError: who, the role or the reason is nothing that the audit trail can hold.
+        """
+        alarm, entry = self._taken(request, "shelved", request.reason)
+        known = self._desk.alarms.get(alarm)
+        if not request.reason.strip():
+            return _refused("a reason is needed: whoever looks at the alarms next has to know why it is hidden")
+        if request.for_s > LONGEST_SHELVED_S:
+            return _refused(f"shelved for {request.for_s:g} s: at most {LONGEST_SHELVED_S:g} s, a shift, are possible")
+        if ALARMS[alarm].latched:
+            return _refused(f"alarm {alarm} stands until a person has reset it; it is never hidden")
+        if known.shelved_until_s is not None:
+            until = datetime.fromtimestamp(known.shelved_until_s, UTC).strftime("%H:%M UTC")
+            return _refused(f"alarm {alarm} is shelved until {until} by {known.shelved_by or 'nobody known'} already")
+        return self._done(self._desk.shelve(alarm, request.for_s, request.who, request.reason), entry)
+
+    async def unshelve(self, request: UnshelveAlarm) -> CommandDone:
+        """Show an alarm again.
+
+        Raises:
+            BadInputError: there is no such alarm.
+            BadRecordError: who or the role is nothing that the audit trail can hold.
+        """
+        alarm, entry = self._taken(request, "unshelved")
+        return self._done(self._desk.unshelve(alarm), entry)
+
+    def _taken(self, request: OfAlarm, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
+        """The alarm, and the trail's row, which is checked before anything is done."""
+        if request.alarm not in set(AlarmId):
+            raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")
+        entry = alarm_changed(request.who, request.role, change, request.alarm, reason)
+        check_entry(entry)
+        return AlarmId(request.alarm), entry
+
+    def _done(self, changed: bool, entry: AuditEntry) -> CommandDone:  # noqa: FBT001 (an answer handed on)
+        if changed:
+            self._trail.note(entry)
+        return CommandDone(done=True, why="")
+
+
+def _refused(why: str) -> CommandDone:
+    return CommandDone(done=False, why=why)
+
+
+def _listed(alarm: Alarm) -> ListedAlarm:
+    row, shelved = ALARMS[alarm.id], alarm.state in SHELVES
+    until_s = alarm.shelved_until_s if shelved else None
+    return ListedAlarm(
+        alarm=alarm.id,
+        number=row.number,
+        priority=row.priority.value,
+        state=alarm.state,
+        active=alarm.state in ACTIVE,
+        latched=row.latched,
+        detail=alarm.detail,
+        since_utc_ms=round(1000 * alarm.since_s),
+        raised=alarm.raised,
+        cause=row.cause,
+        consequence=row.consequence,
+        action=row.action,
+        document=anchor(alarm.id),
+        shelved_until_utc_ms=None if until_s is None else round(1000 * until_s),
+        shelved_by=alarm.shelved_by if shelved else "",
+    )

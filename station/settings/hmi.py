@@ -1,0 +1,126 @@
+"""Where operators' browsers reach the station, and how long a person stays logged in."""
+
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from station.errors import BadInputError
+from station.settings.model import Settings, setting
+from station.settings.network import Host
+from station.settings.paths import File
+from station.settings.plc import LONGEST_SOCKET_PATH
+
+Language = Literal["en", "de", "es"]
+
+
+class HmiTlsSettings(Settings):
+    """The operators' pages over TLS."""
+
+    enabled: bool = setting(
+        default=False, title="Served", description="Whether the pages are served over TLS; it needs both files below."
+    )
+    certificate: File | None = setting(
+        None, title="Certificate", description="PEM file with the station's certificate and what it is signed by."
+    )
+    key: File | None = setting(
+        None, title="Private key", description="PEM file with the certificate's private key, without a passphrase."
+    )
+
+    @model_validator(mode="after")
+    def _has_its_files(self) -> Self:
+        missing = [name for name in ("certificate", "key") if getattr(self, name) is None]
+        if self.enabled and missing:
+            raise ValueError(f"TLS is enabled without {', '.join(missing)}: name the PEM files or set enabled: false")
+        return self
+
+
+class HmiSettings(Settings):
+    """Where operators' browsers reach the station, and how long a person stays logged in."""
+
+    host: Host = setting(
+        "127.0.0.1",
+        title="Address",
+        description="Network address on which the operators' pages are served.",
+        max_length=253,
+    )
+    port: int = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.", ge=1, le=65_535)
+    names: tuple[Host, ...] = setting(
+        ("127.0.0.1", "localhost"),
+        title="Names",
+        description="Under which names browsers may ask for the pages, beside the address above; a request for "
+        "another name is refused, as it may come from a foreign page that only points here.",
+        max_length=16,
+    )
+    tls: HmiTlsSettings = setting(
+        HmiTlsSettings(), title="HMI over TLS", description="Outside the machine the pages are to be served over TLS."
+    )
+    languages: tuple[Language, ...] = setting(
+        ("en", "de", "es"),
+        title="Languages",
+        description="Which a person may choose; the first is shown where the browser asks for none of them.",
+        min_length=1,
+        max_length=3,
+    )
+    idle_s: float = setting(
+        180.0,
+        title="Idle time",
+        description="A person who touches nothing for so long is logged out; the page goes on as a viewer's.",
+        unit="s",
+        ge=10.0,
+        le=3600.0,
+    )
+    refresh_s: float = setting(
+        0.2,
+        title="Refresh",
+        description="How often the pages get what is new.",
+        unit="s",
+        ge=0.05,
+        le=1.0,
+    )
+    cleaning_s: float = setting(
+        30.0,
+        title="Cleaning time",
+        description="How long the cleaning lock keeps a screen from taking touches.",
+        unit="s",
+        ge=5.0,
+        le=300.0,
+    )
+    endpoint: str | None = setting(
+        None,
+        title="Station's endpoint",
+        description="Where the station answers the pages: ipc://PATH or tcp://127.0.0.1:PORT; null for run/panel.ipc "
+        "in the home folder.",
+        pattern=r"^(ipc://.+|tcp://127\..+:[0-9]+)$",
+        max_length=200,
+    )
+
+
+def panel_endpoint(settings: HmiSettings, home: Path) -> str:
+    """Where the station serves the panel's channel and the HMI looks for it.
+
+    Args:
+        settings: with the endpoint, or null for the default.
+        home: the absolute home folder.
+
+    Raises:
+        BadInputError: the path is too long for a socket.
+    """
+    endpoint = settings.endpoint or f"ipc://{home / 'run' / 'panel.ipc'}"
+    path = endpoint.removeprefix("ipc://")
+    if path != endpoint and len(path.encode()) > LONGEST_SOCKET_PATH:
+        raise BadInputError(
+            f"the panel's socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
+            "choose a shorter home folder, or set hmi.endpoint to a short ipc:// path"
+        )
+    return endpoint
+
+
+def address_of(settings: HmiSettings) -> str:
+    """What a person types into a browser.
+
+    Args:
+        settings: with host, port and whether TLS is served.
+    """
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    return f"{'https' if settings.tls.enabled else 'http'}://{host}:{settings.port}"

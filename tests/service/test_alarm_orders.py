@@ -1,0 +1,110 @@
+"""`station alarms` against a running station: seen, acknowledged, hidden for a time, shown again, and who did it."""
+
+import asyncio
+
+import pytest
+from click.testing import CliRunner
+
+from station.channel.line import CommandDone
+from station.channel.messages import RefusedError
+from station.channel.panel import AcknowledgeAlarm, AlarmList, ListAlarms, ShelveAlarm
+from station.cli import cli
+from station.errors import StationError
+from station.inspection.alarm_table import ALARMS, AlarmId
+
+BIT = 1 << (ALARMS[AlarmId.NO_RECIPE].number - 1)
+
+
+@pytest.fixture
+def alarms(tmp_path):
+    """Run a command of the line as a person would: its exit code, and what it said."""
+
+    def call(*arguments):
+        done = CliRunner().invoke(cli, [*arguments, "--config", str(tmp_path / "station.yaml")])
+        if done.exception is None or isinstance(done.exception, SystemExit):
+            return done.exit_code, done.output
+        assert isinstance(done.exception, StationError), done.exception
+        return done.exception.exit_code, str(done.exception)
+
+    async def beside(*arguments):
+        return await asyncio.to_thread(call, *arguments)
+
+    return beside
+
+
+def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who(bench, alarms):
+    async def scenario():
+        async with bench() as cell:
+
+            async def word():
+                return (await cell.line.state()).alarms & BIT
+
+            async with asyncio.timeout(60):
+                while not await word():
+                    await asyncio.sleep(0.05)
+            code, said = await alarms("alarms", "list")
+            assert code == 0
+            assert "no_recipe (medium, unacknowledged) since 20" in said
+            assert ALARMS[AlarmId.NO_RECIPE].action in said
+            for _ in range(2):
+                assert await alarms("alarms", "acknowledge", "no_recipe", "--by", "Ida") == (
+                    0,
+                    "no_recipe is acknowledged\n",
+                )
+            shelve = ("alarms", "shelve", "no_recipe", "--minutes", "30", "--by", "Ida", "--reason", "cleaning")
+            assert await alarms(*shelve) == (0, "no_recipe is shelved for 30 min\n")
+            assert not await word(), "the PLC does not see it either"
+            code, said = await alarms(*shelve)
+            assert (code, "is shelved until" in said, "by Ida already" in said) == (1, True, True)
+            assert "no_recipe (medium) is shelved until 20" in (await alarms("alarms", "list"))[1]
+            assert (await alarms("alarms", "unshelve", "no_recipe", "--by", "Bo"))[0] == 0
+            assert await word()
+            told = cell.station.service.ledger.records
+            async with asyncio.timeout(60):
+                while "alarm.unshelved" not in (rows := (await alarms("audit", "show", "--action", "alarm."))[1]):
+                    await asyncio.sleep(0.1)
+            assert rows.count("alarm.acknowledged") == 1, "what changes nothing is no row"
+            assert "cleaning" in rows
+            assert "Ida" in rows
+            assert "Bo" in rows
+            assert told.status().failures == {}
+
+    asyncio.run(scenario())
+
+
+def test_what_cannot_be_done_to_an_alarm_is_refused_and_said(bench):
+    async def scenario():
+        async with bench() as cell:
+            client = cell.line.client
+
+            async def shelve(alarm="disk_low", who="Ida", reason="why", for_s=60.0):
+                request = ShelveAlarm(alarm=alarm, who=who, role="operator", reason=reason, for_s=for_s)
+                return await client.ask(request, CommandDone, deadline_s=20)
+
+            assert "never hidden" in (await shelve("protective_stop")).why
+            assert "a reason is needed" in (await shelve(reason=" ")).why
+            assert "at most 28800 s, a shift" in (await shelve(for_s=28801.0)).why
+            with pytest.raises(RefusedError, match=r"expected an id of docs/alarms\.md"):
+                await shelve(alarm="moon")
+            with pytest.raises(RefusedError, match="audit: who"):
+                await shelve(who="a\nb")
+            request = AcknowledgeAlarm(alarm="disk_low", who="Ida", role="operator")
+            assert "does not stand" in (await client.ask(request, CommandDone, deadline_s=20)).why
+            assert (await shelve()).done, "also one whose cause is not there yet"
+            listed = await client.ask(ListAlarms(), AlarmList, deadline_s=20)
+            (hidden,) = [each for each in listed.alarms if each.alarm == "disk_low"]
+            assert (hidden.state, hidden.active, hidden.shelved_by) == ("shelved_normal", False, "Ida")
+            assert hidden.document == "docs/alarms.md#disk-low"
+
+    asyncio.run(scenario())
+
+
+def test_without_a_station_it_is_said(alarms, settings_file):
+    settings_file()
+
+    async def scenario():
+        code, said = await alarms("alarms", "list")
+        assert code == 1
+        assert "gave no answer within 5 s when asked for its alarms; alarms are a running station's" in said
+
+    asyncio.run(scenario())
