@@ -113,9 +113,14 @@ class Gateway:
 
     def _is_news(self, state: PanelState) -> bool:
         known = self.last
-        return known is None or self.state is None or (self.state.boot, known.short.sequence) != (
-            state.boot,
-            state.last_sequence,
+        return (
+            known is None
+            or self.state is None
+            or (self.state.boot, known.short.sequence)
+            != (
+                state.boot,
+                state.last_sequence,
+            )
         )
 
 

@@ -109,7 +109,7 @@ async def leds(
 
 
 @router.get("/image")
-async def image(request: Request, hmi: HmiNow, wording: WordingNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
     """The live image, at the browser's pace."""
     return show(request, "maintenance_image.html.j2", tab="image", contact=contact, **await _live(hmi, contact=contact))
 
