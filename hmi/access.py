@@ -12,7 +12,7 @@ from hmi.sessions import Caller
 from hmi.words import Wording, preferred
 
 SESSION_COOKIE, LANGUAGE_COOKIE = "station_session", "station_language"
-TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"  # noqa: S105 (their names)
+TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
 
 
 def hmi_of(request: Request) -> Hmi:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
@@ -43,7 +43,7 @@ class Gateway:
         self.recent = Recent(fruit=())
         """The last fruit in short."""
 
-    async def __aenter__(self) -> "Gateway":
+    async def __aenter__(self) -> Self:
         self._client = ChannelClient(self._endpoint, "the station")
         self._looking = asyncio.create_task(self._look(), name="looking at the station")
         return self

@@ -11,8 +11,6 @@ from hmi.live import Part
 PAGES = (
     "hmi.pages.frame",
     "hmi.pages.run",
-    "hmi.pages.change",
-    "hmi.pages.alarms",
     "hmi.pages.people",
 )
 """Modules with `router`; where they have them, `ENTRY`, their place in the navigation, and `PARTS`."""

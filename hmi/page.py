@@ -10,7 +10,7 @@ from starlette.responses import Response
 from hmi.access import SESSION_COOKIE, caller_of, hmi_of, wording_of
 from hmi.context import Hmi
 from hmi.navigation import entries
-from hmi.roles import Right
+from hmi.roles import Right, Role
 from hmi.words import Wording
 
 FRAME_PARTS = ("frame.alarm", "frame.state")
@@ -24,8 +24,8 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         request: the browser's.
         template: it extends `base.html.j2`.
         status: of HTTP.
-        values: what it needs, beside what every page has: `caller`, `Right`, `state` (the station's, or None), `token()`
-            for a form, and `live(name)`, which puts a part that changes by itself.
+        values: what it needs, beside what every page has: `caller`, `Right`, `state` (the station's, or None),
+            `token()` for a form, and `live(name)`, which puts a part that changes by itself.
     """
     hmi, caller, wording = hmi_of(request), caller_of(request), wording_of(request)
     age_s = hmi.gateway.age_s
@@ -39,9 +39,9 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         "settings": hmi.settings,
         "entries": entries(),
         "path": request.url.path,
-        "first_start": not hmi.people.names(),
+        "first_start": hmi.people.first_start,
         "token": lambda: hmi.sessions.token(caller.session),
-        "live": lambda name: _live(hmi, wording, name),
+        "live": lambda name: _live(hmi, wording, caller.role, name),
     }
     answer = HTMLResponse(hmi.renderer.render(template, wording, {**frame, **values}), status)
     give_session(request, answer, getattr(request.state, "new_session", ""))
@@ -72,6 +72,6 @@ def go_to(address: str) -> RedirectResponse:
     return RedirectResponse(address, 303)
 
 
-def _live(hmi: Hmi, wording: Wording, name: str) -> Markup:
-    filled = hmi.live.part(name, wording)
+def _live(hmi: Hmi, wording: Wording, role: Role, name: str) -> Markup:
+    filled = hmi.live.part(name, wording, role)
     return Markup('<div data-live="{}" data-digest="{}">{}</div>').format(name, filled.digest, filled.html)

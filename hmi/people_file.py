@@ -1,10 +1,12 @@
 """The people who may log in: one file of the home folder, readable by the station's user alone."""
 
 import json
+import logging
 import os
 import tempfile
 import threading
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 
 from argon2 import PasswordHasher
@@ -20,6 +22,8 @@ LONGEST_PIN = 12
 LEAST_DIGITS = {Role.OPERATOR: 4}
 _LEAST_DIGITS_ELSE = 6
 _UNUSED_PIN = "000000"
+
+log = logging.getLogger(__name__)
 
 
 class PeopleError(StationError):
@@ -61,7 +65,7 @@ def pin_problem(pin: str, role: Role) -> str:
     """
     if not (pin.isascii() and pin.isdigit() and least_digits(role) <= len(pin) <= LONGEST_PIN):
         return "people.pin_length"
-    steps = {int(after) - int(before) for before, after in zip(pin, pin[1:], strict=False)}
+    steps = {int(after) - int(before) for before, after in pairwise(pin)}
     return "people.pin_simple" if steps in ({0}, {1}, {-1}) else ""
 
 
@@ -71,8 +75,6 @@ class PeopleFile:
     Args:
         folder: of the HMI within the home folder.
 
-    Raises:
-        PeopleError: the file is there and cannot be read; it is never taken for a first start.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -81,10 +83,17 @@ class PeopleFile:
         self._hasher = PasswordHasher(time_cost=2, memory_cost=19_456, parallelism=1)
         self._unused = self._hasher.hash(_UNUSED_PIN)
         self._turn = threading.Lock()
+        self.broken = ""
+        """Why the file that is there cannot be read: nobody can log in, and it is no first start."""
         self._people = self._read()
 
+    @property
+    def first_start(self) -> bool:
+        """Whether the first person at the panel is to choose an administrator's PIN."""
+        return not self._people and not self.broken
+
     def names(self) -> Mapping[str, Role]:
-        """Everybody with their role; empty at the first start."""
+        """Everybody with their role."""
         return {name: person.role for name, person in sorted(self._people.items())}
 
     def check(self, name: str, pin: str) -> Role | None:
@@ -112,7 +121,7 @@ class PeopleFile:
             PeopleError: somebody is there already, or the name or the PIN is none.
         """
         with self._turn:
-            if self._people:
+            if not self.first_start:
                 raise PeopleError("people.begun")
             self._put(name, Role.ADMIN, pin)
 
@@ -157,6 +166,8 @@ class PeopleFile:
         self._write({**self._people, name: person})
 
     def _write(self, people: dict[str, _Person]) -> None:
+        if self.broken:
+            raise PeopleError("people.broken", self.broken)
         if not any(each.role is Role.ADMIN for each in people.values()):
             raise PeopleError("people.last_admin")
         if len(people) > MOST_PEOPLE:
@@ -181,7 +192,9 @@ class PeopleFile:
         except FileNotFoundError:
             return {}
         except (OSError, ValueError, ValidationError) as error:
-            raise PeopleError(
-                f"{self.path} cannot be read: {error}; put a good copy in its place, or remove it: then the first "
-                "person at the panel chooses a new administrator's PIN"
-            ) from error
+            self.broken = (
+                f"{self.path} cannot be read: {error}; put a good copy in its place, or remove it, and start the pages "
+                "again: without it the first person at the panel chooses a new administrator's PIN"
+            )
+            log.exception("nobody can log in")
+            return {}

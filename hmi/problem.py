@@ -1,7 +1,7 @@
 """What a person is told when a request cannot be served."""
 
 
-class Problem(Exception):
+class Problem(Exception):  # noqa: N818 (what it is called where it is shown)
     """A refusal with a text of the catalogue; rendered as a page, and as JSON below `/api/`.
 
     Args:

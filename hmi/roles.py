@@ -22,8 +22,6 @@ class Right(StrEnum):
     CHANGE_FRUIT = "change_fruit"
     HANDLE_ALARMS = "handle_alarms"
     """Acknowledge and shelve."""
-    CLEAN = "clean"
-    """Lock the screen for cleaning."""
     EDIT_RECIPES = "edit_recipes"
     """Drafts, import and export."""
     APPROVE_RECIPES = "approve_recipes"
@@ -33,7 +31,7 @@ class Right(StrEnum):
     MANAGE_PEOPLE = "manage_people"
 
 
-_OPERATING = frozenset({Right.RUN, Right.CHANGE_FRUIT, Right.HANDLE_ALARMS, Right.CLEAN})
+_OPERATING = frozenset({Right.RUN, Right.CHANGE_FRUIT, Right.HANDLE_ALARMS})
 
 RIGHTS: dict[Role, frozenset[Right]] = {
     Role.VIEWER: frozenset(),

@@ -53,17 +53,14 @@ async def live(
         raise Problem(404, "problem.not_found")
     if hmi.live.open >= MOST_STREAMS:
         raise Problem(503, "problem.too_many")
-
-    def caller() -> str:
-        now = hmi.sessions.caller(session)
-        return f"{now.name}|{now.role}"
-
     session = caller_of(request).session
 
     async def stream() -> AsyncIterator[bytes]:
         hmi.live.open += 1
         try:
-            async for event in hmi.live.stream(tuple(dict.fromkeys(part)), wording, caller):
+            async for event in hmi.live.stream(
+                tuple(dict.fromkeys(part)), wording, lambda: hmi.sessions.caller(session)
+            ):
                 yield event
         finally:
             hmi.live.open -= 1

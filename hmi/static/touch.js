@@ -18,6 +18,9 @@
       return;
     }
     form.dataset.sent = "yes";
+    if (form.csrf && !form.csrf.value) {
+      form.csrf.value = document.body.dataset.token;
+    }
     form.setAttribute("aria-busy", "true");
   });
 

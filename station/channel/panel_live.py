@@ -45,15 +45,18 @@ class Person(Message):
 
 
 class PanelOrder(Message):
-    """Carry out an order of a person's. Answered with `OrderShown`: at once where it is done or cannot be, else with
-    its state so far; `PanelState` goes on telling it. Not idempotent, except that an order that is under way already is
-    not begun twice.
+    """Carry out an order of a person's. Answered with `OrderShown`.
+
+    That is its end where it comes at once, else its state so far; `PanelState` goes on telling it. Not idempotent,
+    except that an order that is under way already is not begun twice.
     """
 
     asked: ClassVar[str] = "to carry out an order"
     person: Person
     order: OrderName
     argument: str = Field(default="", max_length=64)
+    grower: str = Field(default="", max_length=64)
+    """Of a lot that is started; may be empty."""
 
 
 class OrderShown(Message):
@@ -88,13 +91,18 @@ class AskPanel(Message):
     asked: ClassVar[str] = "for its state"
 
 
-class RecipeShown(Message):
-    """A recipe that is in force."""
+class RecipeNamed(Message):
+    """A recipe by its names."""
 
     number: int
     name: str
     title: str
     revision: str
+
+
+class RecipeShown(RecipeNamed):
+    """A recipe that is in force."""
+
     values: str
     """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
 
@@ -153,9 +161,10 @@ class PanelState(Message):
     """A fruit is being inspected."""
     needs_person: bool
     """Nothing but a person's confirmation leads on."""
-    stopped_by_person: bool
+    stopping: bool
+    """A person has told the station to stop: it takes no trigger until it is started."""
     simulated: bool
-    recipe: RecipeShown | None
+    recipe: RecipeNamed | None
     lot: str | None
     """None before the first fruit of one."""
     named_lot: str
@@ -264,7 +273,10 @@ class Recipes(Message):
     """The recipes in force, by their number."""
 
     recipes: tuple[RecipeShown, ...]
+    active: RecipeShown | None
+    """What the next fruit is inspected with; of a lot under way it may be an older revision."""
     problems: tuple[str, ...]
+    """Of the recipes' files."""
 
 
 class AskAlarmHistory(Message):

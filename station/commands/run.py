@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.hmi import address_of
 from station.supervision.notify import notify
 from station.supervision.programs import station_programs
 from station.supervision.supervisor import Supervisor
@@ -16,7 +17,7 @@ from station.supervision.supervisor import Supervisor
 @click.command("run")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 def run(config: Path | None) -> None:
-    """Run the station until Ctrl-C: the service and the PLC interface, each a process of its own.
+    """Run the station until Ctrl-C: the service, the PLC interface and the pages, each a process of its own.
 
     What dies or hangs is started again, at most 5 times within 60 s. On SIGTERM a running inspection ends, the jaws
     open, and all processes end.
@@ -47,6 +48,7 @@ def addresses(site: Configuration) -> str:
         site: its configuration.
     """
     return (
+        f"HMI         {address_of(site.hmi)}\n"
         f"Modbus TCP  {site.modbus.host}:{site.modbus.port}, unit {site.modbus.unit}\n"
         f"metrics     http://{site.metrics.host}:{site.metrics.port}/metrics, health at /livez, /readyz, /version"
     )

@@ -56,6 +56,7 @@ class AlarmId(StrEnum):
     REJECT_RATE = "reject_rate"
     DEADLINE_MISSED = "deadline_missed"
     CALIBRATION_OLD = "calibration_old"
+    HMI_LOST = "hmi_lost"
 
 
 class Provocation(NamedTuple):
@@ -337,6 +338,14 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         "Areas in mm² may be wrong; where verification is demanded, triggers are refused.",
         "At the next pause stop the station, run `station verify`, and where it fails `station calibrate`.",
         (P("camera", "gel_worn"),),
+    ),
+    AlarmId.HMI_LOST: AlarmRow(
+        32,
+        Priority.LOW,
+        "The process of the operators' pages does not ask any more.",
+        "Nobody sees the station or acts at the panel; inspections go on.",
+        "Wait for its restart; if it stays away, read its log and start the station again.",
+        (P("process", "hmi"),),
     ),
 }
 """Every alarm, in the order of its number."""

@@ -13,6 +13,7 @@ from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
 from station.records.model import (
+    AlarmEntry,
     AlarmRow,
     CurvePoint,
     FullRecord,
@@ -22,7 +23,7 @@ from station.records.model import (
     StoredImage,
     Trigger,
 )
-from station.records.schema import alarms, curve_points, images, inspections, recipe_snapshots
+from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
 
 
 class Summary(NamedTuple):
@@ -60,6 +61,18 @@ def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
     """The alarms that were saved last, by their ids."""
     rows = connection.execute(select(alarms).order_by(alarms.c.id))
     return tuple(AlarmRow(**row) for row in rows.mappings())
+
+
+def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
+    """What alarms did, newest first.
+
+    Args:
+        connection: any.
+        limit: at most so many.
+    """
+    columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
+    rows = connection.execute(select(*columns).order_by(alarms_log.c.row.desc()).limit(limit))
+    return tuple(AlarmEntry(*row) for row in rows)
 
 
 def read_inspection(connection: Connection, sequence: int, folder: Path) -> FullRecord:
@@ -124,7 +137,10 @@ def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Sum
         connection: any.
         sequences: which; those that are not there are left out.
     """
-    database, wanted = plain(connection), (json.dumps(list(sequences)),)  # through SQLAlchemy it takes several times as long
+    database, wanted = (
+        plain(connection),
+        (json.dumps(list(sequences)),),
+    )  # through SQLAlchemy it takes several times as long
     areas: defaultdict[int, list[float | None]] = defaultdict(list)
     for sequence, area_mm2 in database.execute(_AREAS, wanted):
         areas[sequence].append(area_mm2)

@@ -20,7 +20,7 @@ from station.records.errors import DiskFullError, RecordsClosedError, RecordsDea
 from station.records.images import MB, accepted_is_kept
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
 from station.records.opening import Notice, Opened, lock_folder, open_records
-from station.records.reading import read_alarms, read_inspection, read_open, read_totals
+from station.records.reading import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
 from station.records.writer import Work
 from station.records.writing import (
     PENDING,
@@ -291,6 +291,14 @@ class Records:
             RecordsError: it may not be durable.
         """
         return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
+
+    async def alarm_log(self, limit: int) -> tuple[AlarmEntry, ...]:
+        """What alarms did, newest first.
+
+        Args:
+            limit: at most so many.
+        """
+        return await self._read(lambda connection: read_alarm_log(connection, limit))
 
     async def change(self, work: Work[T]) -> T:
         """Carry out a change of lots or holds, as `lambda connection: start_lot(connection, name, grower)`.

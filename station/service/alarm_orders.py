@@ -41,8 +41,11 @@ class AlarmOrders:
 
     async def listed(self, _request: ListAlarms) -> AlarmList:
         """Which alarms are not in their normal state."""
-        alarms = tuple(_listed(alarm) for alarm in self._desk.alarms.standing)
-        return AlarmList(alarms=alarms, longest_shelved_s=LONGEST_SHELVED_S)
+        return AlarmList(alarms=self.standing(), longest_shelved_s=LONGEST_SHELVED_S)
+
+    def standing(self) -> tuple[ListedAlarm, ...]:
+        """The same, most urgent first."""
+        return tuple(_listed(alarm) for alarm in self._desk.alarms.standing)
 
     async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:
         """A person has seen an alarm.

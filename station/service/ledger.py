@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from station.channel.line import Open, Outcome
@@ -32,6 +32,8 @@ class Ledger:
         self.records = records
         self.fault: RecordsError | None = None
         """Why the records are not to be relied on, until they were opened again."""
+        self.on_told: Callable[[Inspection], None] = lambda _: None
+        """Told of every inspection with its durable outcome."""
         self._triggers, self._crew, self._versions = triggers, crew, versions
         self._begun: list[Inspection] = []
         """Accepted, in order, and perhaps without a durable outcome."""
@@ -95,6 +97,7 @@ class Ledger:
         """
         if now.standing is not None:
             self._triggers.ended(now.standing)
+            self.on_told(now)
             areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
             with inspecting(now.standing.sequence):
                 log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))

@@ -62,9 +62,10 @@ class LineServer:
 
     async def _begin(self, request: Begin) -> Begun:
         refusal, _ = self._gate.refusal()
-        if refusal is None and not await self._lots.begin(request.lot):
+        lot = self._lots.of(request.lot)
+        if refusal is None and not await self._lots.begin(lot):
             refusal = Refusal.NOT_READY
-        return await self._service.begin(request, refusal)
+        return await self._service.begin(request, refusal, lot)
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:
         return await self._service.ledger.outcome(request.sequence)

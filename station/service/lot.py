@@ -26,6 +26,10 @@ class LotKeeper:
         self._turn = asyncio.Lock()
         self.lot: str | None = None
         """The lot under way; None before the first fruit of one."""
+        self.named = ""
+        """The lot that a person has started at the panel, for fruit of which the PLC names none."""
+        self.plc_names = False
+        """Whether the PLC named a lot with its last trigger."""
         self.mismatch = ""
         """Why the last lot could not begin: PLC number, name and content of the recipe do not belong together."""
 
@@ -47,6 +51,23 @@ class LotKeeper:
         self.mismatch = ""
         self._service.active = active
         return self._book.remember(active, self.lot)
+
+    def of(self, told: str) -> str:
+        """The lot of a fruit.
+
+        Args:
+            told: as the PLC names it; may be empty.
+        """
+        self.plc_names = bool(told)
+        return told or self.named
+
+    def name(self, lot: str) -> None:
+        """A person starts or ends a lot; with the next fruit what is in force of the recipe is frozen anew.
+
+        Args:
+            lot: its name; empty for none.
+        """
+        self.named, self.lot = lot, None
 
     async def begin(self, lot: str) -> bool:
         """A fruit of a lot has come. The first of another lot freezes what is in force of the active recipe.

@@ -10,14 +10,14 @@ from station.channel.panel import Recover
 from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.cycle import UNJUDGED, Event
+from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
 from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
 from station.service.recipe_book import RecipeBook
 from station.service.service import Service
-from station.service.trail import PANEL, PLC, Trail, alarm_changed, order_of_plc
+from station.service.trail import PANEL, PLC, Trail, alarm_changed, order_told
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
@@ -63,6 +63,11 @@ class Orders:
         """Time since the PLC interface was heard; None where it never was."""
         return None if self._line_at_s is None else time.monotonic() - self._line_at_s
 
+    @property
+    def told(self) -> Line | None:
+        """What the PLC interface said last; None where it never did."""
+        return self._line
+
     def line(self, line: Line) -> None:
         """Note what the PLC interface says with its beat.
 
@@ -104,13 +109,14 @@ class Orders:
         alarms.show(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
         alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
 
-    async def carry_out(self, command: Command) -> CommandDone:
+    async def carry_out(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Carry out one command.
 
         Args:
             command: as it came.
+            by: who gives it, and in what role.
         """
-        log.info("the PLC orders %s %s", command.command, command.argument)
+        log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
         before, alarms = self._before(command.command), self._service.alarms.alarms
         async with self._turn:
             try:
@@ -121,11 +127,11 @@ class Orders:
         if why:
             log.warning("%s was not done: %s", command.command, why)
         done = CommandDone(done=not why, why=why)
-        self._trail.note(order_of_plc(command, done, before))
+        self._trail.note(order_told(command, done, before, by))
         if command.command in _ON_ALARMS:
             now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
             changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
-            self._trail.note(*(alarm_changed(PLC, PLC, change, alarm) for alarm in changed))
+            self._trail.note(*(alarm_changed(*by, change, alarm) for alarm in changed))
         return done
 
     def _before(self, command: CommandName) -> dict[str, Any]:
@@ -186,11 +192,25 @@ class Orders:
             return f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
         return ""
 
-    async def recover(self, request: Recover) -> CommandDone:
+    async def stop(self) -> str:
+        """Take no more triggers until the next reset; the fruit under way is inspected to its end.
+
+        Returns:
+            Why it does not stand as told, empty where it does.
+        """
+        service = self._service
+        service.stop_wanted = True
+        if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
+            service.conductor.post(Event.STOP, "a person stops the station at the panel")
+        await service.conductor.until(lambda state: state is State.STOPPED or state in WAITING)
+        return ""
+
+    async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
 
         Args:
             request: which stop.
+            by: who gives it, and in what role.
         """
         if STATES[self._service.state].refusal is Refusal.BUSY:
             return CommandDone(done=False, why="an inspection is under way")
@@ -200,7 +220,7 @@ class Orders:
             why = ""
         except ArmFault as fault:
             why = str(fault)
-        self._trail.command(PANEL, "recover", request.what, why)
+        self._trail.command(by[0], "recover", request.what, why, by[1])
         return CommandDone(done=not why, why=why)
 
     async def _call_off(self) -> str:
@@ -212,7 +232,8 @@ class Orders:
         await service.conductor.until(lambda state: state not in UNJUDGED)
         return ""
 
-    def _no_reset(self) -> str:
+    def no_reset(self) -> str:
+        """Why a reset would do nothing now; empty where it would."""
         if self._service.stop_asked:
             return "the station is told to end"
         if stop := self._crew.standing_stop:
@@ -222,8 +243,11 @@ class Orders:
 
     async def _reset(self) -> str:
         service, state = self._service, self._service.state
-        if (why_not := self._no_reset()) or state is State.IDLE:
+        if why_not := self.no_reset():
             return why_not
+        service.stop_wanted = False
+        if state is State.IDLE:
+            return ""
         service.reset_wanted = True
         self._crew.confirmed_clear = True
         if state is State.LATCHED:

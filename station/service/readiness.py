@@ -51,6 +51,8 @@ class Gate:
             return Refusal.NOT_READY, "The station is told to end; start it again."
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.sentence
+        if service.stop_wanted:
+            return Refusal.NOT_READY, "A person has stopped the station at the panel; start it there."
         return self._idle_refusal()
 
     def _idle_refusal(self) -> tuple[Refusal | None, str]:

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 from station.channel.line import Begin, Begun, Outcome
@@ -73,6 +73,11 @@ class Service:
         self.reset_wanted = self._settings.automatic_reset
         """Whether a stopped station makes itself ready."""
         self.stop_asked = False
+        """The process is told to end."""
+        self.stop_wanted = False
+        """A person has stopped the station, until the next reset."""
+        self.on_published: Callable[[Outcome], None] = lambda _: None
+        """Told of what the PLC was told, once."""
         self._pending: Pending | None = None
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
@@ -87,12 +92,13 @@ class Service:
 
     # What the line asks.
 
-    async def begin(self, request: Begin, refusal: Refusal | None) -> Begun:
+    async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> Begun:
         """Begin an inspection, or say why not. The same request again, before its outcome was told, begins none.
 
         Args:
             request: the trigger.
             refusal: why none may begin now.
+            lot: that the fruit belongs to.
         """
         async with self._beginning:
             if (same := self.triggers.repeated(request)) is not None:
@@ -102,7 +108,7 @@ class Service:
             trigger = Trigger(
                 request.trigger_id,
                 request.encoder,
-                request.lot,
+                lot,
                 utc_ms(),
                 self.active.snapshot,
                 self._crew.simulated,
@@ -126,6 +132,7 @@ class Service:
             fruit = "" if now is None else now.active.recipe.name
             self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
             self._outcomes.saw(outcome)
+            self.on_published(outcome)
         running = self.ledger.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
@@ -204,7 +211,7 @@ class Service:
         if state is State.IDLE:
             self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
-        if state is State.STOPPED and self.reset_wanted and not self.stop_asked:
+        if state is State.STOPPED and self.reset_wanted and not (self.stop_asked or self.stop_wanted):
             self.conductor.post(Event.RESET)
 
     def tick(self) -> None:
@@ -229,7 +236,7 @@ class Service:
     # The actions.
 
     async def _check(self) -> Event:
-        if self.stop_asked:
+        if self.stop_asked or self.stop_wanted:
             return Event.STOP
         for fault in (*self._crew.faults.values(), self.ledger.fault):
             if fault is not None:

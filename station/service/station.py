@@ -9,6 +9,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+from station.channel.server import ChannelServer
 from station.errors import StationError
 from station.inspection.states import STATES
 from station.outbox.status import outbox_folder, read_status
@@ -26,6 +27,7 @@ from station.service.line_server import LineServer
 from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
 from station.service.orders import Orders
+from station.service.panel import Panel
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.reference import Golden
@@ -34,6 +36,7 @@ from station.service.starting import ended, started
 from station.service.trail import FLUSH_S, Trail
 from station.service.upkeep import UPKEEP, Upkeep
 from station.settings.configuration import Configuration
+from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.supervision.notify import feed_watchdog, notify
 
@@ -120,6 +123,8 @@ class Station:
         trail.note(*started(self.boot, configuration, kept, versions, self._broken))
         orders = Orders(service, crew, book, lots, trail, metrics)
         gate = Gate(self.boot, service, crew, orders, book, lots, liveness, calibrated)
+        alarm_orders = AlarmOrders(alarms, trail)
+        panel = Panel(gate, service, crew, lots, book, orders, records, alarm_orders, trail)
         upkeep = Upkeep(
             service,
             crew,
@@ -130,6 +135,7 @@ class Station:
             metrics,
             liveness,
             calibrated,
+            panel.trouble,
             broken=self._broken,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,
@@ -140,9 +146,10 @@ class Station:
             orders,
             gate,
             lots,
-            AlarmOrders(alarms, trail),
+            alarm_orders,
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
+        self._serve(stack, panel)
         address = configuration.metrics
         health = HealthServer(address.host, address.port, metrics, liveness, gate.readiness, versions)
         port = await health.start()
@@ -152,10 +159,18 @@ class Station:
         tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.keep(records), "alarms' records")
         self._begin(stack, trail.keep(), "audit trail")
-        for name in (*crew.watches, CYCLE, UPKEEP):
-            liveness.watch(name, settings.progress_s)
-        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
+        self._watch_progress(stack, liveness, (*crew.watches, CYCLE, UPKEEP))
         return tuple(tasks), port
+
+    def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel) -> None:
+        stack.push_async_callback(panel.close)
+        endpoint = _made_room_for(panel_endpoint(self._configuration.hmi, self._configuration.home))
+        self._begin(stack, ChannelServer(endpoint, panel.handlers).serve(), "panel server")
+
+    def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
+        for name in names:
+            liveness.watch(name, self._configuration.service.progress_s)
+        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
 
     async def _note_end(self, trail: Trail) -> None:
         """The trail's last row of this start, as far as it can be written in time."""

@@ -43,7 +43,7 @@ class Trail:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._told.set()
 
-    def command(self, who: str, command: str, subject: str, why_not: str, **old: Any) -> None:
+    def command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
         """Note a command that was carried out, or refused.
 
         Args:
@@ -51,10 +51,11 @@ class Trail:
             command: its name.
             subject: what it is about.
             why_not: why it was not carried out; empty where it was.
+            role: in what capacity; as `who` where none is given.
             old: what was before, where that tells something.
         """
         new = {"done": not why_not} | ({"why": why_not} if why_not else {})
-        self.note(AuditEntry(who, who, f"command.{command}", subject, "", old or None, new))
+        self.note(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
 
     async def keep(self) -> None:
         """Write what is told, until cancelled."""
@@ -85,16 +86,17 @@ class Trail:
             return True
 
 
-def order_of_plc(command: Command, done: CommandDone, old: Any) -> AuditEntry:
-    """What the trail says of a command of the PLC's.
+def order_told(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
+    """What the trail says of a command of the PLC's, or the same of a person's.
 
     Args:
         command: as it came.
         done: what came of it.
         old: what was before; None where nothing tells.
+        by: who gave it, and in what role.
     """
     new = {"argument": command.argument, **done.model_dump()}
-    return AuditEntry(PLC, PLC, f"command.{command.command}", "station", "", old, new)
+    return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
 
 
 def calibration_stored(who: str, reason: str, subject: str, old: Any, new: Any) -> AuditEntry:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import time
+from collections.abc import Callable
 
 from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
 from station.errors import StationError
@@ -44,6 +45,7 @@ class Upkeep:
         metrics: shows what is ready.
         liveness: fed with this task's progress.
         calibrated: how old the sensor's calibration is.
+        pages_trouble: what is wrong with the HMI's process; empty for nothing.
         broken: what was wrong with the configuration at the start; empty for nothing.
         reserve_mb: space on the disk below which nothing is inspected.
         longest_pause_s: between two tries to bring something back.
@@ -60,6 +62,7 @@ class Upkeep:
         metrics: Metrics,
         liveness: Liveness,
         calibrated: Calibrated,
+        pages_trouble: Callable[[], str],
         *,
         broken: str,
         reserve_mb: int,
@@ -67,6 +70,7 @@ class Upkeep:
     ) -> None:
         self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
         self._metrics, self._liveness, self._trail, self._calibrated = metrics, liveness, trail, calibrated
+        self._pages_trouble = pages_trouble
         self._book_at_s = time.monotonic()
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
         self._told_ready_s = 0.0
@@ -157,6 +161,7 @@ class Upkeep:
             AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
         )
         alarms.show(AlarmId.CALIBRATION_OLD, self._calibrated.trouble())
+        alarms.show(AlarmId.HMI_LOST, self._pages_trouble())
         self._orders.show_line()
         self._show_restarts()
         self._show_clock()

@@ -7,7 +7,7 @@ from station.supervision.supervisor import Program
 
 
 def station_programs(config: Path | None, logs: Path | None = None, *, outbox: bool = False) -> list[Program]:
-    """The processes of one station: the service, and the PLC interface, which outlives it.
+    """The processes of one station: the service, the PLC interface, which outlives it, and the pages.
 
     Args:
         config: the configuration's file; None for the usual one.
@@ -17,6 +17,7 @@ def station_programs(config: Path | None, logs: Path | None = None, *, outbox: b
     programs = [
         _program("service", logs, "service", *_config(config)),
         _program("plc", logs, "plc", "run", *_config(config)),
+        _program("hmi", logs, "hmi", *_config(config)),
     ]
     return [*programs, _program("outbox", logs, "outbox", "run", *_config(config))] if outbox else programs
 

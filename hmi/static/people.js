@@ -1,0 +1,46 @@
+// The number pad, and the cleaning lock, which ends by itself.
+"use strict";
+
+(() => {
+  for (const pad of document.querySelectorAll("[data-pad]")) {
+    const form = pad.closest("form");
+    const fields = [...form.querySelectorAll(".pin")];
+    let field = fields[0];
+    fields.forEach((each) => each.addEventListener("focus", () => (field = each)));
+    pad.addEventListener("click", (event) => {
+      const button = event.target.closest("button");
+      if (!button) {
+        return;
+      }
+      if (button.dataset.digit !== undefined && field.value.length < field.maxLength) {
+        field.value += button.dataset.digit;
+      } else if (button.dataset.erase !== undefined) {
+        field.value = field.value.slice(0, -1);
+      }
+    });
+  }
+
+  const lock = document.querySelector("[data-cleaning]");
+  const left = lock.querySelector("[data-left]");
+  lock.addEventListener("cancel", (event) => event.preventDefault());
+  for (const button of document.querySelectorAll("[data-clean]")) {
+    button.addEventListener("click", () => {
+      let seconds = Number(button.dataset.clean);
+      const tick = () => {
+        left.textContent = `${seconds} s`;
+        if (seconds === 0) {
+          lock.close();
+          location.reload();
+          return;
+        }
+        seconds -= 1;
+        setTimeout(tick, 1000);
+      };
+      fetch("/people/clean", { method: "POST", headers: { "X-CSRF-Token": document.body.dataset.token } }).catch(
+        () => undefined,
+      );
+      lock.showModal();
+      tick();
+    });
+  }
+})();

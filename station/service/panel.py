@@ -1,0 +1,184 @@
+"""What the HMI's process asks of the running station, answered from memory; nothing here waits for a device."""
+
+import time
+
+from station.channel.line import Noted
+from station.channel.panel_live import (
+    AlarmChange,
+    AlarmHistory,
+    AskAlarmHistory,
+    AskFruit,
+    AskPanel,
+    AskPicture,
+    AskRecent,
+    AskRecipes,
+    DeviceShown,
+    Fruit,
+    OrderShown,
+    PanelOrder,
+    PanelState,
+    PersonNoted,
+    Picture,
+    Recent,
+    RecipeNamed,
+    Recipes,
+    RecipeShown,
+)
+from station.channel.server import Handlers
+from station.inspection.states import STATES
+from station.records.audit import AuditEntry
+from station.records.records import Records
+from station.service.alarm_orders import AlarmOrders
+from station.service.crew import Crew
+from station.service.inspection import utc_ms
+from station.service.lot import LotKeeper
+from station.service.orders import Orders
+from station.service.panel_memory import PanelMemory
+from station.service.panel_orders import PanelOrders
+from station.service.readiness import Gate
+from station.service.recipe_book import Active, RecipeBook
+from station.service.service import Service
+from station.service.trail import Trail
+from station.vocabulary import Refusal
+
+SILENT_S = 3.0
+"""A process that was killed and started again is back by then, on a machine that has nothing else to do."""
+
+
+class Panel:
+    """Answers the HMI.
+
+    Args:
+        gate: the state and why it is not ready.
+        service: the cycle.
+        crew: the devices.
+        lots: the lot under way.
+        book: the recipes in force.
+        line: what the PLC interface says.
+        records: told of lots, and asked about alarms.
+        alarms: people's hands on alarms.
+        trail: told of what people do.
+    """
+
+    def __init__(
+        self,
+        gate: Gate,
+        service: Service,
+        crew: Crew,
+        lots: LotKeeper,
+        book: RecipeBook,
+        line: Orders,
+        records: Records,
+        alarms: AlarmOrders,
+        trail: Trail,
+    ) -> None:
+        self._gate, self._service, self._crew, self._lots = gate, service, crew, lots
+        self._book, self._line, self._records, self._alarms, self._trail = book, line, records, alarms, trail
+        self._orders = PanelOrders(line, service, crew, lots, records, trail)
+        self._memory = PanelMemory()
+        self._heard_s: float | None = None
+        service.ledger.on_told, service.on_published = self._memory.ended, self._memory.stands
+        self.handlers: Handlers = {
+            AskPanel: self._state,
+            AskRecent: self._recent,
+            AskFruit: self._fruit,
+            AskPicture: self._picture,
+            AskRecipes: self._recipes,
+            AskAlarmHistory: self._alarm_history,
+            PanelOrder: self._order,
+            PersonNoted: self._person,
+            **alarms.handlers,
+        }
+        """For a channel's server."""
+
+    async def close(self) -> None:
+        """Give up the orders that are under way."""
+        await self._orders.close()
+
+    def trouble(self) -> str:
+        """What is wrong with the HMI's process; empty where nothing is, or it was never heard."""
+        age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
+        return f"the pages' process has not asked for {age_s:.0f} s" if age_s > SILENT_S else ""
+
+    async def _state(self, _request: AskPanel) -> PanelState:
+        self._heard_s = time.monotonic()
+        service, line = self._service, self._gate.state()
+        facts, active = STATES[service.state], service.active
+        told = self._line.told
+        return PanelState(
+            boot=line.boot,
+            utc_ms=utc_ms(),
+            state=service.state,
+            sentence=facts.sentence,
+            packml_state=line.packml_state,
+            mode=line.mode,
+            ready=line.ready,
+            why_not_ready=line.why_not_ready,
+            busy=facts.refusal is Refusal.BUSY,
+            needs_person=facts.needs_person,
+            stopping=service.stop_wanted,
+            simulated=line.simulated,
+            recipe=None if active is None else _named(active),
+            lot=self._lots.lot,
+            named_lot=self._lots.named,
+            plc_names_lots=self._lots.plc_names,
+            plc_connected=told is not None and told.plc_connected,
+            plc_alive=told is not None and told.plc_alive,
+            line_trouble=self._line.line_trouble(),
+            alarms=self._alarms.standing(),
+            devices=tuple(
+                DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
+                for name, watch in self._crew.watches.items()
+            ),
+            orders=self._orders.shown,
+            may=self._orders.possible,
+            recoveries=self._orders.recoveries,
+            last_sequence=self._memory.last_sequence,
+            lot_counts=self._memory.counts(self._lots.lot),
+            deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
+        )
+
+    async def _recent(self, request: AskRecent) -> Recent:
+        return Recent(fruit=self._memory.recent(request.most))
+
+    async def _fruit(self, request: AskFruit) -> Fruit:
+        return self._memory.fruit(request.sequence)
+
+    async def _picture(self, request: AskPicture) -> Picture:
+        return await self._memory.picture(request.sequence)
+
+    async def _recipes(self, _request: AskRecipes) -> Recipes:
+        found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
+        active = self._service.active
+        return Recipes(
+            recipes=tuple(_shown(each) for each in found),
+            active=None if active is None else _shown(active),
+            problems=self._book.problems,
+        )
+
+    async def _alarm_history(self, request: AskAlarmHistory) -> AlarmHistory:
+        rows = await self._records.alarm_log(request.most)
+        return AlarmHistory(
+            changes=tuple(
+                AlarmChange(utc_ms=row.utc_ms, id=row.id, change=row.change, detail=row.detail) for row in rows
+            )
+        )
+
+    async def _order(self, request: PanelOrder) -> OrderShown:
+        return await self._orders.order(request)
+
+    async def _person(self, request: PersonNoted) -> Noted:
+        entry = AuditEntry(request.person.who, request.person.role, f"panel.{request.what}", request.subject)
+        self._trail.note(entry)
+        return Noted()
+
+
+def _named(active: Active) -> RecipeNamed:
+    recipe = active.recipe
+    return RecipeNamed(
+        number=recipe.plc_number, name=recipe.name, title=recipe.title, revision=active.snapshot.revision
+    )
+
+
+def _shown(active: Active) -> RecipeShown:
+    return RecipeShown(**_named(active).model_dump(), values=active.snapshot.text)

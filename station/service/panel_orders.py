@@ -1,0 +1,185 @@
+"""What people order at the panel: begun at once, followed to its end, and told to all panels and to the audit trail."""
+
+import asyncio
+import contextlib
+import itertools
+from collections import deque
+
+from station.channel.line import Command, CommandName
+from station.channel.panel import Recover, RecoveryName
+from station.channel.panel_live import LONGEST_LOT, OrderName, OrderShown, PanelOrder
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.errors import StationError
+from station.inspection.cycle import UNJUDGED, WAITING
+from station.inspection.states import State
+from station.records.errors import RecordsError
+from station.records.lots import end_lot, start_lot
+from station.records.records import Records
+from station.service.crew import ARM, Crew
+from station.service.inspection import utc_ms
+from station.service.lot import LotKeeper
+from station.service.orders import Orders
+from station.service.service import Service
+from station.service.trail import Trail
+
+AT_ONCE_S = 0.4
+"""So long an order's answer waits for the order's end."""
+_REMEMBERED = 8
+_RECOVERIES: dict[ArmCause, RecoveryName] = {
+    ArmCause.PROTECTIVE_STOP: "protective-stop",
+    ArmCause.EMERGENCY_STOP: "power",
+    ArmCause.SAFETY_FAULT: "power",
+    ArmCause.NOT_POWERED: "power",
+    ArmCause.SAFEGUARD_STOP: "program",
+    ArmCause.LOCAL_CONTROL: "program",
+    ArmCause.PROGRAM_STOPPED: "program",
+    ArmCause.REGISTERS_IN_USE: "program",
+}
+_COMMANDS = {
+    OrderName.CHOOSE_RECIPE: CommandName.CHANGE_RECIPE,
+    OrderName.START: CommandName.RESET,
+    OrderName.CALL_OFF: CommandName.CALL_OFF,
+    OrderName.SET_MODE: CommandName.SET_MODE,
+}
+"""What the PLC may order too goes the PLC's way."""
+
+
+class PanelOrders:
+    """Carries people's orders out.
+
+    Args:
+        orders: the PLC's, whose way they go where there is one.
+        service: the cycle.
+        crew: the devices.
+        lots: the lot under way.
+        records: told of lots with a grower.
+        trail: told of what the PLC's way does not tell.
+    """
+
+    def __init__(
+        self, orders: Orders, service: Service, crew: Crew, lots: LotKeeper, records: Records, trail: Trail
+    ) -> None:
+        self._orders, self._service, self._crew, self._lots = orders, service, crew, lots
+        self._records, self._trail = records, trail
+        self._tickets = itertools.count(1)
+        self._shown: deque[OrderShown] = deque(maxlen=_REMEMBERED)
+        self._tasks: dict[int, asyncio.Task[None]] = {}
+
+    async def close(self) -> None:
+        """Give up what is under way."""
+        for task in self._tasks.values():
+            task.cancel()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+
+    @property
+    def shown(self) -> tuple[OrderShown, ...]:
+        """The last orders, newest first."""
+        return tuple(reversed(self._shown))
+
+    @property
+    def recoveries(self) -> tuple[RecoveryName, ...]:
+        """What stands to be recovered from by a person who has looked at the cell."""
+        fault = self._crew.watches[ARM].fault if ARM in self._crew.watches else None
+        found = _RECOVERIES.get(fault.cause) if isinstance(fault, ArmFault) else None
+        return () if found is None else (found,)
+
+    @property
+    def possible(self) -> tuple[OrderName, ...]:
+        """What would be begun now."""
+        service, state = self._service, self._service.state
+        conditions = {
+            OrderName.CHOOSE_RECIPE: not self._orders.recipe_changing,
+            OrderName.START: not self._orders.no_reset() and (state in WAITING or service.stop_wanted),
+            OrderName.STOP: not service.stop_wanted and not service.stop_asked and state is not State.LATCHED,
+            OrderName.CALL_OFF: state in UNJUDGED,
+            OrderName.RECOVER: bool(self.recoveries),
+            OrderName.SET_MODE: True,
+            OrderName.START_LOT: not self._lots.plc_names,
+            OrderName.END_LOT: not self._lots.plc_names and bool(self._lots.named),
+        }
+        return tuple(order for order, possible in conditions.items() if possible)
+
+    async def order(self, request: PanelOrder) -> OrderShown:
+        """Begin an order, and wait a moment for its end.
+
+        Args:
+            request: as it came.
+        """
+        same = next((each for each in self.shown if _under_way(each, request)), None)
+        shown = same or OrderShown(
+            ticket=next(self._tickets),
+            order=request.order,
+            argument=request.argument,
+            state="executing",
+            why="",
+            who=request.person.who,
+            began_utc_ms=utc_ms(),
+            ended_utc_ms=None,
+        )
+        if same is None:
+            self._shown.append(shown)
+            task = asyncio.create_task(self._follow(shown, request), name=f"order {request.order}")
+            self._tasks[shown.ticket] = task
+            task.add_done_callback(lambda _: self._tasks.pop(shown.ticket, None))
+        if (running := self._tasks.get(shown.ticket)) is not None:
+            await asyncio.wait({running}, timeout=AT_ONCE_S)
+        return next((each for each in self._shown if each.ticket == shown.ticket), shown)
+
+    async def _follow(self, shown: OrderShown, request: PanelOrder) -> None:
+        try:
+            why = await self._carry_out(request)
+        except StationError as error:
+            why = str(error)
+        ended = shown.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
+        self._shown = deque((ended if each.ticket == shown.ticket else each for each in self._shown), _REMEMBERED)
+
+    async def _carry_out(self, request: PanelOrder) -> str:
+        by, order, argument = (request.person.who, request.person.role), request.order, request.argument
+        if order in _COMMANDS:
+            if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
+                return f"{order}: {argument!r} is no number"
+            command = Command(command=_COMMANDS[order], argument=int(argument or 0))
+            return (await self._orders.carry_out(command, by)).why
+        match order:
+            case OrderName.RECOVER:
+                return await self._recover(argument, by)
+            case OrderName.STOP:
+                why = await self._orders.stop()
+            case OrderName.START_LOT:
+                why = await self._start_lot(argument, request.grower)
+            case _:
+                why = await self._end_lot()
+        self._trail.command(by[0], order, argument, why, by[1])
+        return why
+
+    async def _recover(self, what: str, by: tuple[str, str]) -> str:
+        for standing in self.recoveries:
+            if standing == what:
+                return (await self._orders.recover(Recover(what=standing), by)).why
+        return "there is nothing to recover from any more"
+
+    async def _start_lot(self, name: str, grower: str) -> str:
+        if self._lots.plc_names:
+            return "the line's PLC names the lots"
+        if not name.strip() or len(name) > LONGEST_LOT or not (name.isascii() and name.isprintable()):
+            return f"{name!r} is no lot's name: 1 to {LONGEST_LOT} letters, digits and signs"
+        if grower:
+            try:
+                await self._records.change(lambda connection: start_lot(connection, name, grower))
+            except RecordsError as error:
+                return str(error)
+        self._lots.name(name)
+        return ""
+
+    async def _end_lot(self) -> str:
+        name = self._lots.named
+        if not name:
+            return "no lot was started at the panel"
+        with contextlib.suppress(RecordsError):  # of a lot without a grower the records were never told
+            await self._records.change(lambda connection: end_lot(connection, name))
+        self._lots.name("")
+        return ""
+
+
+def _under_way(shown: OrderShown, request: PanelOrder) -> bool:
+    return shown.state == "executing" and (shown.order, shown.argument) == (request.order, request.argument)
