@@ -5,10 +5,12 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 WIDE, HIGH = 720.0, 330.0
-LEFT, RIGHT, TOP, BOTTOM = 62.0, 18.0, 14.0, 46.0
+LEFT, RIGHT, TOP, BOTTOM = 62.0, 18.0, 30.0, 46.0
 STRIP_WIDE, STRIP_HIGH = 720.0, 96.0
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _TICKS = 6
+_ROOM = 1.04
+"""Beyond the largest value, so that its sign is not at the edge."""
 
 
 class Curve(NamedTuple):
@@ -85,8 +87,8 @@ def area_chart(curves: Sequence[Curve], limits: Sequence[Limit], early_stop_mm2:
     """
     xs = [x for curve in curves for x, _ in curve.points] + [limit.closing_mm for limit in limits]
     ys = [y for curve in curves for _, y in curve.points] + [limit.area_mm2 for limit in limits]
-    x_ticks, x_most = _ticks(max(xs, default=1.0))
-    y_ticks, y_most = _ticks(max([*ys, early_stop_mm2 or 0.0], default=1.0))
+    x_ticks, x_most = _ticks(_ROOM * max(xs, default=1.0))
+    y_ticks, y_most = _ticks(_ROOM * max([*ys, early_stop_mm2 or 0.0], default=1.0))
 
     def x_of(value: float) -> float:
         return round(LEFT + (WIDE - LEFT - RIGHT) * min(max(value, 0.0), x_most) / x_most, 1)
@@ -127,7 +129,7 @@ def strip(values: Iterable[tuple[str, float]], limits: Sequence[tuple[str, float
     known = list(values)
     every = [value for _, value in (*known, *limits)]
     least = 0.0 if from_zero else min(every, default=0.0)
-    ticks, most = _ticks(max([*every, least + 1e-6], default=1.0), least)
+    ticks, most = _ticks(_ROOM * max([*every, least + 1e-6], default=1.0), least)
     least = ticks[0].value
 
     def x_of(value: float) -> float:
@@ -178,7 +180,7 @@ def _ticks(most: float, least: float = 0.0) -> tuple[list[Tick], float]:
     span = max(most - least, 1e-6)
     power = 10.0 ** math.floor(math.log10(span / _TICKS))
     step = next(step * power for step in _STEPS if step * power * _TICKS >= span * 0.999)
-    digits = max(0, -math.floor(math.log10(step) + 1e-9)) + (1 if f"{step:e}".startswith("2.5") else 0)
+    digits = max(0, (1 if f"{step:e}".startswith("2.5") else 0) - math.floor(math.log10(step) + 1e-9))
     first, last = math.floor(least / step + 1e-9), math.ceil(most / step - 1e-9)
     values = [number * step for number in range(first, max(last, first + 1) + 1)]
     return [Tick(0.0, value, digits) for value in values], values[-1]

@@ -11,7 +11,11 @@ from hmi.live import Part
 PAGES = (
     "hmi.pages.frame",
     "hmi.pages.run",
+    "hmi.pages.recipes",
+    "hmi.pages.history",
+    "hmi.pages.maintenance",
     "hmi.pages.people",
+    "hmi.pages.jobs",
 )
 """Modules with `router`; where they have them, `ENTRY`, their place in the navigation, and `PARTS`."""
 

@@ -11,13 +11,15 @@ from starlette.responses import Response
 from hmi.access import HmiNow, WordingNow, orders
 from hmi.chart import histogram
 from hmi.context import Hmi
+from hmi.gateway import person
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.words import Wording
-from station.channel.messages import ChannelError
+from station.channel.messages import ChannelError, RefusedError
+from station.channel.panel_live import OrderName, OrderShown, PanelOrder
 from station.channel.panel_maintenance_queries import (
     BallRunTold,
     BeginBallRun,
@@ -69,6 +71,16 @@ async def health_part(hmi: HmiNow, wording: WordingNow) -> Response:
 async def hand(request: Request, hmi: HmiNow) -> Response:
     """Moving the fingers and setting the light by hand."""
     return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done="")
+
+
+@router.post("/mode")
+async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
+    """Set manual mode, in which no fruit is taken, or production again."""
+    asked = PanelOrder(person=person(caller.name, caller.role), order=OrderName.SET_MODE, argument=mode)
+    shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
+    if shown.state == "failed":
+        raise RefusedError(shown.why)
+    return go_to("/maintenance/hand")
 
 
 @router.post("/jog")
