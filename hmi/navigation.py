@@ -16,6 +16,7 @@ PAGES = (
     "hmi.pages.maintenance",
     "hmi.pages.people",
     "hmi.pages.jobs",
+    "hmi.api",
 )
 """Modules with `router`; where they have them, `ENTRY`, their place in the navigation, and `PARTS`."""
 
