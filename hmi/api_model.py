@@ -10,7 +10,7 @@ from station.vocabulary import OutcomeName
 
 LotName = Annotated[str, Field(min_length=1, max_length=32, pattern=r"^[ -~]*[!-~][ -~]*$")]
 """Printable ASCII, as in the PLC's registers."""
-Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f\ud800-\udfff]*$")]
+Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 
 
 class Model(BaseModel):

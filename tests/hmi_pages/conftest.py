@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import http.client
 import itertools
 import json
 import os
@@ -10,6 +11,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
@@ -17,9 +19,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+import psutil
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
+from hmi.api_tokens import ApiTokens
 from hmi.people_file import PeopleFile
 from hmi.roles import Role
 from station.channel.client import ChannelClient
@@ -168,6 +172,28 @@ def begun(command: list[str], said: Callable[[str], bool], log: Path) -> subproc
     raise AssertionError(f"{command} ended: {log.read_text()}")
 
 
+@pytest.fixture(autouse=True)
+def nothing_left_behind() -> None:
+    """A browser begins threads and processes of its own when it likes: what is left is looked for after the module."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_left_by_the_module() -> Iterator[None]:
+    """Fail the last test of a module that leaves a thread or a process."""
+
+    def living() -> tuple[set[int], set[threading.Thread]]:
+        children = psutil.Process().children(recursive=True)
+        running = {child.pid for child in children if child.is_running() and child.status() != psutil.STATUS_ZOMBIE}
+        return running, {thread for thread in threading.enumerate() if thread.is_alive()}
+
+    processes, threads = living()
+    yield
+    deadline_s = time.monotonic() + PATIENCE_S
+    while (left := (living()[0] - processes, living()[1] - threads)) != (set(), set()):
+        assert time.monotonic() < deadline_s, f"left behind: {left}"
+        time.sleep(0.05)
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     folder = tmp_path_factory.mktemp("site")
@@ -208,7 +234,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
                 command = [sys.executable, "-m", "station", *name, *arguments]
                 processes.append(subprocess.Popen(command, stdout=log, stderr=log, text=True))
         made = Site(load_configuration(file, {}), consoles[0], f"http://127.0.0.1:{port}")
-        eventually(lambda: _answers(made.address))
+        eventually(lambda: _answers(made.address) or _ended(processes, folder / "others.log"))
         made.twin(do="remove")
         eventually(lambda: made.order(CommandName.RESET).done)
         assert made.order(CommandName.CHANGE_RECIPE, 1).done
@@ -218,6 +244,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
             process.send_signal(signal.SIGTERM)
         for process in reversed(processes):
             process.communicate(timeout=40)
+
+
+def _ended(processes: list[subprocess.Popen[str]], log: Path) -> bool:
+    assert all(process.poll() is None for process in processes), log.read_text()
+    return False
 
 
 def _answers(address: str) -> bool:
@@ -246,6 +277,55 @@ def browser() -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
         yield browser
         browser.close()
+
+
+@dataclass
+class Answer:
+    """Of the HTTP API."""
+
+    status: int
+    body: Any
+    headers: dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def api(site: Site) -> Callable[..., Answer]:
+    """Sends one request to the pages' server, as a program does."""
+
+    def send(
+        method: str,
+        path: str,
+        body: bytes | None = None,
+        *,
+        token: str = "",
+        json_body: Any = None,
+        **headers: str,
+    ) -> Answer:
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        if token:
+            named["authorization"] = f"Bearer {token}"
+        if json_body is not None:
+            body = json.dumps(json_body).encode()
+            named["content-type"] = "application/json"
+        host, _, port = site.address.removeprefix("http://").partition(":")
+        connection = http.client.HTTPConnection(host, int(port), timeout=PATIENCE_S)
+        try:
+            connection.request(method, path, body, named)
+            answer = connection.getresponse()
+            raw = answer.read()
+        finally:
+            connection.close()
+        found = {name.lower(): value for name, value in answer.getheaders()}
+        is_json = found.get("content-type", "").startswith("application/json")
+        return Answer(answer.status, json.loads(raw) if is_json else raw.decode("utf-8", "replace"), found)
+
+    return send
+
+
+@pytest.fixture(scope="module")
+def token_of(site: Site) -> Callable[[str, Role], str]:
+    """Makes a token as `station api-token add` does."""
+    return ApiTokens(site.home / "hmi").add
 
 
 @dataclass
