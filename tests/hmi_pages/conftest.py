@@ -15,13 +15,14 @@ import threading
 import time
 import urllib.request
 from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 import psutil
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from hmi.api_tokens import ApiTokens
 from hmi.people_file import PeopleFile
@@ -48,7 +49,7 @@ from station.settings.recipe import recipe_files
 from station.settings.recipe_text import with_values
 from station.twin.console import ask
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 PEOPLE = {"Ada": Role.ADMIN, "Quin": Role.QUALITY, "Rosa": Role.QUALITY, "Max": Role.MAINTENANCE}
 PIN = "735192"
@@ -119,7 +120,8 @@ class Site:
             async with ChannelClient(where, "the station") as client:
                 return await work(client)
 
-        return asyncio.run(run())
+        with ThreadPoolExecutor(1) as thread:  # the browser's own event loop runs in this one
+            return thread.submit(asyncio.run, run()).result()
 
     def over_the_panel(self, work: Callable[[ChannelClient], Awaitable[T]]) -> T:
         return self.asked(work, panel_endpoint(self.configuration.hmi, self.home))
@@ -273,6 +275,7 @@ def browser() -> Iterator[Browser]:
         if os.environ.get("CI") == "true":
             pytest.fail("chromium is missing, and CI=true says that nothing may be", pytrace=False)
         pytest.skip("chromium is missing on this machine")
+    expect.set_options(timeout=1000 * PATIENCE_S)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
         yield browser
@@ -359,7 +362,7 @@ def panel(site: Site, browser: Browser) -> Iterator[Callable[..., Person]]:
 
     def come(name: str = "", width: int = 1280, height: int = 800, locale: str = "en") -> Person:
         context = browser.new_context(viewport={"width": width, "height": height}, locale=locale)
-        context.set_default_timeout(PATIENCE_S * 500)
+        context.set_default_timeout(1000 * PATIENCE_S)
         contexts.append(context)
         page = context.new_page()
         page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -75,7 +75,7 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     page.locator("[name=reason]").fill("softer fruit were let through")
     page.get_by_role("button", name="Save as a draft").click()
     expect(page.get_by_text("waits for approval")).to_be_visible()
-    expect(page.get_by_text("damage.area[0].area_mm2")).to_be_visible()
+    expect(page.get_by_role("cell", name="damage.area[0].area_mm2")).to_be_visible()
     assert page.get_by_role("button", name="Approve").count() == 0, "its author cannot approve it"
     assert comments == [line for line in file.read_text().splitlines() if line.lstrip().startswith("#")]
 
@@ -175,7 +175,7 @@ def test_a_draft_is_tried_on_what_was_inspected(orchard: Any, panel: Any) -> Non
 def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(orchard: Any, panel: Any) -> None:
     person = panel("Max")
     page = person.go("/maintenance/hand")
-    expect(page.get_by_text("set manual mode")).to_be_visible()
+    expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
     page.get_by_label("Width, mm").fill("40")
     page.get_by_role("button", name="Go there").click()
     expect(page.get_by_text("The station is in mode 1")).to_be_visible()
@@ -211,7 +211,7 @@ def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, pan
 
 def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, panel: Any) -> None:
     person = panel("Max")
-    expect(person.go("/maintenance/sensor").get_by_text("set manual mode")).to_be_visible()
+    expect(person.go("/maintenance/sensor").get_by_text("set manual mode, 3, first")).to_be_visible()
     with orchard.manual_mode():
         page = person.go("/maintenance/sensor")
         expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
