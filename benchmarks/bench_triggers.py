@@ -41,6 +41,7 @@ DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "triggers.md"
 CONFIGURATION = f"""
 modbus: {{port: 5920}}
 metrics: {{port: 9808}}
+hmi: {{port: 8808}}
 arm: {{host: {HOST}}}
 gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}, answer_timeout_s: 1.0}}
 camera: {{oldest_s: 1.0, twin: {{port: 5930}}}}

@@ -103,7 +103,7 @@ class Gateway:
             with contextlib.suppress(ChannelError):
                 state = await self.ask(AskPanel(), PanelState, deadline_s=_LOOK_DEADLINE_S)
                 if state.last_sequence is not None and self._is_news(state):
-                    recent = await self.ask(AskRecent(), Recent)
+                    recent = await self.ask(AskRecent(most=200), Recent)
                     self.last = await self.ask(AskFruit(sequence=state.last_sequence), Fruit)
                     self.recent = recent
                 self.state, self.heard_s = state, time.monotonic()

@@ -1,5 +1,6 @@
 """What every request has to pass before any page sees it, and the headers that every answer carries."""
 
+import contextlib
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -46,28 +47,40 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        begun = False
 
         async def told(message: Message) -> None:
-            nonlocal begun
             if message["type"] == "http.response.start":
-                begun = True
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
                     headers.setdefault(name, value)
                 headers.setdefault("cache-control", "no-store")
             await send(message)
 
-        headers = Headers(scope=scope)
-        if refused := self._refusal(headers, scope["method"]):
+        if refused := self._refusal(Headers(scope=scope), scope["method"]):
             await refused(scope, receive, told)
-            return
-        try:
-            await self._app(scope, _limited(receive), told)
-        except TooLargeError:
-            if begun:
-                raise
-            await _too_large()(scope, receive, told)
+        else:
+            await self._within_size(scope, receive, told)
+
+    async def _within_size(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request that may be larger than it says."""
+        taken = 0
+
+        async def take() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > LARGEST_BODY_BYTES:
+                raise TooLargeError
+            return message
+
+        async def tell(message: Message) -> None:
+            if taken <= LARGEST_BODY_BYTES:  # else whatever the framework made of it is not what was wrong
+                await send(message)
+
+        with contextlib.suppress(TooLargeError):
+            await self._app(scope, take, tell)
+        if taken > LARGEST_BODY_BYTES:
+            await _too_large()(scope, receive, send)
 
     def _refusal(self, headers: Headers, method: str) -> PlainTextResponse | None:
         host = headers.get("host", "")
@@ -90,20 +103,6 @@ def _name_of(host: str) -> str:
     """A Host header's name without its port."""
     name = host[: host.rindex("]") + 1].strip("[]") if "]" in host else host.partition(":")[0]
     return name.lower()
-
-
-def _limited(receive: Receive) -> Receive:
-    taken = 0
-
-    async def take() -> Message:
-        nonlocal taken
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > LARGEST_BODY_BYTES:
-            raise TooLargeError
-        return message
-
-    return take
 
 
 def _too_large() -> PlainTextResponse:

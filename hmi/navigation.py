@@ -11,8 +11,10 @@ from hmi.live import Part
 PAGES = (
     "hmi.pages.frame",
     "hmi.pages.run",
+    "hmi.pages.change",
     "hmi.pages.recipes",
     "hmi.pages.history",
+    "hmi.pages.alarms",
     "hmi.pages.maintenance",
     "hmi.pages.people",
     "hmi.pages.jobs",

@@ -38,6 +38,7 @@ _DISK_MB = 24
 _MARKS = {
     "service": "-m station service",
     "plc": "-m station plc run",
+    "hmi": "-m station hmi",
     "arm": "-m station.devices.arm.process",
 }
 _DEFORMED_MM = 0.5
@@ -265,7 +266,7 @@ async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterat
         CannotDoError: the fault's disk or clock cannot be had.
         StationError: a process does not start.
     """
-    modbus, metrics, camera, console = _free_ports(4)
+    modbus, metrics, hmi, camera, console = _free_ports(5)
     host = f"127.79.{os.getpid() % 250 + 1}.{number % 250 + 1}"
     file = folder / "station.yaml"
     values = {
@@ -273,6 +274,7 @@ async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterat
         "recipes_folder": str(_quick_recipes(folder / "recipes")),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
+        "hmi": {"port": hmi},
         "arm": {
             "host": host,
             "stale_after_s": 1.0,

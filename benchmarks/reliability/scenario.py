@@ -42,7 +42,7 @@ class ProcessFault(_Checked):
     """A signal to one of the station's processes; the supervisor starts again what ends."""
 
     kind: Literal["process"] = "process"
-    process: Literal["service", "plc", "arm"]
+    process: Literal["service", "plc", "hmi", "arm"]
     """`arm` is the process that the service talks to the arm's controller through."""
     signal: Literal["SIGKILL", "SIGSTOP", "SIGTERM"]
 

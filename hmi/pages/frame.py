@@ -26,7 +26,7 @@ def _alarms(gateway: Gateway) -> Hashable:
 def _alarm_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
     state = gateway.state
     shown = [] if state is None else [each for each in state.alarms if each.shelved_until_utc_ms is None]
-    return {"alarms": shown, "heard": state is not None}
+    return {"alarms": sorted(shown, key=lambda each: not each.active), "heard": state is not None}
 
 
 def _state(gateway: Gateway) -> Hashable:

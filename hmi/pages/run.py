@@ -1,16 +1,155 @@
 """The page Run: what the station does, what to do next, and the last fruit."""
 
-from fastapi import APIRouter, Request
+import base64
+from collections import Counter
+from collections.abc import Hashable, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Path, Request
 from starlette.responses import Response
 
+from hmi import charts
+from hmi.access import HmiNow, WordingNow, orders
+from hmi.gateway import Gateway, person
+from hmi.live import Part
 from hmi.navigation import Entry
-from hmi.page import show
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from hmi.roles import Right
+from hmi.sessions import Caller
+from hmi.words import Wording
+from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
+SHOWN = 20
+ORDER_DEADLINE_S = 5.0
+_MOST_REASONS = 3
+_ORDERS = frozenset(
+    {OrderName.START, OrderName.STOP, OrderName.CALL_OFF, OrderName.RECOVER, OrderName.START_LOT, OrderName.END_LOT}
+)
+_KEPT_FOR_EVER = "private, max-age=31536000, immutable"
+Sequence = Annotated[int, Path(ge=1, lt=2**32)]
+
+
+def _doing(gateway: Gateway) -> Hashable:
+    state = gateway.state
+    return None if state is None else state.model_copy(update={"utc_ms": 0, "devices": ()})
+
+
+def _doing_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    state = gateway.state
+    order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
+    return {"state": state, "order": order, "OrderName": OrderName}
+
+
+def _fruit(gateway: Gateway) -> Hashable:
+    return gateway.last
+
+
+def _fruit_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
+    return fruit_values(gateway.last, wording)
+
+
+def _figures(gateway: Gateway) -> Hashable:
+    state = gateway.state
+    if state is None:
+        return None
+    return gateway.last, state.recipe, state.lot, state.named_lot, state.lot_counts, state.plc_names_lots
+
+
+def _figures_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
+    fruit = gateway.recent.fruit
+    reasons = Counter(reason for each in fruit for reason in each.reasons[:1])
+    times_s = [each.duration_ms / 1000 for each in fruit[:SHOWN]]
+    return {
+        "state": gateway.state,
+        "last": gateway.last,
+        "looked_at": len(fruit),
+        "rejected": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
+        "reasons": reasons.most_common(_MOST_REASONS),
+        "trend": charts.trend(fruit, wording),
+        "bar": charts.bar,
+        "longest_s": max(times_s, default=None),
+    }
+
+
+def _recent(gateway: Gateway) -> Hashable:
+    return gateway.recent
+
+
+def _recent_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    return {"fruit": gateway.recent.fruit[:SHOWN], "sketch": charts.sketch}
+
+
+PARTS = {
+    "run.doing": Part("run_doing.html.j2", _doing, _doing_values),
+    "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
+    "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
+    "run.recent": Part("run_recent.html.j2", _recent, _recent_values),
+}
+
+
+def fruit_values(fruit: Fruit | None, wording: Wording) -> Mapping[str, Any]:
+    """What `run_fruit.html.j2` needs to show a fruit.
+
+    Args:
+        fruit: None for none.
+        wording: the language.
+    """
+    return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, wording)}
 
 
 @router.get("/")
 async def run(request: Request) -> Response:
     """The page."""
     return show(request, "run.html.j2")
+
+
+@router.get("/fruit/{sequence}")
+async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Sequence) -> Response:
+    """One of the last fruit."""
+    found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+    return show(request, "fruit.html.j2", **fruit_values(found, wording))
+
+
+@router.get("/fruit/{sequence}/picture.svg")
+async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
+    """A fruit's picture with the contact's outline, as one file: it never changes, so a browser takes it once."""
+    found = await hmi.gateway.ask(AskPicture(sequence=sequence), Picture)
+    base64.b64decode(found.jpeg, validate=True)
+    corners = " ".join(f"{x},{y}" for x, y in found.outline)
+    size = f'width="{found.width_px}" height="{found.height_px}"'
+    # A light line upon a dark one is seen on any picture.
+    outline = "".join(
+        f'<polygon points="{corners}" fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-linejoin="round"/>'
+        for colour, width_px in (("#000", 7), ("#fff", 3))
+        if corners
+    )
+    drawn = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {found.width_px} {found.height_px}" {size}>'
+        f'<image {size} href="data:image/jpeg;base64,{found.jpeg}"/>{outline}</svg>'
+    )
+    return Response(drawn, media_type="image/svg+xml", headers={"cache-control": _KEPT_FOR_EVER})
+
+
+@router.post("/order")
+async def order(
+    hmi: HmiNow,
+    caller: Annotated[Caller, Depends(orders(Right.RUN))],
+    order: Annotated[OrderName, Form()],
+    argument: Annotated[str, Form(max_length=64)] = "",
+    grower: Annotated[str, Form(max_length=64)] = "",
+) -> Response:
+    """Start, stop, call off, recover, or begin and end a lot; the page shows what comes of it."""
+    if order not in _ORDERS:
+        raise Problem(400, "problem.bad_form")
+    request = PanelOrder(person=person(caller.name, caller.role), order=order, argument=argument, grower=grower)
+    await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
+    return go_to("/")
+
+
+@router.get("/lot")
+async def lot(request: Request) -> Response:
+    """Where a lot is started and ended, if the PLC names none."""
+    return show(request, "lot.html.j2")

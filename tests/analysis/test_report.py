@@ -1,11 +1,9 @@
 """The report, read by a real browser from the disk with no network."""
 
 import pytest
-from selenium import webdriver
-from selenium.webdriver.common.by import By
+from playwright.sync_api import sync_playwright
 
 ARGUMENTS = (
-    "--headless",
     "--no-sandbox",
     "--disable-gpu",
     "--disable-quic",
@@ -18,38 +16,38 @@ ARGUMENTS = (
 
 
 @pytest.fixture
-def browser(chromium, tmp_path):
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    for argument in (*ARGUMENTS, f"--user-data-dir={tmp_path / 'profile'}"):
-        options.add_argument(argument)
-    driver = webdriver.Chrome(options, webdriver.ChromeService("/usr/bin/chromedriver"))
-    yield driver
-    driver.quit()
+def page(chromium):
+    """A page of a headless browser, which ends with the test."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=list(ARGUMENTS))
+        yield browser.new_page()
+        browser.close()
 
 
-def test_the_report_shows_every_picture_and_the_curve_without_a_network(press, analyze, browser, tmp_path):
+def test_the_report_shows_every_picture_and_the_curve_without_a_network(press, analyze, page, tmp_path):
     out = tmp_path / "out"
     done = analyze(
         "--reference", press.reference, "--method", "paper", "--stages", "--widths", press.widths, "--out", out,
         press.folder,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    browser.get((out / "report.html").as_uri())
-    pictures = browser.find_elements(By.CSS_SELECTOR, "img")
-    assert len(pictures) == 7
-    assert all(picture.get_property("naturalWidth") > 0 for picture in pictures)
-    assert browser.find_element(By.CSS_SELECTOR, ".curve svg").size["height"] > 100
-    sources = browser.execute_script("return performance.getEntriesByType('resource').map(entry => entry.name)")
+    page.goto((out / "report.html").as_uri())
+    widths = page.eval_on_selector_all("img", "pictures => pictures.map(picture => picture.naturalWidth)")
+    assert len(widths) == 7
+    assert all(width > 0 for width in widths)
+    box = page.locator(".curve svg").first.bounding_box()
+    assert box is not None
+    assert box["height"] > 100
+    sources = page.evaluate("performance.getEntriesByType('resource').map(entry => entry.name)")
     assert not [source for source in sources if source.startswith("http")]
 
 
-def test_names_from_outside_are_shown_as_text(press, analyze, browser, tmp_path):
+def test_names_from_outside_are_shown_as_text(press, analyze, page, tmp_path):
     name = "<img src=x onerror=document.title='owned'>.png"
     (press.folder / "frame_9.png").rename(press.folder / name)
     out = tmp_path / "out"
     done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder / name)
     assert done.returncode == 0, done.stderr
-    browser.get((out / "report.html").as_uri())
-    assert browser.find_element(By.CSS_SELECTOR, ".tile b").text == name
-    assert browser.title == "Contact areas of 1 images"
+    page.goto((out / "report.html").as_uri())
+    assert page.inner_text(".tile b") == name
+    assert page.title() == "Contact areas of 1 images"

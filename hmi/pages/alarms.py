@@ -1,0 +1,139 @@
+"""The page Alarms: what stands, what to do about it, who has seen it, what is hidden and what was."""
+
+from collections.abc import Hashable, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Path, Request
+from starlette.responses import Response
+
+from hmi.access import HmiNow, orders
+from hmi.gateway import Gateway
+from hmi.live import Part
+from hmi.navigation import Entry
+from hmi.page import go_to, show
+from hmi.roles import Right
+from hmi.sessions import Caller
+from hmi.words import Wording
+from station.channel.line import CommandDone
+from station.channel.messages import Message, RefusedError
+from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
+from station.channel.panel_live import AlarmHistory, AskAlarmHistory
+
+router = APIRouter()
+ENTRY = Entry("alarms", "/alarms")
+ACKNOWLEDGEABLE = frozenset({"unacknowledged", "returned", "latched_unacknowledged"})
+SHELVES_S = (600, 3600, 4 * 3600, 8 * 3600)
+REASONS = ("being_mended", "known", "nuisance")
+_LAST = 100
+Operator = Annotated[Caller, Depends(orders(Right.HANDLE_ALARMS))]
+AlarmName = Annotated[str, Path(pattern=r"^[a-z_]{1,40}$")]
+
+
+def _alarms(gateway: Gateway) -> Hashable:
+    return None if gateway.state is None else gateway.state.alarms
+
+
+def _alarms_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    alarms = () if gateway.state is None else gateway.state.alarms
+    return {
+        "heard": gateway.state is not None,
+        "shown": [each for each in alarms if each.shelved_until_utc_ms is None],
+        "shelved": [each for each in alarms if each.shelved_until_utc_ms is not None],
+        "acknowledgeable": ACKNOWLEDGEABLE,
+    }
+
+
+PARTS = {"alarms.standing": Part("alarms_standing.html.j2", _alarms, _alarms_values)}
+
+
+@router.get("/alarms")
+async def alarms(request: Request) -> Response:
+    """What stands and what is shelved."""
+    return show(request, "alarms.html.j2")
+
+
+@router.get("/alarms/history")
+async def history(request: Request, hmi: HmiNow) -> Response:
+    """What alarms did lately."""
+    found = await hmi.gateway.ask(AskAlarmHistory(most=_LAST), AlarmHistory)
+    return show(request, "alarms_history.html.j2", changes=found.changes)
+
+
+@router.get("/alarms/{alarm}")
+async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
+    """One alarm: what it is, what it does, what to do."""
+    found = (
+        next((each for each in hmi.gateway.state.alarms if each.alarm == alarm), None) if hmi.gateway.state else None
+    )
+    if found is None:
+        return go_to("/alarms")
+    return show(
+        request,
+        "alarm.html.j2",
+        alarm=found,
+        acknowledgeable=ACKNOWLEDGEABLE,
+        place=place(alarm),
+        shelves_s=SHELVES_S,
+        reasons=REASONS,
+    )
+
+
+@router.post("/alarms/{alarm}/acknowledge")
+async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
+    """A person has seen it."""
+    await _done(hmi.gateway, AcknowledgeAlarm(alarm=alarm, who=caller.name, role=caller.role))
+    return go_to("/alarms")
+
+
+@router.post("/alarms/{alarm}/shelve")
+async def shelve(
+    hmi: HmiNow,
+    caller: Operator,
+    alarm: AlarmName,
+    for_s: Annotated[int, Form(gt=0, le=SHELVES_S[-1])],
+    reason: Annotated[str, Form(max_length=200)],
+) -> Response:
+    """Hide it for a time, with a reason."""
+    reason = {"being_mended": "it is being mended", "known": "known", "nuisance": "nuisance"}.get(reason, reason)
+    request = ShelveAlarm(alarm=alarm, who=caller.name, role=caller.role, reason=reason, for_s=for_s)
+    await _done(hmi.gateway, request)
+    return go_to("/alarms")
+
+
+@router.post("/alarms/{alarm}/unshelve")
+async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
+    """Show it again."""
+    await _done(hmi.gateway, UnshelveAlarm(alarm=alarm, who=caller.name, role=caller.role))
+    return go_to("/alarms")
+
+
+async def _done(gateway: Gateway, request: Message) -> None:
+    done = await gateway.ask(request, CommandDone)
+    if not done.done:
+        raise RefusedError(done.why)
+
+
+def place(alarm: str) -> str:
+    """Where to look, for the drawing of the station: the part of it that an alarm is about.
+
+    Args:
+        alarm: its id.
+    """
+    places = {
+        "arm": ("emergency_stop", "protective_stop", "safety_fault", "arm_link_lost", "arm_not_remote"),
+        "gripper": ("fruit_held", "gripper_link_lost", "gripper_fault", "gripper_jam"),
+        "sensor": (
+            "camera_lost",
+            "camera_stale",
+            "camera_led_dead",
+            "camera_dirty",
+            "camera_saturated",
+            "reference_bad",
+            "reference_drifting",
+            "calibration_old",
+        ),
+        "plc": ("plc_heartbeat_lost", "plc_interface_lost"),
+        "gate": ("can_node_lost", "gate_not_fired"),
+        "fruit": ("many_no_result", "reject_rate", "no_recipe", "recipe_broken"),
+    }
+    return next((where for where, alarms in places.items() if alarm in alarms), "computer")

@@ -1,0 +1,125 @@
+"""The page Change fruit: choose, see what changes, confirm, and watch it take effect between fruits."""
+
+import json
+from collections.abc import Hashable, Mapping
+from typing import Annotated, Any, NamedTuple
+
+from fastapi import APIRouter, Depends, Form, Path, Request
+from pydantic import ValidationError
+from starlette.responses import Response
+
+from hmi.access import HmiNow, WordingNow, orders
+from hmi.gateway import Gateway, person
+from hmi.live import Part
+from hmi.navigation import Entry
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from hmi.roles import Right
+from hmi.sessions import Caller
+from hmi.words import NO_VALUE, Wording
+from station.channel.panel_live import AskRecipes, OrderName, OrderShown, PanelOrder, Recipes, RecipeShown
+from station.settings.recipe import Recipe
+
+router = APIRouter()
+ENTRY = Entry("change", "/change")
+ORDER_DEADLINE_S = 5.0
+
+
+class Change(NamedTuple):
+    """One line of what changes."""
+
+    key: str
+    """`change.field.KEY` of the catalogue."""
+    now: str
+    then: str
+
+
+def _order(gateway: Gateway) -> Hashable:
+    state = gateway.state
+    return None if state is None else (state.orders, state.ready, state.why_not_ready, state.recipe, state.busy)
+
+
+def _order_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    state = gateway.state
+    order = next((each for each in state.orders if each.order is OrderName.CHOOSE_RECIPE), None) if state else None
+    return {"state": state, "order": order}
+
+
+PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
+
+
+@router.get("/change")
+async def change(request: Request, hmi: HmiNow) -> Response:
+    """The fruit to choose from."""
+    found = await hmi.gateway.ask(AskRecipes(), Recipes)
+    return show(request, "change.html.j2", recipes=found.recipes, active=found.active, problems=found.problems)
+
+
+@router.get("/change/progress")
+async def progress(request: Request) -> Response:
+    """How the change goes."""
+    return show(request, "change_progress.html.j2")
+
+
+@router.get("/change/{number}")
+async def confirm(
+    request: Request, hmi: HmiNow, wording: WordingNow, number: Annotated[int, Path(ge=1, le=65_535)]
+) -> Response:
+    """What will change against now."""
+    found = await hmi.gateway.ask(AskRecipes(), Recipes)
+    chosen = next((each for each in found.recipes if each.number == number), None)
+    if chosen is None:
+        raise Problem(404, "change.gone")
+    return show(
+        request,
+        "change_confirm.html.j2",
+        chosen=chosen,
+        active=found.active,
+        changes=changes(found.active, chosen, wording),
+    )
+
+
+@router.post("/change")
+async def carry_out(
+    hmi: HmiNow,
+    caller: Annotated[Caller, Depends(orders(Right.CHANGE_FRUIT))],
+    number: Annotated[int, Form(ge=1, le=65_535)],
+) -> Response:
+    """Change the fruit, by the way that the PLC's command takes."""
+    request = PanelOrder(person=person(caller.name, caller.role), order=OrderName.CHOOSE_RECIPE, argument=str(number))
+    await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
+    return go_to("/change/progress")
+
+
+def changes(now: RecipeShown | None, then: RecipeShown, wording: Wording) -> list[Change]:
+    """What differs for a person at the line; all values, where nothing is active now.
+
+    Args:
+        now: what is active.
+        then: what is chosen.
+        wording: for numbers.
+    """
+    before, after = {} if now is None else _told(now, wording), _told(then, wording)
+    lines = [Change(key, before.get(key, NO_VALUE), value) for key, value in after.items()]
+    return [line for line in lines if line.now != line.then]
+
+
+def _told(shown: RecipeShown, w: Wording) -> dict[str, str]:
+    try:
+        recipe = Recipe.model_validate_json(json.dumps(json.loads(shown.values)))
+    except (ValueError, ValidationError):  # of another form of the program
+        return {"revision": shown.revision}
+    width, steps, damage = recipe.expected_width, recipe.steps, recipe.damage
+    limits = ", ".join(f"{w.number(a.area_mm2)} mm² ({w.number(a.closing_mm, 1)} mm)" for a in damage.area)
+    return {
+        "width": f"{w.number(width.smallest_mm)} … {w.number(width.largest_mm)} mm",
+        "steps": f"{steps.number} × {w.number(steps.step_mm, 1)} mm",  # noqa: RUF001 (what is shown)
+        "force": f"{w.number(recipe.gripper.force_n)} N",
+        "speed": f"{w.number(recipe.gripper.speed_mm_s)} mm/s",
+        "settle": f"{w.number(recipe.imaging.settle_s, 2)} s",
+        "limits": limits,
+        "growth": f"{w.number(damage.growth_mm2_per_mm)} mm²/mm",
+        "early_stop": f"{w.number(recipe.early_stop.area_mm2)} mm²",
+        "method": recipe.segmentation.method,
+        "revision": shown.revision or NO_VALUE,
+    }

@@ -1,0 +1,452 @@
+"""A whole station on a simulated bench, its pages as a process of their own, and a browser to look at them."""
+
+import asyncio
+import contextlib
+import json
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+import psutil
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from hmi.app import make_app, make_context
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    Begun,
+    Command,
+    CommandDone,
+    CommandName,
+    Noted,
+    Outcome,
+    Published,
+)
+from station.channel.messages import ChannelError
+from station.channel.panel_live import AskPanel, PanelState
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.hmi import panel_endpoint
+from station.settings.plc import line_endpoint
+from station.settings.recipe import load_recipes
+from station.twin.console import ask as ask_twin
+
+PATIENCE_S = 60.0
+ADMIN, ADMIN_PIN = "admin", "482915"
+OPERATOR, OPERATOR_PIN = "Ana", "7391"
+NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
+BROWSER_ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+    """Poll until something is so."""
+    deadline_s = time.monotonic() + patience_s
+    while True:
+        if value := what():
+            return value
+        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
+        time.sleep(0.05)
+
+
+def run_apart(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run in a loop of its own, in a thread of its own: Playwright's own loop runs in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()
+
+
+def free_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as stack:
+        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for probe in probes:
+            probe.bind(("127.0.0.1", 0))
+        return [probe.getsockname()[1] for probe in probes]
+
+
+def quick_recipes(folder: Path) -> Path:
+    """The shipped recipes with few steps."""
+    folder.mkdir()
+    for name in NUMBERS:
+        values = load_recipes()[name].model_dump(mode="json")
+        values["steps"] |= {"number": 4, "result_closings_mm": [3], "closing_limit_mm": 4.5}
+        values["imaging"] |= {"settle_s": 0.2, "frames_per_step": 1, "reference_frames": 3}
+        values["damage"]["growth_mm2_per_mm"] = 60
+        values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
+        values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
+        (folder / f"{name}.yaml").write_text(json.dumps(values))
+    return folder
+
+
+@dataclass
+class Cell:
+    """The running station, and what the line does with it."""
+
+    configuration: Configuration
+    console: int
+    folder: Path
+    file: Path
+    supervisor: subprocess.Popen[bytes]
+    trigger_id: int = 0
+    environment: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.configuration.hmi.port}"
+
+    def twin(self, **request: Any) -> None:
+        ask_twin("127.0.0.1", self.console, request)
+
+    def ask_line(self, *requests: tuple[Any, Any]) -> list[Any]:
+        """What the PLC interface asks, by hand."""
+        return run_apart(self._ask(line_endpoint(self.configuration.handshake, self.configuration.home), requests))
+
+    def state(self) -> PanelState | None:
+        endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
+        try:
+            return run_apart(self._ask(endpoint, [(AskPanel(), PanelState)], 2.0))[0]
+        except ChannelError:
+            return None
+
+    def until(self, what: Callable[[PanelState], Any]) -> PanelState:
+        def look() -> PanelState | None:
+            state = self.state()
+            return state if state is not None and what(state) else None
+
+        return eventually(look)
+
+    def choose(self, kind: str) -> None:
+        """A ready station with a recipe and its fruit; on a bench a person says first that the jaws are clear."""
+        self.twin(do="remove")
+        self.until(lambda state: not state.busy and (state.state in {"unknown", "held", "idle", "stopped"}))
+        orders = [(CommandName.RESET, 0), (CommandName.CHANGE_RECIPE, NUMBERS[kind])]
+        for done in self.ask_line(*((Command(command=name, argument=n), CommandDone) for name, n in orders)):
+            assert done.done, done.why
+        self.twin(do="fruit", kind=kind, seed=1, bruised=False)
+        self.until(lambda state: state.ready)
+
+    def begin(self) -> int:
+        """Trigger; gives the inspection's number once it is accepted."""
+        self.until(lambda state: state.ready)
+        self.trigger_id += 1
+        request = Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1")
+        begun = self.ask_line((request, Begun))[0]
+        assert begun.sequence is not None, (begun, self.state())
+        return begun.sequence
+
+    def end(self, sequence: int) -> Outcome:
+        """Wait for an outcome, and take it as the PLC does."""
+        outcome = self.ask_line((AwaitOutcome(sequence=sequence), Outcome))[0]
+        self.ask_line((Published(outcome=outcome), Noted), (Acknowledged(sequence=sequence), Noted))
+        return outcome
+
+    def process(self, name: str) -> psutil.Process:
+        """A process of the station."""
+
+        def look() -> psutil.Process | None:
+            for child in psutil.Process(self.supervisor.pid).children(recursive=True):
+                with contextlib.suppress(psutil.Error):
+                    if f"-m station {name}" in " ".join(child.cmdline()):
+                        return child
+            return None
+
+        return eventually(look)
+
+    @staticmethod
+    async def _ask(endpoint: str, requests: Any, deadline_s: float = PATIENCE_S) -> list[Any]:
+        async with ChannelClient(endpoint, "the station") as client:
+            return [await client.ask(request, reply, deadline_s=deadline_s) for request, reply in requests]
+
+
+@contextlib.contextmanager
+def begun(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
+    with log.open("wb") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(40)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def said(log: Path, words: str, process: subprocess.Popen[bytes]) -> bool:
+    assert process.poll() is None, log.read_text()
+    return words in log.read_text()
+
+
+@pytest.fixture(scope="session")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
+    """One station for all tests of a session; each test leaves it ready, or makes it so."""
+    folder = tmp_path_factory.mktemp("cell")
+    modbus, metrics, hmi, camera, console = free_ports(5)
+    host = f"127.82.{os.getpid() % 250 + 1}.1"
+    values = {
+        "home": str(folder / "home"),
+        "recipes_folder": str(quick_recipes(folder / "recipes")),
+        "modbus": {"port": modbus},
+        "metrics": {"port": metrics},
+        "hmi": {"port": hmi, "cleaning_s": 5},
+        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "camera": {"oldest_s": 3.0, "twin": {"port": camera}},
+        "records": {"free_reserve_mb": 1},
+        "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0},
+    }
+    file = folder / "station.yaml"
+    file.write_text(json.dumps(values))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    station = [sys.executable, "-m", "station"]
+    twin_log, log = folder / "twin.log", folder / "station.log"
+    with contextlib.ExitStack() as stack:
+        twin = [*station, "twin", "--config", str(file), "--bench", "--console", str(console)]
+        twin_process = stack.enter_context(begun(twin, twin_log, environment))
+        eventually(lambda: said(twin_log, "running", twin_process))
+        supervisor = stack.enter_context(begun([*station, "run", "--config", str(file)], log, environment))
+        eventually(lambda: said(log, "running", supervisor), 2 * PATIENCE_S)
+        configuration = load_configuration(file, {})
+        yield Cell(configuration, console, folder, file, supervisor, environment=environment)
+
+
+@pytest.fixture
+def ready(cell: Cell) -> Cell:
+    """The station, ready with blueberries."""
+    cell.choose("blueberry")
+    return cell
+
+
+@pytest.fixture(scope="module")
+def browser(cell: Cell) -> Iterator[Browser]:
+    """One headless Chromium for the tests of a file: no other file's tests may meet Playwright's running loop."""
+    path = shutil.which("chromium")
+    if path is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("chromium is missing, and CI=true says that nothing may be", pytrace=False)
+        pytest.skip("chromium is missing on this machine")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(BROWSER_ARGUMENTS))
+        with contextlib.closing(browser.new_context()) as context:  # what a browser starts for its first page stays
+            context.new_page().goto(cell.address)
+        yield browser
+        browser.close()
+
+
+@dataclass
+class Panel:
+    """One browser's page, and a person's hand on it."""
+
+    context: BrowserContext
+    page: Page
+    address: str
+    complaints: list[str]
+
+    def open(self, path: str) -> None:
+        self.page.goto(self.address + path)
+
+    def order(self, name: str) -> None:
+        """Press a button."""
+        self.page.get_by_role("button", name=re.compile(name)).first.click()
+
+    def hold(self, selector: str) -> None:
+        """Hold a button until it has taken."""
+        button = self.page.locator(selector).first
+        button.hover()
+        with self.page.expect_navigation():
+            self.page.mouse.down()
+        self.page.mouse.up()
+
+    def log_in(self, name: str, pin: str, *, by_pad: bool = False) -> None:
+        """As the person does, by the number pad or by a keyboard."""
+        self.open("/people")
+        self.page.locator(f"input[name=name][value='{name}']").check(force=True)
+        if by_pad:
+            for digit in pin:
+                self.page.locator(f"[data-digit='{digit}']").click()
+        else:
+            self.page.fill("#pin", pin)
+        with self.page.expect_navigation():
+            self.page.locator("form[action='/people/log-in'] .button.main").click()
+
+    def text(self, selector: str = "body") -> str:
+        return self.page.inner_text(selector)
+
+    def until(self, selector: str, words: str) -> None:
+        """Wait until a part of the page says something."""
+        self.page.locator(selector).filter(has_text=re.compile(words)).first.wait_for(timeout=1000 * PATIENCE_S)
+
+
+@pytest.fixture
+def panel(browser: Browser, cell: Cell) -> Iterator[Callable[..., Panel]]:
+    """Opens a browser of its own; a complaint in its console fails the test, unless that was expected."""
+    opened: list[Panel] = []
+
+    def begin(address: str = "", width: int = 1280, height: int = 800, locale: str = "en-GB", **more: Any) -> Panel:
+        context = browser.new_context(viewport={"width": width, "height": height}, locale=locale, **more)
+        context.set_default_timeout(1000 * PATIENCE_S)
+        page = context.new_page()
+        complaints: list[str] = []
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on(
+            "console",
+            lambda message: complaints.append(message.text) if "Content Security Policy" in message.text else None,
+        )
+        opened.append(Panel(context, page, address or cell.address, complaints))
+        return opened[-1]
+
+    yield begin
+    complaints = [complaint for each in opened for complaint in each.complaints]
+    for each in opened:
+        each.context.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def people(cell: Cell, panel: Callable[..., Panel]) -> Cell:
+    """The station with an administrator and an operator."""
+    file = cell.configuration.home / "hmi" / "people.json"
+    known = json.loads(file.read_text())["people"] if file.exists() else {}
+    if ADMIN not in known:
+        first = panel()
+        first.open("/people")
+        first.page.fill("input[name=name]", ADMIN)
+        first.page.fill("#pin", ADMIN_PIN)
+        first.page.fill("#again", ADMIN_PIN)
+        with first.page.expect_navigation():
+            first.page.locator("form[action='/people/begin'] .button.main").click()
+        known = {ADMIN: {}}
+    if OPERATOR not in known:
+        admin = panel()
+        admin.log_in(ADMIN, ADMIN_PIN)
+        admin.open("/people")
+        admin.page.locator("summary").last.click()
+        form = admin.page.locator("form[action='/people/put']")
+        form.locator("input[name=name]").fill(OPERATOR)
+        form.locator("select[name=role]").select_option("operator")
+        form.locator("#their").fill(OPERATOR_PIN)
+        with admin.page.expect_navigation():
+            form.locator(".button.main").click()
+    return cell
+
+
+@pytest.fixture
+def operator(people: Cell, panel: Callable[..., Panel]) -> Panel:
+    """A browser at which the operator is logged in."""
+    begun = panel()
+    begun.log_in(OPERATOR, OPERATOR_PIN)
+    return begun
+
+
+Answer = tuple[int, dict[str, str], bytes]
+
+
+@dataclass
+class Pages:
+    """The web application without a server, asked request by request."""
+
+    app: Any
+    context: Any
+    cookies: dict[str, str] = field(default_factory=dict)
+
+    def __call__(
+        self, method: str, path: str, body: bytes = b"", *, headers: dict[str, str] | None = None, chunks: int = 1
+    ) -> Answer:
+        given = {"host": "127.0.0.1:8080", "content-length": str(len(body))} | (headers or {})
+        if self.cookies:
+            given["cookie"] = "; ".join(f"{name}={value}" for name, value in self.cookies.items())
+        scope = {
+            "type": "http",
+            "http_version": "1.1",
+            "method": method,
+            "scheme": "http",
+            "path": path.partition("?")[0],
+            "raw_path": path.partition("?")[0].encode(),
+            "query_string": path.partition("?")[2].encode(),
+            "root_path": "",
+            "headers": [(name.encode(), value.encode()) for name, value in given.items() if value],
+            "client": ("127.0.0.1", 50_000),
+            "server": ("127.0.0.1", 8080),
+        }
+        return run_apart(self._ask(scope, body, chunks))
+
+    async def _ask(self, scope: dict[str, Any], body: bytes, chunks: int) -> Answer:
+        size = max(1, -(-len(body) // chunks))
+        parts = [body[at : at + size] for at in range(0, len(body), size)] or [b""]
+        coming = [
+            {"type": "http.request", "body": part, "more_body": number < len(parts) - 1}
+            for number, part in enumerate(parts)
+        ]
+        sent: list[dict[str, Any]] = []
+
+        async def receive() -> dict[str, Any]:
+            return coming.pop(0) if coming else {"type": "http.disconnect"}
+
+        async def send(message: dict[str, Any]) -> None:
+            sent.append(message)
+
+        with contextlib.suppress(RuntimeError):  # which the framework raises on from its own error page
+            await self.app(scope, receive, send)
+        headers = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
+        if "set-cookie" in headers:
+            name, _, value = headers["set-cookie"].partition(";")[0].partition("=")
+            self.cookies[name] = value
+        return sent[0]["status"], headers, b"".join(message.get("body", b"") for message in sent[1:])
+
+    def token(self, path: str = "/people") -> str:
+        """A fresh one, from a page."""
+        page = self("GET", path)[2].decode()
+        found = re.search(r'data-token="([^"]+)"', page)
+        assert found is not None, page
+        return found[1]
+
+    def post(self, path: str, **fields: str) -> Answer:
+        """Send a form as one of our own pages does."""
+        headers = {
+            "content-type": "application/x-www-form-urlencoded",
+            "origin": "http://127.0.0.1:8080",
+            "sec-fetch-site": "same-origin",
+        }
+        return self("POST", path, urlencode(fields).encode(), headers=headers)
+
+
+@pytest.fixture
+def pages(tmp_path: Path) -> Pages:
+    """The web application over a station that is not there."""
+    site = load_configuration(None, {"STATION_HOME": str(tmp_path)})
+    context = make_context(site)
+    return Pages(make_app(context), context)
+
+
+@pytest.fixture
+def free_hmi(unused_port: int, tmp_path: Path) -> Iterator[Callable[..., str]]:
+    """Starts one more process of the pages of the same station, with other settings; gives its address."""
+    with contextlib.ExitStack() as stack:
+
+        def begin(cell: Cell, **variables: str) -> str:
+            log = tmp_path / "hmi.log"
+            command = [sys.executable, "-m", "station", "hmi", "--config", str(cell.file)]
+            environment = {**cell.environment, "STATION_HMI_PORT": str(unused_port), **variables}
+            process = stack.enter_context(begun(command, log, environment))
+            eventually(lambda: said(log, "the pages are served", process))
+            return f"http://127.0.0.1:{unused_port}"
+
+        yield begin

@@ -1,0 +1,311 @@
+"""What the pages refuse, asked without a browser: forged, replayed, oversized and cross-site requests, and roles."""
+
+import json
+import stat
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmi.guard import LARGEST_BODY_BYTES
+from hmi.people_file import FILE_NAME, PeopleError, PeopleFile, pin_problem
+from hmi.pin_limit import FREE_TRIES, LONGEST_WAIT_S, PinLimit
+from hmi.roles import RIGHTS, Right, Role, least_role
+from hmi.sessions import TOKEN_LIFE_S, Sessions
+
+PIN, OTHER_PIN = "482915", "730264"
+
+
+class Clock:
+    def __init__(self):
+        self.now_s = 1000.0
+
+    def __call__(self):
+        return self.now_s
+
+
+def log_in(pages, name="admin", role=Role.ADMIN):
+    session = pages.context.sessions.log_in(name, role)
+    pages.cookies["station_session"] = session
+    return session
+
+
+class TestRequests:
+    @pytest.mark.parametrize("path", ["/", "/people", "/alarms"])
+    def test_every_answer_has_a_strict_policy(self, pages, path):
+        status, headers, body = pages("GET", path)
+        assert status == 200
+        policy = headers["content-security-policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert "http" not in policy
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cache-control"] == "no-store"
+        text = body.decode()
+        assert "<script>" not in text
+        assert " style=" not in text
+        assert " onclick" not in text
+        assert 'src="http' not in text
+
+    @pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "[::2]"])
+    def test_another_hosts_name_is_refused(self, pages, host):
+        assert pages("GET", "/", headers={"host": host})[0] == 421
+
+    @pytest.mark.parametrize(
+        "headers",
+        [
+            {"origin": "http://evil.example"},
+            {"origin": "null"},
+            {"origin": "https://127.0.0.1:8080"},
+            {"origin": "http://127.0.0.1:9999"},
+            {"sec-fetch-site": "cross-site"},
+            {"sec-fetch-site": "same-site"},
+        ],
+    )
+    def test_a_foreign_pages_order_is_refused(self, pages, headers):
+        log_in(pages)
+        body = f"csrf={pages.token()}&language=de".encode()
+        kind = {"content-type": "application/x-www-form-urlencoded"}
+        assert pages("POST", "/language", body, headers={**kind, **headers})[0] == 403
+        assert pages("POST", "/language", body, headers=kind)[0] == 303
+
+    def test_an_order_without_a_token_or_with_a_forged_one_is_refused(self, pages):
+        token = pages.token()
+        for forged in ("", "x", token[:-1] + ("0" if token[-1] != "0" else "1"), "9" + token):
+            status, _, body = pages.post("/language", csrf=forged, language="de")
+            assert status == 403, forged
+            assert b"does not come from a page of this browser" in body
+
+    def test_an_order_that_was_sent_before_is_refused(self, pages):
+        token = pages.token()
+        assert pages.post("/language", csrf=token, language="de")[0] == 303
+        assert pages.post("/language", csrf=token, language="es")[0] == 409
+        assert pages.cookies["station_language"] == "de"
+
+    def test_another_browsers_token_is_worth_nothing(self, pages):
+        token = pages.token()
+        pages.cookies.clear()
+        pages.token()
+        assert pages.post("/language", csrf=token, language="de")[0] == 403
+
+    @pytest.mark.parametrize("chunks", [1, 4])
+    def test_a_request_that_is_too_large_is_refused(self, pages, chunks):
+        body = b"csrf=" + b"x" * (LARGEST_BODY_BYTES + 1)
+        kind = {"content-type": "application/x-www-form-urlencoded"}
+        assert pages("POST", "/language", body, headers=kind)[0] == 413
+        kind["content-length"] = ""
+        assert pages("POST", "/language", body, headers=kind, chunks=chunks)[0] == 413
+
+    def test_a_form_that_is_not_what_is_expected_is_refused(self, pages):
+        log_in(pages)
+        assert pages.post("/change", csrf=pages.token(), number="70000")[0] == 400
+        assert pages.post("/order", csrf=pages.token(), order="explode")[0] == 400
+        assert pages("GET", "/fruit/0")[0] == 400
+        assert pages("GET", "/live?part=secret")[0] == 404
+        assert pages("GET", "/nowhere")[0] == 404
+
+    @pytest.mark.parametrize("back", ["//evil.example", "/\\evil.example", "https://evil.example", "javascript:x"])
+    def test_nobody_is_sent_to_a_foreign_page(self, pages, back):
+        _, headers, _ = pages.post("/language", csrf=pages.token(), language="de", back=back)
+        assert headers["location"] == "/"
+
+    @pytest.mark.parametrize(
+        ("path", "right", "fields"),
+        [
+            ("/order", Right.RUN, {"order": "stop"}),
+            ("/change", Right.CHANGE_FRUIT, {"number": "1"}),
+            ("/alarms/camera_lost/acknowledge", Right.HANDLE_ALARMS, {}),
+            ("/alarms/camera_lost/shelve", Right.HANDLE_ALARMS, {"for_s": "600", "reason": "known"}),
+            ("/people/put", Right.MANAGE_PEOPLE, {"name": "Eve", "role": "admin", "pin": PIN}),
+            ("/people/remove", Right.MANAGE_PEOPLE, {"name": "admin"}),
+        ],
+    )
+    def test_every_order_asks_for_its_role(self, pages, path, right, fields):
+        for role in Role:
+            log_in(pages, "Ana", role)
+            status, _, _ = pages.post(path, csrf=pages.token("/alarms"), **fields)
+            if right not in RIGHTS[role]:
+                assert status == 403, role
+            else:
+                assert status in {303, 400, 503}, role  # the station is away here
+
+    def test_what_a_station_that_is_away_makes_of_an_order_is_said(self, pages):
+        log_in(pages)
+        status, _, body = pages.post("/order", csrf=pages.token(), order="stop")
+        assert status == 503
+        assert b"gave no answer in time" in body
+
+    def test_a_page_says_that_the_station_has_not_answered(self, pages):
+        text = pages("GET", "/")[2].decode()
+        assert '<body class="stale"' in text
+        assert "The station does not answer" in text
+
+
+class TestLogIn:
+    def test_the_first_start_asks_for_an_administrator_and_only_once(self, pages):
+        assert b"First start" in pages("GET", "/people")[2]
+        wrong = pages.post("/people/begin", csrf=pages.token(), name="admin", pin=PIN, again=OTHER_PIN)
+        assert (wrong[0], pages.context.people.first_start) == (400, True)
+        simple = pages.post("/people/begin", csrf=pages.token(), name="admin", pin="123456", again="123456")
+        assert (simple[0], pages.context.people.first_start) == (400, True)
+        before = pages.cookies["station_session"]
+        assert pages.post("/people/begin", csrf=pages.token(), name="admin", pin=PIN, again=PIN)[0] == 303
+        assert pages.cookies["station_session"] != before, "a cookie from before the log-in is worth nothing"
+        again = pages.post("/people/begin", csrf=pages.token(), name="eve", pin=OTHER_PIN, again=OTHER_PIN)
+        assert again[0] == 400
+        assert list(pages.context.people.names()) == ["admin"]
+
+    def test_wrong_pins_have_to_wait(self, pages):
+        pages.context.people.begin("admin", PIN)
+        for _ in range(FREE_TRIES + 1):
+            assert pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=OTHER_PIN)[0] == 403
+        status, _, body = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=PIN)
+        assert status == 429
+        assert b"Too many wrong PINs" in body
+        assert pages.context.sessions.caller(pages.cookies["station_session"]).role is Role.VIEWER
+
+    def test_a_cookie_is_out_of_reach_of_scripts_and_other_pages(self, pages):
+        pages.context.people.begin("admin", PIN)
+        _, headers, _ = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=PIN, back="//evil.example")
+        assert headers["location"] == "/"
+        assert {"HttpOnly", "SameSite=strict", "Path=/"} <= {part.strip() for part in headers["set-cookie"].split(";")}
+
+    def test_a_removed_person_is_logged_out_everywhere(self, pages):
+        pages.context.people.begin("admin", PIN)
+        pages.context.people.put("Ana", Role.OPERATOR, "7391")
+        hers = pages.context.sessions.log_in("Ana", Role.OPERATOR)
+        log_in(pages)
+        assert pages.post("/people/remove", csrf=pages.token(), name="Ana")[0] == 303
+        assert pages.context.sessions.caller(hers).role is Role.VIEWER
+
+    def test_names_from_outside_are_shown_as_text(self, pages):
+        name = "<img src=x onerror=alert(1)>"
+        pages.context.people.begin(name, PIN)
+        text = pages("GET", "/people")[2].decode()
+        assert "<img src=x" not in text
+        assert "&lt;img src=x" in text
+
+
+class TestSessions:
+    def test_who_is_idle_is_a_viewer_again(self):
+        clock = Clock()
+        sessions = Sessions(60.0, clock)
+        session = sessions.log_in("Ana", Role.OPERATOR)
+        clock.now_s += 50
+        sessions.touch(session)
+        clock.now_s += 50
+        assert sessions.caller(session).may(Right.RUN)
+        assert sessions.sweep() == []
+        clock.now_s += 11
+        assert sessions.caller(session).role is Role.VIEWER
+        sessions.touch(session)
+        assert sessions.caller(session).role is Role.VIEWER, "a touch after the time does not bring the person back"
+        assert [caller.name for caller in sessions.sweep()] == ["Ana"]
+        assert sessions.sweep() == []
+
+    def test_an_old_token_is_refused(self):
+        clock = Clock()
+        sessions = Sessions(60.0, clock)
+        token = sessions.token("a")
+        clock.now_s += TOKEN_LIFE_S + 2
+        assert sessions.spend("a", token) == "problem.old"
+
+    @given(st.text(max_size=80))
+    def test_no_text_is_a_token(self, text):
+        assert Sessions(60.0).spend("a", text) == "problem.forged"
+
+    def test_every_right_is_somebodys_and_a_viewer_has_none(self):
+        assert RIGHTS[Role.VIEWER] == frozenset()
+        for right in Right:
+            assert right in RIGHTS[least_role(right)]
+            assert right in RIGHTS[Role.ADMIN]
+
+
+class TestPinLimit:
+    def test_waits_grow_and_end(self):
+        clock = Clock()
+        limit = PinLimit(clock)
+        waits = []
+        for _ in range(40):
+            limit.tried("name")
+            waits.append(limit.wait_s("name", "address"))
+            clock.now_s += waits[-1]
+        assert waits[:FREE_TRIES] == [0.0] * FREE_TRIES
+        assert waits == sorted(waits)
+        assert waits[-1] == LONGEST_WAIT_S
+        limit.right("name")
+        assert limit.wait_s("name") == 0.0
+
+    def test_an_address_that_tries_many_names_waits_too(self):
+        limit = PinLimit(Clock())
+        for number in range(FREE_TRIES + 1):
+            limit.tried(f"name {number}", "address")
+        assert limit.wait_s("name 99", "address") > 0
+        assert limit.wait_s("name 1", "another address") == 0.0
+
+
+class TestPeopleFile:
+    def test_it_is_the_stations_alone_and_holds_no_pin(self, tmp_path):
+        people = PeopleFile(tmp_path / "hmi")
+        people.begin("admin", PIN)
+        path = tmp_path / "hmi" / FILE_NAME
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        text = path.read_text()
+        assert PIN not in text
+        assert "$argon2id$" in text
+        again = PeopleFile(tmp_path / "hmi")
+        assert again.check("admin", PIN) is Role.ADMIN
+        assert again.check("admin", OTHER_PIN) is None
+        assert again.check("nobody", "000000") is None
+
+    def test_a_write_that_fails_leaves_what_was(self, tmp_path, monkeypatch):
+        people = PeopleFile(tmp_path)
+        people.begin("admin", PIN)
+        before = people.path.read_bytes()
+
+        def full(_):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("hmi.people_file.os.fsync", full)
+        with pytest.raises(PeopleError, match="No space left"):
+            people.put("Ana", Role.OPERATOR, "7391")
+        assert people.path.read_bytes() == before
+        assert list(people.names()) == ["admin"]
+
+    def test_a_broken_file_is_no_first_start(self, tmp_path):
+        (tmp_path / FILE_NAME).write_text('{"version": 1, "people": {"admin": {"role": "admin"}}}')
+        people = PeopleFile(tmp_path)
+        assert not people.first_start
+        assert FILE_NAME in people.broken
+        with pytest.raises(PeopleError):
+            people.begin("eve", PIN)
+        assert "admin" in json.loads((tmp_path / FILE_NAME).read_text())["people"]
+
+    def test_one_administrator_stays(self, tmp_path):
+        people = PeopleFile(tmp_path)
+        people.begin("admin", PIN)
+        people.put("Ana", Role.OPERATOR, "7391")
+        for wrong in (lambda: people.remove("admin"), lambda: people.put("admin", Role.OPERATOR, "")):
+            with pytest.raises(PeopleError, match="last_admin"):
+                wrong()
+        with pytest.raises(PeopleError, match="pin_length"):
+            people.put("Ana", Role.ADMIN, "")
+        people.put("Ana", Role.ADMIN, OTHER_PIN)
+        people.remove("admin")
+        assert people.names() == {"Ana": Role.ADMIN}
+
+    @pytest.mark.parametrize(
+        ("pin", "wrong"),
+        [
+            ("7391", "people.pin_length"),
+            ("123456", "people.pin_simple"),
+            ("654321", "people.pin_simple"),
+            ("000000", "people.pin_simple"),
+            ("48291x", "people.pin_length"),
+            ("٤٨٢٩١٥", "people.pin_length"),
+            ("4829154829154", "people.pin_length"),
+            (PIN, ""),
+        ],
+    )
+    def test_a_pin_is_long_enough_and_not_simple(self, pin, wrong):
+        assert pin_problem(pin, Role.QUALITY) == wrong
