@@ -208,7 +208,7 @@ def _group(path: Path) -> Path:
 
 
 def _key(path: Path) -> str:
-    return ".".join(["recipe_field", *(part for part in path if isinstance(part, str))])
+    return ".".join(["recipe_field", *([part for part in path if isinstance(part, str)] or ["general"])])
 
 
 def _field(root: dict[str, Any], path: Path, value: Any) -> Field:

@@ -9,8 +9,8 @@ from pydantic import StringConstraints, ValidationError
 from starlette.responses import Response
 
 from hmi.access import GenuineCaller, HmiNow, caller_of
-from hmi.chart import Curve, Limit, area_chart, spark
 from hmi.context import Hmi
+from hmi.limit_chart import Curve, Limit, area_chart, spark
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem

@@ -9,9 +9,9 @@ from pydantic import StringConstraints
 from starlette.responses import Response
 
 from hmi.access import HmiNow, WordingNow, orders
-from hmi.chart import histogram
 from hmi.context import Hmi
 from hmi.gateway import person
+from hmi.limit_chart import histogram
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem

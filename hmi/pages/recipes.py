@@ -8,8 +8,8 @@ from pydantic import StringConstraints
 from starlette.responses import Response
 
 from hmi.access import HmiNow, WordingNow, caller_of, orders
-from hmi.chart import Curve, Limit, area_chart, strip
 from hmi.context import Hmi
+from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem

@@ -1,4 +1,4 @@
-"""Charts as geometry: where every line and tick lies; `charts.html.j2` draws them as SVG, `rooms.css` dresses them."""
+"""Fruit against their limits: where every line and tick lies; `limit_chart.html.j2` draws it as SVG."""
 
 import math
 from collections.abc import Iterable, Sequence
