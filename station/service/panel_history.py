@@ -7,8 +7,6 @@ from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 
-import cv2
-import numpy as np
 from sqlalchemy import Connection
 
 from station.channel.messages import Message
@@ -21,9 +19,7 @@ from station.channel.panel_queries import (
     EndJob,
     EndLot,
     FindInspections,
-    GetImage,
     GetInspection,
-    GetStages,
     ImageTold,
     InspectionPage,
     InspectionRow,
@@ -32,11 +28,9 @@ from station.channel.panel_queries import (
     ListLots,
     Lots,
     LotTold,
-    Picture,
     ReadAudit,
     ReadJobFile,
     Search,
-    Stages,
     StartExport,
     StartLot,
     StartLotReport,
@@ -47,26 +41,19 @@ from station.records.audit import AuditEntry
 from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.records.errors import RecordsError
-from station.records.images import image_path
 from station.records.lots import Lot, end_lot, read_lots, start_lot
-from station.records.model import FullRecord, StoredImage
+from station.records.model import FullRecord
 from station.records.reading import Summary, read_inspection, read_summaries
 from station.records.records import Records
 from station.records.search import LARGEST, Query, find
 from station.records.wording import sentence
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_worker import PanelWorker
-from station.settings.problems import SettingsError
-from station.settings.recipe_form import parse_recipe
-from station.vision.contact import Image
-from station.vision.methods import make_method
 
 LOOKED_THROUGH = 5000
 """Inspections looked at for one page where a search names the fruit, which no index knows."""
-LARGEST_IMAGE_BYTES = 8 * 1024 * 1024
 _PORTION = 250
 _LONGEST_AUDIT_VALUE = 2000
-_JPEG_QUALITY = 88
 
 
 class PanelHistory:
@@ -87,8 +74,6 @@ class PanelHistory:
         return {
             FindInspections: self.find,
             GetInspection: self.inspection,
-            GetImage: self.image,
-            GetStages: self.stages,
             ListLots: self.lots,
             StartLot: self.start_lot,
             EndLot: self.end_lot,
@@ -112,18 +97,6 @@ class PanelHistory:
                 return _told(read_inspection(connection, request.sequence, self._folder))
 
         return await self._worker.do(read)
-
-    async def image(self, request: GetImage) -> Picture:
-        """One stored image."""
-
-        def read() -> Picture:
-            return Picture(media_type="image/png", data=_file(image_path(self._folder, request.sha256)))
-
-        return await self._worker.do(read)
-
-    async def stages(self, request: GetStages) -> Stages:
-        """One step measured again with its stages."""
-        return await self._worker.do(lambda: self._stages(request))
 
     async def lots(self, request: ListLots) -> Lots:
         """The last lots told of."""
@@ -216,27 +189,6 @@ class PanelHistory:
                 rows, below = _of_fruit(connection, found, search.fruit, limit)
         return InspectionPage(rows=tuple(map(_row, rows)), below=below)
 
-    def _stages(self, request: GetStages) -> Stages:
-        with reading(self._folder) as connection:
-            record = read_inspection(connection, request.sequence, self._folder)
-        if record.trigger.recipe is None:
-            raise RecordsError(f"inspection {request.sequence} has no recipe", "look at another one")
-        try:
-            recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
-        except SettingsError as error:
-            raise RecordsError("its recipe is of a form that this program does not take", str(error)) from error
-        reference = _picture(_kept(record, "reference", None))
-        image = _picture(_kept(record, "step", request.step))
-        if reference.shape != image.shape:
-            raise RecordsError("its reference and this image differ in size", "look at another step")
-        pictures: list[tuple[str, Picture]] = []
-
-        def take(name: str, picture: np.ndarray) -> None:
-            pictures.append((name, _jpeg(picture)))
-
-        contact = make_method([reference], recipe.segmentation).measure(image, take)
-        return Stages(pictures=tuple(pictures), area_px=contact.area_px)
-
 
 def _of_fruit(connection: Connection, found: Iterator[int], fruit: str, limit: int) -> tuple[list[Summary], int | None]:
     """Those of one fruit, and what to go on below; so many are looked at that a page comes in a moment."""
@@ -295,38 +247,6 @@ def _told(record: FullRecord) -> InspectionTold:
         published_utc_ms=record.published_utc_ms,
         acknowledged_utc_ms=record.acknowledged_utc_ms,
     )
-
-
-def _kept(record: FullRecord, kind: str, step: int | None) -> StoredImage:
-    for image in record.images:
-        if image.kind == kind and image.step == step:
-            return image
-    what = "reference" if step is None else f"image of step {step}"
-    raise RecordsError(
-        f"the {what} of inspection {record.sequence} was not kept ({record.images_state})",
-        "look at another one; records.images_quota_mb and records.accepted_share say what is kept",
-    )
-
-
-def _file(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST_IMAGE_BYTES:
-            raise RecordsError("the image's file is larger than any of a sensor", f"look at {path}")
-        return path.read_bytes()
-    except OSError as error:
-        raise RecordsError("the image is not kept any more", "the oldest images make room for new ones") from error
-
-
-def _picture(image: StoredImage) -> Image:
-    picture = cv2.imdecode(np.frombuffer(_file(Path(image.path)), np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        raise RecordsError("the image's file is damaged", "run `station records check`")
-    return np.asarray(picture, np.uint8)
-
-
-def _jpeg(picture: np.ndarray) -> Picture:
-    data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
-    return Picture(media_type="image/jpeg", data=data)
 
 
 def _options(search: Search) -> list[str]:

@@ -16,6 +16,7 @@ from station.service.panel_history import PanelHistory
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_log import LogRing
 from station.service.panel_maintenance import PanelMaintenance
+from station.service.panel_pictures import PanelPictures
 from station.service.panel_recipes import PanelRecipes
 from station.service.panel_worker import PanelWorker
 from station.service.readiness import Gate
@@ -74,6 +75,7 @@ class PanelRooms:
         )
         self.handlers: dict[type[Message], Handler] = {
             **history.handlers(),
+            **PanelPictures(records.folder, self._worker).handlers(),
             **recipes.handlers(),
             **maintenance.handlers(),
             **self._ball.handlers(),
