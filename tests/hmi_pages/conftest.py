@@ -134,7 +134,7 @@ class Site:
         return self.asked(lambda client: client.ask(request, CommandDone, deadline_s=40))
 
     def ready(self) -> bool:
-        """Whether fruit is taken; where not, a person resets: a busy machine makes moves late, which stops a station."""
+        """Whether fruit is taken; where not, a person resets: on a busy machine moves come late, which stops it."""
         if self.state().ready:
             return True
         self.order(CommandName.RESET)
