@@ -1,6 +1,6 @@
 """Charts as SVG, without colour: an area curve with its limits, a trend of rejects, a curve on a tile."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from markupsafe import Markup, escape
 
@@ -11,6 +11,7 @@ WIDTH, HEIGHT = 360, 290
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46, 12, 16, 44
 TREND_BUCKET = 10
 _STEPS = (1, 2, 5)
+Scale = Callable[[float], float]
 
 
 def ticks(largest: float, most: int = 5) -> list[float]:
@@ -128,9 +129,7 @@ def bar(value: float, largest: float) -> Markup:
     return drawn.format(filled)
 
 
-def _axes(across: list[float], up: list[float], x: object, y: object, wording: Wording) -> str:
-    assert callable(x)  # noqa: S101 (of `curve`)
-    assert callable(y)  # noqa: S101 (likewise)
+def _axes(across: list[float], up: list[float], x: Scale, y: Scale, wording: Wording) -> str:
     parts = []
     for value in up:
         digits = 0 if up[1] >= 1 else 1

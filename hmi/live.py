@@ -3,7 +3,7 @@
 import asyncio
 import hashlib
 import json
-from collections.abc import AsyncIterator, Callable, Hashable, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -23,8 +23,8 @@ class Part(NamedTuple):
     """A part of a page."""
 
     template: str
-    depends_on: Callable[[Gateway], Hashable]
-    """Filled in anew when this changes; cheap."""
+    depends_on: Callable[[Gateway], object]
+    """Filled in anew when this is no longer equal to what it was; cheap."""
     values: Callable[[Gateway, Wording], Mapping[str, Any]]
     """What the template needs, beside `may(right)`; `gateway.state` may be None, or old: the page says how old."""
 
@@ -48,7 +48,7 @@ class Live:
 
     def __init__(self, parts: Mapping[str, Part], renderer: Renderer, gateway: Gateway, boot: str) -> None:
         self._parts, self._renderer, self._gateway, self._boot = parts, renderer, gateway, boot
-        self._filled: dict[tuple[str, Language, Role], tuple[Hashable, Filled]] = {}
+        self._filled: dict[tuple[str, Language, Role], tuple[object, Filled]] = {}
         self.open = 0
         """Streams under way."""
         self.ending = False

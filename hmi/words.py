@@ -120,5 +120,7 @@ def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> La
         cookie: what the person chose; may be anything.
         accepted: the browser's Accept-Language.
     """
-    asked = [cookie, *(part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])]
-    return next((language for each in asked for language in languages if language == each), languages[0])
+    wished = (part.partition(";")[0].strip().partition("-")[0].lower() for part in accepted.split(",")[:20])
+    order = [cookie, *wished]
+    known = [language for language in languages if str(language) in order]
+    return min(known, key=order.index, default=languages[0])

@@ -1,6 +1,6 @@
 """The page Alarms: what stands, what to do about it, who has seen it, what is hidden and what was."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Form, Path, Request
@@ -29,7 +29,7 @@ Operator = Annotated[Caller, Depends(orders(Right.HANDLE_ALARMS))]
 AlarmName = Annotated[str, Path(pattern=r"^[a-z_]{1,40}$")]
 
 
-def _alarms(gateway: Gateway) -> Hashable:
+def _alarms(gateway: Gateway) -> object:
     return None if gateway.state is None else gateway.state.alarms
 
 

@@ -1,7 +1,7 @@
 """The page Change fruit: choose, see what changes, confirm, and watch it take effect between fruits."""
 
 import json
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from fastapi import APIRouter, Depends, Form, Path, Request
@@ -34,7 +34,7 @@ class Change(NamedTuple):
     then: str
 
 
-def _order(gateway: Gateway) -> Hashable:
+def _order(gateway: Gateway) -> object:
     state = gateway.state
     return None if state is None else (state.orders, state.ready, state.why_not_ready, state.recipe, state.busy)
 

@@ -1,6 +1,6 @@
 """What every page has around it: the alarm line, the station's state, the stream of what changes, the language."""
 
-from collections.abc import AsyncIterator, Hashable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Form, Query, Request
@@ -19,7 +19,7 @@ MOST_STREAMS = 40
 _A_YEAR_S = 365 * 24 * 3600
 
 
-def _alarms(gateway: Gateway) -> Hashable:
+def _alarms(gateway: Gateway) -> object:
     return None if gateway.state is None else gateway.state.alarms
 
 
@@ -29,7 +29,7 @@ def _alarm_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
     return {"alarms": sorted(shown, key=lambda each: not each.active), "heard": state is not None}
 
 
-def _state(gateway: Gateway) -> Hashable:
+def _state(gateway: Gateway) -> object:
     state = gateway.state
     return None if state is None else (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)
 

@@ -2,7 +2,7 @@
 
 import base64
 from collections import Counter
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Form, Path, Request
@@ -32,7 +32,7 @@ _KEPT_FOR_EVER = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
-def _doing(gateway: Gateway) -> Hashable:
+def _doing(gateway: Gateway) -> object:
     state = gateway.state
     return None if state is None else state.model_copy(update={"utc_ms": 0, "devices": ()})
 
@@ -43,7 +43,7 @@ def _doing_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
     return {"state": state, "order": order, "OrderName": OrderName}
 
 
-def _fruit(gateway: Gateway) -> Hashable:
+def _fruit(gateway: Gateway) -> object:
     return gateway.last
 
 
@@ -51,7 +51,7 @@ def _fruit_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
     return fruit_values(gateway.last, wording)
 
 
-def _figures(gateway: Gateway) -> Hashable:
+def _figures(gateway: Gateway) -> object:
     state = gateway.state
     if state is None:
         return None
@@ -74,7 +74,7 @@ def _figures_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
     }
 
 
-def _recent(gateway: Gateway) -> Hashable:
+def _recent(gateway: Gateway) -> object:
     return gateway.recent
 
 

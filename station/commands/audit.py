@@ -53,6 +53,8 @@ def verify(context: click.Context, anchors: tuple[str, ...], since: int, config:
     folder, known = records_folder(load_configuration(config).home), [_anchor(text) for text in anchors]
     with reading(folder) as connection:
         found = check_audit(connection, read_head(folder), known, since)
+    for text in found.restored:
+        click.echo(f"note {text}", err=True)
     for text in found.broken:
         click.echo(f"BROKEN {text}", err=True)
     if found.broken:

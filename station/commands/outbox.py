@@ -10,13 +10,12 @@ import click
 
 from station.commands.records_options import config_option
 from station.errors import StationError
+from station.outbox.lag import LOST_S
 from station.outbox.status import outbox_folder, read_status
 from station.outbox.telling import destinations, keep_telling
 from station.service.logs import configure_logging
 from station.settings.configuration import Configuration, load_configuration
 from station.supervision.notify import feed_watchdog, notify
-
-_LOST_S = 30.0
 
 
 @click.group()
@@ -55,7 +54,7 @@ def status(config: Path | None) -> None:
         connected = "connected" if each.connected else f"not connected: {each.error}"
         click.echo(f"{name}: {each.told} told, {waiting}{oldest}, {each.refused} refused; {connected}")
     age_s = time.time() - said.utc_ms / 1000
-    if age_s > _LOST_S:
+    if age_s > LOST_S:
         raise StationError(f"the outbox was last heard {age_s:.0f} s ago; start `station run`, or `station outbox run`")
     if not all(each.connected for each in said.destinations.values()):
         raise StationError("not all destinations are connected; what waits is told when they are")
@@ -72,7 +71,7 @@ async def _until_ended(site: Configuration) -> None:
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     tasks = [
         asyncio.create_task(keep_telling(site.outbox, site.home, progress), name="outbox"),
-        asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < _LOST_S), name="watchdog"),
+        asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < LOST_S), name="watchdog"),
         asyncio.create_task(ended.wait(), name="order to end"),
     ]
     notify("READY=1")

@@ -122,6 +122,8 @@ def backup(directory: Path, config: Path | None) -> None:
     """
     made = make_backup(folder_of(config), directory)
     click.echo(f"{directory}: {made.inspections} inspections, {made.images} images, {made.size_bytes} bytes, verified")
+    if made.audit_head:
+        click.echo(f"the audit trail's last row in it: {made.audit_head}")
     for note in made.notes:
         click.echo(f"note: {note}", err=True)
 

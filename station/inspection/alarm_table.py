@@ -57,6 +57,11 @@ class AlarmId(StrEnum):
     DEADLINE_MISSED = "deadline_missed"
     CALIBRATION_OLD = "calibration_old"
     HMI_LOST = "hmi_lost"
+    OUTBOX_BEHIND = "outbox_behind"
+
+
+WORD_BITS = 32
+"""The alarm word's; what has a higher number concerns no line."""
 
 
 class Provocation(NamedTuple):
@@ -72,7 +77,7 @@ class AlarmRow(NamedTuple):
     """One alarm as its document and the panel show it."""
 
     number: int
-    """1 to 32; bit number - 1 of the alarm word, and the PLC's error code. Never given to another alarm."""
+    """The PLC's error code; up to `WORD_BITS` also bit number - 1 of its alarm word. Never given to another alarm."""
     priority: Priority
     cause: str
     consequence: str
@@ -346,6 +351,14 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         "Nobody sees the station or acts at the panel; inspections go on.",
         "Wait for its restart; if it stays away, read its log and start the station again.",
         (P("process", "hmi"),),
+    ),
+    AlarmId.OUTBOX_BEHIND: AlarmRow(
+        33,
+        Priority.LOW,
+        "Another system, PostgreSQL or the MQTT broker, has not been told of inspections for longer than allowed.",
+        "It shows the past; nothing is lost, and the line goes on. What waits is told in order once it can be.",
+        "See `station outbox status` for why: the other system, the network to it, or the outbox's own process.",
+        (P("process", "postgresql_away"),),
     ),
 }
 """Every alarm, in the order of its number."""

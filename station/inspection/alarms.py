@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from station.inspection.alarm_table import ALARMS, AlarmId, urgency
+from station.inspection.alarm_table import ALARMS, WORD_BITS, AlarmId, urgency
 
 LONGEST_SHELVED_S = 8 * 3600.0
 """One shift: what is hidden for longer is not an alarm."""
@@ -209,7 +209,8 @@ class Alarms:
     @property
     def word(self) -> int:
         """The PLC's 32 bits: bit n for an active alarm with number n + 1."""
-        return sum(1 << (ALARMS[alarm.id].number - 1) for alarm in self.active)
+        numbers = (ALARMS[alarm.id].number for alarm in self.active)
+        return sum(1 << (number - 1) for number in numbers if number <= WORD_BITS)
 
     @property
     def error_code(self) -> int:

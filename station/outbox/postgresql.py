@@ -157,12 +157,22 @@ class Session:
         await self._connection.commit()
 
     async def idle(self, pause_s: float) -> None:
-        """Let time pass; a connection that was cut meanwhile is noticed with the next row.
+        """Let time pass; a connection that ends meanwhile is noticed, a silent one by keepalives of TCP (25 s).
 
         Args:
             pause_s: how long.
         """
-        await asyncio.sleep(pause_s)
+        loop, heard, socket = asyncio.get_running_loop(), asyncio.Event(), self._connection.fileno()
+        loop.add_reader(socket, heard.set)  # nothing is asked for: the server only tells of its end
+        try:
+            async with asyncio.timeout(pause_s):
+                await heard.wait()
+        except TimeoutError:
+            return
+        finally:
+            loop.remove_reader(socket)
+        await self._connection.execute("SELECT 1")
+        await self._connection.commit()
 
     async def _write(self, events: Sequence[Event]) -> None:
         async with self._connection.cursor() as cursor:

@@ -25,6 +25,8 @@ class DestinationStatus(BaseModel):
     """When the first of them was done."""
     error: str
     """Why it cannot be told now; empty where it can."""
+    away_since_utc_ms: int | None = None
+    """Since when it cannot."""
 
 
 class OutboxStatus(BaseModel):

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import random
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
@@ -71,6 +72,7 @@ class Teller:
         self._waiting: int | None = None
         self._oldest_utc_ms: int | None = None
         self._connected, self._error = False, "not yet connected"
+        self._away_since_utc_ms: int | None = time.time_ns() // 1_000_000
 
     async def run(self) -> None:
         """Tell until cancelled."""
@@ -99,6 +101,7 @@ class Teller:
             waiting=self._waiting,
             oldest_utc_ms=self._oldest_utc_ms,
             error=self._error,
+            away_since_utc_ms=self._away_since_utc_ms,
         )
 
     async def _look(self) -> None:
@@ -140,6 +143,10 @@ class Teller:
         if error and error != self._error:
             log.warning("%s: %s", self.destination.name, error)
         self._connected, self._error = connected, error
+        if connected:
+            self._away_since_utc_ms = None
+        elif self._away_since_utc_ms is None:
+            self._away_since_utc_ms = time.time_ns() // 1_000_000
 
 
 def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:

@@ -17,6 +17,8 @@ GENESIS = "0" * 64
 """What the first row of all has as the hash of the row before it."""
 CONTINUED = "audit.continued"
 """The action of a row that says that rows before it are missing from this database."""
+RESTORED = "records.restored"
+"""The action of a row that says that a person put a backup back; rows written since then are missing before it."""
 STATION = "station"
 """Who acts where no person does, and its role."""
 LONGEST_WORD, LONGEST_REASON = 64, 1000
@@ -107,6 +109,28 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
     found, told = (None if head is None else {"seq": head.seq, "hash": head.hash} for head in (last, known))
     entry = AuditEntry(STATION, STATION, CONTINUED, "audit", reason, found, told)
     return _append(connection, entry, last, max(head.seq for head in (last, known) if head) + _SPARE_NUMBERS)
+
+
+def append_restored(connection: Connection, by: str, known: Head | None, new: dict[str, Any]) -> AuditRow:
+    """Say that a backup was put back, behind its last row; with a gap where rows are known that it does not have.
+
+    Args:
+        connection: of a transaction on the restored database, begun for writing.
+        by: who did it.
+        known: the head of the trail that was there; None where there was none.
+        new: what is to be told of the backup.
+
+    Raises:
+        BadRecordError: `by` is nothing that the trail can hold.
+    """
+    last = last_row(connection)
+    lost = known if known is not None and not holds(connection, known) else None
+    here = None if last is None else {"seq": last.seq, "hash": last.hash}
+    old = None if lost is None else {"audit": lost._asdict()}
+    entry = AuditEntry(by, "command line", RESTORED, "records", "", old, {**new, "audit": here})
+    check_entry(entry)
+    seq = None if lost is None else max(lost.seq, last.seq if last else 0) + _SPARE_NUMBERS
+    return _append(connection, entry, last, seq)
 
 
 def holds(connection: Connection, head: Head) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, select
 
-from station.records.audit import CONTINUED, GENESIS, AuditRow, last_row, row_of
+from station.records.audit import CONTINUED, GENESIS, RESTORED, AuditRow, last_row, row_of
 from station.records.audit_head import Head
 from station.records.schema import audit
 
@@ -21,6 +21,8 @@ class AuditCheck:
     """The last row; None of an empty trail."""
     broken: tuple[str, ...]
     """What is wrong, the first broken row first; empty where the trail is whole."""
+    restored: tuple[str, ...]
+    """Rows that are missing because a person put a backup back, which the trail tells of; no fault by itself."""
 
 
 def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
@@ -33,11 +35,15 @@ def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Hea
         since: leave out rows before this one, as where a break is known and explained.
     """
     broken: list[str] = []
+    restored: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
     wanted = {anchor.seq for anchor in anchors} | ({kept.seq} if kept else set())
     for row in _rows(connection, since):
         number += 1
-        broken += _wrong(row, before, first_of_all=not since)
+        if before is not None and (gap := _restored(row, before)):
+            restored.append(gap)
+        else:
+            broken += _wrong(row, before, first_of_all=not since)
         if row.seq in wanted:
             hashes[row.seq] = row.hash
         before = row
@@ -47,12 +53,26 @@ def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Hea
         broken.append(text)
     if kept is None and last_row(connection) is not None:
         broken.append("the head kept beside the database is missing: rows may have been cut off at the end")
-    return AuditCheck(number, head, tuple(broken))
+    return AuditCheck(number, head, tuple(broken), tuple(restored))
 
 
 def _rows(connection: Connection, since: int) -> Iterator[AuditRow]:
     for found in connection.execute(select(audit).where(audit.c.seq >= since).order_by(audit.c.seq)):
         yield row_of(found)
+
+
+def _restored(row: AuditRow, before: AuditRow) -> str:
+    """What a whole row says of the gap before it, where a backup ended with the row before; else empty."""
+    behind = row.action == RESTORED and row.seq != before.seq + 1
+    if not behind or row.hash != row.true_hash or row.previous_hash != before.hash:
+        return ""
+    told, lost = json.loads(row.new or "{}"), json.loads(row.old or "{}").get("audit")
+    if lost is None or told.get("audit") != {"seq": before.seq, "hash": before.hash}:
+        return ""
+    return (
+        f"row {row.seq}: {row.who} put back a backup that ends with row {before.seq}; rows up to {lost['seq']} "
+        "are in the records that were moved aside then"
+    )
 
 
 def _wrong(row: AuditRow, before: AuditRow | None, *, first_of_all: bool) -> list[str]:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from station.records.audit import holds, newer_head
+from station.records.audit_head import Head, read_head
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.errors import DamagedError, DiskFullError, RecordsError
 from station.records.failures import in_words
@@ -36,8 +38,10 @@ class Manifest(BaseModel):
     images: int = Field(ge=0)
     size_bytes: int = Field(ge=0)
     database_sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    audit_head: str = Field(default="", pattern="^([0-9]+:[0-9a-f]{64})?$")
+    """The audit trail's last row as `ROW:HASH`, an anchor for `station audit verify`; empty where there is none."""
     notes: tuple[str, ...] = ()
-    """What could not be copied."""
+    """What could not be copied, or was missing before."""
 
 
 def make_backup(folder: Path, directory: Path) -> Manifest:
@@ -136,7 +140,7 @@ def integrity(connection: sqlite3.Connection) -> Iterator[str]:
 
 
 def _copied(folder: Path, partial: Path) -> Manifest:
-    path = partial / FILE_NAME
+    path, known = partial / FILE_NAME, read_head(folder)
     with reading(folder) as live, closing(sqlite3.connect(path)) as target:
         plain(live).backup(target)  # in one step: a reader of the write-ahead log holds up nobody
         target.execute("PRAGMA journal_mode = DELETE")
@@ -144,6 +148,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     if faults:
         raise DamagedError(f"{folder / FILE_NAME}: {faults[0]}", "see `station records check`; keep the last backup")
     size_bytes, notes = _copy_images(folder, partial)
+    head, cut = _audit_head(path, known)
     with closing(sqlite3.connect(path)) as target:
         inspections, last = target.execute("SELECT count(*), max(sequence) FROM inspections").fetchone()
         images = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()[0]
@@ -155,8 +160,22 @@ def _copied(folder: Path, partial: Path) -> Manifest:
         images=images,
         size_bytes=size_bytes + path.stat().st_size,
         database_sha256=hash_of(path),
-        notes=tuple(notes),
+        audit_head=head,
+        notes=(*notes, *cut),
     )
+
+
+def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
+    """The copied trail's last row, and whether rows are missing from it that were there before the copying."""
+    engine = open_engine(path, "ro")
+    try:
+        with engine.connect() as connection:
+            head = newer_head(connection, None)
+            cut = known is not None and not holds(connection, known)
+    finally:
+        engine.dispose()
+    note = "the audit trail lacks rows that it had: see `station audit verify`"
+    return f"{head.seq}:{head.hash}" if head else "", (note,) if cut else ()
 
 
 def _copy_images(folder: Path, partial: Path) -> tuple[int, list[str]]:

@@ -137,17 +137,13 @@ def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Sum
         connection: any.
         sequences: which; those that are not there are left out.
     """
-    database, wanted = (
-        plain(connection),
-        (json.dumps(list(sequences)),),
-    )  # through SQLAlchemy it takes several times as long
+    database = plain(connection)  # through SQLAlchemy a page takes several times as long
+    wanted = (json.dumps(list(sequences)),)
     areas: defaultdict[int, list[float | None]] = defaultdict(list)
     for sequence, area_mm2 in database.execute(_AREAS, wanted):
         areas[sequence].append(area_mm2)
-    return [
-        Summary(*told, tuple(json.loads(reasons)) if reasons else (), tuple(areas[told[0]]), duration_ms)
-        for *told, reasons, duration_ms in database.execute(_SUMMARIES, wanted)
-    ]
+    rows = database.execute(_SUMMARIES, wanted)
+    return [Summary._make((*row[:7], tuple(json.loads(row[7] or "[]")), tuple(areas[row[0]]), row[8])) for row in rows]
 
 
 def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[str, str, str], int]:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from sqlalchemy import func, insert, select
 
-from station.records.audit import AuditEntry, append_audit, continue_audit, newer_head
-from station.records.audit_head import keep_head, read_head
+from station.records.audit import append_restored
+from station.records.audit_head import Head, keep_head, read_head
 from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
 from station.records.errors import DamagedError, RecordsError
@@ -99,19 +99,16 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
 
 
 def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
-    """Let what is numbered go on: the outbox under a new name, the audit trail with a row that tells of the gap."""
+    """Let what is numbered go on: the outbox under a new name, the audit trail with a row that tells of it."""
     engine = open_engine(new / FILE_NAME, "rw")
     try:
         migrate(engine, new)
         with engine.begin() as connection:
             after = (connection.scalar(select(func.max(outbox.c.entry))) or 0) + 1
             connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
-            continue_audit(connection, read_head(folder))
-            new_values = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
-            append_audit(connection, AuditEntry(by, "command line", "records.restored", "records", new=new_values))
-            head = newer_head(connection, None)
-        if head is not None:
-            keep_head(folder, head)
+            told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
+            row = append_restored(connection, by, read_head(folder), told)
+        keep_head(folder, Head(row.seq, row.hash))
     except RecordsError:
         raise
     except Exception as error:

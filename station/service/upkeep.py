@@ -46,6 +46,7 @@ class Upkeep:
         liveness: fed with this task's progress.
         calibrated: how old the sensor's calibration is.
         pages_trouble: what is wrong with the HMI's process; empty for nothing.
+        outbox: says what is behind, empty for nothing.
         broken: what was wrong with the configuration at the start; empty for nothing.
         reserve_mb: space on the disk below which nothing is inspected.
         longest_pause_s: between two tries to bring something back.
@@ -63,6 +64,7 @@ class Upkeep:
         liveness: Liveness,
         calibrated: Calibrated,
         pages_trouble: Callable[[], str],
+        outbox: Callable[[], str],
         *,
         broken: str,
         reserve_mb: int,
@@ -71,7 +73,7 @@ class Upkeep:
         self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
         self._metrics, self._liveness, self._trail, self._calibrated = metrics, liveness, trail, calibrated
         self._pages_trouble = pages_trouble
-        self._book_at_s = time.monotonic()
+        self._book_at_s, self._outbox = time.monotonic(), outbox
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
         self._told_ready_s = 0.0
         self._alarms_at_s = 0.0
@@ -162,6 +164,7 @@ class Upkeep:
         )
         alarms.show(AlarmId.CALIBRATION_OLD, self._calibrated.trouble())
         alarms.show(AlarmId.HMI_LOST, self._pages_trouble())
+        alarms.show(AlarmId.OUTBOX_BEHIND, self._outbox())
         self._orders.show_line()
         self._show_restarts()
         self._show_clock()

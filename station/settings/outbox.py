@@ -81,6 +81,21 @@ class OutboxSettings(Settings):
         ge=0.1,
         le=3600.0,
     )
+    alarm_after_s: float = setting(
+        900.0,
+        title="Alarm after",
+        description="An alarm is raised where another system has not been told of something for so long.",
+        unit="s",
+        ge=1.0,
+        le=86_400.0 * 7,
+    )
+    alarm_after_rows: int = setting(
+        5000,
+        title="Alarm after entries",
+        description="Likewise where so many entries wait to be told, however young they are.",
+        ge=1,
+        le=100_000_000,
+    )
     postgresql: OutboxPostgresqlSettings = setting(
         OutboxPostgresqlSettings(), title="PostgreSQL", description="The database of many stations."
     )

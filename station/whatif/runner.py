@@ -3,9 +3,10 @@
 import importlib
 import multiprocessing
 import socket
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +25,8 @@ _WITH_IMAGES = 8
 _REACH_S = 10.0
 _AHEAD = 3
 """Chunks that wait for each worker: so many that none is idle, so few that memory stays small."""
+_ALONE_S = 2.0
+"""About as long as a process takes to start and to load what it needs."""
 
 
 class Batch(NamedTuple):
@@ -82,19 +85,27 @@ def run(parts: Iterable[Batch], jobs: int, scheduler: str | None) -> Iterator[li
         BadInputError: the address is none, or the extra `cluster` is not installed.
         StationError: a worker was lost.
     """
-    if scheduler is None and jobs == 1:
+    if scheduler is not None:
+        with _cluster(scheduler) as (submit, width):
+            yield from _flow(parts, submit, width * _AHEAD)
+    elif jobs == 1:
         yield from map(replay_batch, parts)
+    else:
+        yield from _on_cores(iter(parts), jobs)
+
+
+def _on_cores(parts: Iterator[Batch], jobs: int) -> Iterator[list[Replayed]]:
+    """This process works too, and at first alone: what is done by the time that another one has started needs none."""
+    until_s = time.monotonic() + _ALONE_S
+    for part in parts:
+        yield replay_batch(part)
+        if time.monotonic() > until_s:
+            break
+    else:
         return
-    with ExitStack() as stack:
-        submit, width = stack.enter_context(_cluster(scheduler) if scheduler else _processes(jobs))
-        yield from _flow(parts, submit, width * _AHEAD)
-
-
-@contextmanager
-def _processes(jobs: int) -> Iterator[tuple[Callable[[Batch], Any], int]]:
-    """Processes of this machine. Spawned, since OpenCV's threads do not survive a fork."""
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        yield lambda batch: pool.submit(replay_batch, batch), jobs
+    # Spawned, since OpenCV's threads do not survive a fork.
+    with ProcessPoolExecutor(jobs - 1, multiprocessing.get_context("spawn")) as pool:
+        yield from _flow(parts, lambda batch: pool.submit(replay_batch, batch), (jobs - 1) * _AHEAD, helps=True)
 
 
 @contextmanager
@@ -128,16 +139,21 @@ def _reach(address: str) -> None:
         raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
 
 
-def _flow(parts: Iterable[Batch], submit: Callable[[Batch], Any], most: int) -> Iterator[list[Replayed]]:
-    """Keep so many batches on their way."""
+def _flow(
+    parts: Iterable[Batch], submit: Callable[[Batch], Any], most: int, *, helps: bool = False
+) -> Iterator[list[Replayed]]:
+    """Keep so many batches on their way; this process may help with others meanwhile."""
     source, under_way = iter(parts), set[Future[list[Replayed]]]()
     try:
         while True:
             for part in islice(source, most - len(under_way)):
                 under_way.add(submit(part))
+            mine = next(source, None) if helps else None
+            if mine is not None:
+                yield replay_batch(mine)
             if not under_way:
                 return
-            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            done, under_way = wait(under_way, 0 if mine is not None else None, FIRST_COMPLETED)
             for future in done:
                 yield future.result()
     finally:

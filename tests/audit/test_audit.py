@@ -1,6 +1,7 @@
 """The audit trail: it only grows, and whatever was done to it behind its back is found."""
 
 import asyncio
+import json
 import sqlite3
 
 import pytest
@@ -100,6 +101,45 @@ def test_rows_cut_off_are_told_by_the_next_start_too_and_by_an_anchor(trail, fol
     assert code == 1
     assert f"row {last[0].seq}: rows before it are missing: a start found up to row 3 here" in told
     assert station("audit", "verify", "--since", str(last[1].seq))[0] == 0
+
+
+def test_after_a_restoring_the_trail_is_whole_and_tells_what_is_missing(trail, folder, station, meddle, tmp_path):
+    copy = tmp_path / "copy"
+    trail(3)
+    code, told = station("records", "backup", str(copy))
+    assert code == 0
+    anchor = told.split()[-1]
+    assert json.loads((copy / "backup.json").read_text())["audit_head"] == anchor
+    trail(2)
+    lost = station("audit", "verify")[1].split()[-1]
+    assert station("records", "restore", str(copy), "--by", "Ida")[0] == 0
+    code, told = station("audit", "verify", "--anchor", anchor)
+    assert code == 0
+    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in told
+    assert "OK 4 rows" in told
+    trail(1)
+    assert station("audit", "verify")[0] == 0
+    assert "row 5: it is missing" in station("audit", "verify", "--anchor", lost)[1]
+    meddle("UPDATE audit SET old = NULL WHERE action = 'records.restored'")
+    assert station("audit", "verify")[0] == 1
+
+
+def test_a_backup_put_back_on_another_machine_has_a_whole_trail(trail, folder, station, tmp_path):
+    trail(3)
+    station("records", "backup", str(tmp_path / "copy"))
+    folder.rename(tmp_path / "the other machine's")
+    assert station("records", "restore", str(tmp_path / "copy"), "--by", "Ida")[0] == 0
+    code, told = station("audit", "verify")
+    assert (code, "note" in told) == (0, False)
+    assert told.startswith("OK 4 rows, the last one is 4:")
+
+
+def test_a_backup_of_a_trail_that_was_cut_says_so(trail, station, meddle, tmp_path):
+    trail(5)
+    meddle("DELETE FROM audit WHERE seq > 3")
+    code, told = station("records", "backup", str(tmp_path / "copy"))
+    assert code == 0
+    assert "note: the audit trail lacks rows that it had" in told
 
 
 def test_the_trail_goes_on_where_the_database_was_lost(trail, folder, station):

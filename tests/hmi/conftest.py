@@ -47,7 +47,24 @@ PATIENCE_S = 60.0
 ADMIN, ADMIN_PIN = "admin", "482915"
 OPERATOR, OPERATOR_PIN = "Ana", "7391"
 NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
+KEEPER = """
+import os, subprocess, sys, time
+if os.fork():
+    os._exit(0)
+tests, log, told, *command = sys.argv[1:]
+process = subprocess.Popen(command, stdout=open(log, "wb"), stderr=subprocess.STDOUT, start_new_session=True)
+with open(told + ".new", "w") as file:
+    file.write(str(process.pid))
+os.replace(told + ".new", told)
+while process.poll() is None:
+    if not os.path.exists(f"/proc/{tests}"):
+        process.terminate()
+    time.sleep(0.2)
+"""
+"""Keeps a program for these tests and ends it with them, apart from their own processes: what it starts anew while a
+test goes on is none of that test's."""
 BROWSER_ARGUMENTS = (
+    "--headless=new",
     "--no-sandbox",
     "--disable-gpu",
     "--disable-quic",
@@ -104,7 +121,7 @@ class Cell:
     console: int
     folder: Path
     file: Path
-    supervisor: subprocess.Popen[bytes]
+    supervisor: psutil.Process
     trigger_id: int = 0
     environment: dict[str, str] = field(default_factory=dict)
 
@@ -113,7 +130,7 @@ class Cell:
         return f"http://127.0.0.1:{self.configuration.hmi.port}"
 
     def twin(self, **request: Any) -> None:
-        ask_twin("127.0.0.1", self.console, request)
+        ask_twin("127.0.0.1", self.console, request, PATIENCE_S)
 
     def ask_line(self, *requests: tuple[Any, Any]) -> list[Any]:
         """What the PLC interface asks, by hand."""
@@ -144,13 +161,14 @@ class Cell:
         self.until(lambda state: state.ready)
 
     def begin(self) -> int:
-        """Trigger; gives the inspection's number once it is accepted."""
-        self.until(lambda state: state.ready)
-        self.trigger_id += 1
-        request = Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1")
-        begun = self.ask_line((request, Begun))[0]
-        assert begun.sequence is not None, (begun, self.state())
-        return begun.sequence
+        """Trigger, as often as it takes on a machine that has other work; gives the accepted inspection's number."""
+
+        def trigger() -> int | None:
+            self.until(lambda state: state.ready)
+            self.trigger_id += 1
+            return self.ask_line((Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1"), Begun))[0].sequence
+
+        return eventually(trigger)
 
     def end(self, sequence: int) -> Outcome:
         """Wait for an outcome, and take it as the PLC does."""
@@ -162,7 +180,7 @@ class Cell:
         """A process of the station."""
 
         def look() -> psutil.Process | None:
-            for child in psutil.Process(self.supervisor.pid).children(recursive=True):
+            for child in self.supervisor.children(recursive=True):
                 with contextlib.suppress(psutil.Error):
                     if f"-m station {name}" in " ".join(child.cmdline()):
                         return child
@@ -177,22 +195,25 @@ class Cell:
 
 
 @contextlib.contextmanager
-def begun(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
-    with log.open("wb") as output:
-        process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
+def begun(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[psutil.Process]:
+    told = log.with_suffix(".pid")
+    keeper = [sys.executable, "-c", KEEPER, str(os.getpid()), str(log), str(told), *command]
+    subprocess.run(keeper, env=environment, check=True, timeout=PATIENCE_S)
+    process = psutil.Process(int(eventually(lambda: told.exists() and told.read_text())))
     try:
         yield process
     finally:
-        process.terminate()
-        try:
-            process.wait(40)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        family = [process, *process.children(recursive=True)] if process.is_running() else []
+        with contextlib.suppress(psutil.Error):
+            process.terminate()
+        _, left = psutil.wait_procs(family, 40)
+        for each in left:
+            each.kill()
+        assert not left, f"had to be killed: {left}"
 
 
-def said(log: Path, words: str, process: subprocess.Popen[bytes]) -> bool:
-    assert process.poll() is None, log.read_text()
+def said(log: Path, words: str, process: psutil.Process) -> bool:
+    assert process.is_running(), log.read_text()
     return words in log.read_text()
 
 
@@ -210,6 +231,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         "hmi": {"port": hmi, "cleaning_s": 5},
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 3.0, "twin": {"port": camera}},
+        "handshake": {"station_lost_after_s": 30.0},
         "records": {"free_reserve_mb": 1},
         "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0},
     }
@@ -228,6 +250,12 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         yield Cell(configuration, console, folder, file, supervisor, environment=environment)
 
 
+@pytest.fixture(name="eventually")
+def polled() -> Callable[..., Any]:
+    """Polls until something is so."""
+    return eventually
+
+
 @pytest.fixture
 def ready(cell: Cell) -> Cell:
     """The station, ready with blueberries."""
@@ -236,19 +264,22 @@ def ready(cell: Cell) -> Cell:
 
 
 @pytest.fixture(scope="module")
-def browser(cell: Cell) -> Iterator[Browser]:
+def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One headless Chromium for the tests of a file: no other file's tests may meet Playwright's running loop."""
     path = shutil.which("chromium")
     if path is None:
         if os.environ.get("CI") == "true":
             pytest.fail("chromium is missing, and CI=true says that nothing may be", pytrace=False)
         pytest.skip("chromium is missing on this machine")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(BROWSER_ARGUMENTS))
-        with contextlib.closing(browser.new_context()) as context:  # what a browser starts for its first page stays
-            context.new_page().goto(cell.address)
-        yield browser
-        browser.close()
+    folder, port = tmp_path_factory.mktemp("browser"), free_ports(1)[0]
+    profile, log = f"--user-data-dir={folder / 'profile'}", folder / "chromium.log"
+    command = [path, *BROWSER_ARGUMENTS, profile, f"--remote-debugging-port={port}"]
+    with begun(command, log, cell.environment) as chromium:
+        eventually(lambda: said(log, "DevTools listening", chromium))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.connect_over_cdp(f"http://127.0.0.1:{port}")
+            yield browser
+            browser.close()
 
 
 @dataclass

@@ -16,7 +16,7 @@ from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
-from station.vocabulary import PackmlState, Reason
+from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
 LANGUAGES = ("en", "de", "es")
@@ -116,7 +116,7 @@ def test_an_axis_reaches_its_largest_value_with_few_round_numbers(largest):
     assert 2 <= len(ticks) <= 12
 
 
-def fruit(outcome="FAIL", areas=(1.0, 20.5, 60.0)):
+def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 60.0)) -> Fruit:
     short = FruitShort(
         sequence=7,
         outcome=outcome,
@@ -151,14 +151,16 @@ def test_a_curve_is_drawn_with_every_point_and_limit(areas):
     circles = [each for each in drawn.iter() if each.tag.endswith("circle")]
     assert len(circles) == len(areas)
     assert drawn.get("role") == "img"
-    assert "60,0" in drawn.get("aria-label")
-    assert all(0 <= float(each.get("cy")) <= charts.HEIGHT for each in circles)
+    assert "60,0" in drawn.attrib["aria-label"]
+    assert all(0 <= float(each.attrib["cy"]) <= charts.HEIGHT for each in circles)
 
 
 def test_a_trend_counts_tens():
-    many = [fruit(outcome).short for outcome in ["PASS"] * 7 + ["FAIL"] * 2 + ["NO_RESULT"] + ["PASS"] * 14]
+    outcomes: list[OutcomeName] = ["PASS", "PASS", "FAIL", "FAIL", "NO_RESULT"]
+    outcomes += [outcomes[0]] * 19
+    many = [fruit(outcome).short for outcome in outcomes]
     drawn = ET.fromstring(charts.trend(many, Wording("en")))
-    assert drawn.get("aria-label").endswith("0, 3")
+    assert drawn.attrib["aria-label"].endswith("0, 3")
     ET.fromstring(charts.sketch(()))
 
 

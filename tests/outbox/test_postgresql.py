@@ -125,6 +125,19 @@ def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):
     assert [number for (number,) in found] == [*range(1, 11)]
 
 
+def test_a_connection_that_is_cut_while_there_is_nothing_to_tell_is_noticed(server):
+    async def steps():
+        async with Postgresql(settings(server), "idle").connected() as session:
+            await session.idle(0.01)
+            server.cut()
+            await session.idle(LIMIT_S)
+
+    began_s = time.monotonic()
+    with pytest.raises(OutboxError, match="terminating connection"):
+        asyncio.run(steps())
+    assert time.monotonic() - began_s < LIMIT_S, "noticed, not waited for"
+
+
 def test_two_processes_cannot_tell_as_one_station(server):
     async def steps():
         async with Postgresql(settings(server), "one").connected():

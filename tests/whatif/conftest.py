@@ -147,13 +147,27 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tu
     return call
 
 
+_WITHOUT_WAITING = """
+from station.cli import main
+from station.whatif import runner
+if __name__ == "__main__":
+    runner.CHUNK, runner._ALONE_S = 10, 0.0
+    main()
+"""
+
+
 @pytest.fixture
 def apart(tmp_path: Path) -> Callable[..., tuple[int, str]]:
-    """Call the command line in a process of its own, for what leaves threads and helpers behind until its end."""
+    """Call the command line in a process of its own, for what leaves threads and helpers behind until its end.
+
+    Further processes take part from the second part on, however soon all would be done without them.
+    """
+    program = tmp_path / "without_waiting.py"
+    program.write_text(_WITHOUT_WAITING)
 
     def call(*arguments: object) -> tuple[int, str]:
         done = subprocess.run(
-            [sys.executable, "-m", "station", *map(str, arguments)],
+            [sys.executable, program, *map(str, arguments)],
             capture_output=True,
             text=True,
             timeout=120,

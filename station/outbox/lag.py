@@ -1,0 +1,45 @@
+"""Whether other systems are told in time, by what the outbox's process says of itself."""
+
+import time
+from pathlib import Path
+
+from station.outbox.status import DestinationStatus, outbox_folder, read_status
+from station.settings.outbox import OutboxSettings
+
+LOST_S = 30.0
+"""A process that says nothing for so long does not run."""
+
+
+class Lag:
+    """Looks at the outbox's status.
+
+    Args:
+        settings: the site's.
+        home: the station's home folder.
+    """
+
+    def __init__(self, settings: OutboxSettings, home: Path) -> None:
+        self._settings, self._folder = settings, outbox_folder(home)
+        self._enabled = settings.postgresql.enabled or settings.mqtt.enabled
+        self._began_s = time.monotonic()
+
+    def trouble(self) -> str:
+        """What is behind, in a sentence each; empty where nothing is, or where no other system is to be told."""
+        if not self._enabled:
+            return ""
+        status, now_s = read_status(self._folder), time.time()
+        silent_s = time.monotonic() - self._began_s
+        if status is not None:  # what an earlier start said is not held against this one
+            silent_s = min(silent_s, now_s - status.utc_ms / 1000)
+        if silent_s > LOST_S:
+            return f"the outbox's process has not been heard for {silent_s:.0f} s"
+        told = {} if status is None or now_s - status.utc_ms / 1000 > LOST_S else status.destinations
+        return "; ".join(text for name, each in told.items() if (text := self._of(name, each, now_s)))
+
+    def _of(self, name: str, each: DestinationStatus, now_s: float) -> str:
+        since_utc_ms = each.away_since_utc_ms if each.waiting is None else each.oldest_utc_ms
+        age_s = 0.0 if since_utc_ms is None else now_s - since_utc_ms / 1000
+        if age_s <= self._settings.alarm_after_s and (each.waiting or 0) <= self._settings.alarm_after_rows:
+            return ""
+        waiting = "it is not known how many entries wait" if each.waiting is None else f"{each.waiting} entries wait"
+        return f"{name}: {waiting}, for {age_s:.0f} s" + (f": {each.error}" if each.error else "")

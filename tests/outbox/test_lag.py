@@ -1,0 +1,118 @@
+"""The alarm for other systems that are not told in time: raised by a PostgreSQL that is away, gone when it is back."""
+
+import asyncio
+import json
+import socket
+import time
+
+import pytest
+
+from station.inspection.alarm_table import AlarmId
+from station.outbox import lag
+from station.outbox.lag import Lag
+from station.outbox.status import DestinationStatus, outbox_folder, write_status
+from station.outbox.telling import keep_telling
+from station.records.audit import AuditEntry
+from station.service.station import Station
+from station.settings.configuration import load_configuration
+
+LIMIT_S = 90.0
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def site(tmp_path):
+    """The configuration of a station that tells a PostgreSQL; nobody is at its devices' addresses."""
+
+    def make(host="/nowhere", **outbox):
+        postgresql = {"enabled": True, "host": str(host), "user": "fruit", "tls": "disable"}
+        values = {
+            "home": str(tmp_path / "home"),
+            "gripper": {"urcap": {"host": "127.0.0.1", "port": 1}},
+            "camera": {"twin": {"port": 1}},
+            "metrics": {"port": free_port()},
+            "records": {"free_reserve_mb": 1, "deadline_s": 30},
+            "service": {"bench": True},
+            "outbox": {"station": "lag", "longest_pause_s": 0.3, **outbox, "postgresql": postgresql},
+        }
+        file = tmp_path / "station.yaml"
+        file.write_text(json.dumps(values))
+        return load_configuration(file, {})
+
+    return make
+
+
+def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, site):
+    configuration = site(server.folder, alarm_after_rows=30)
+    station = Station(configuration)
+
+    async def until(holds):
+        async with asyncio.timeout(LIMIT_S):
+            while not holds():
+                await asyncio.sleep(0.05)
+
+    def told():
+        assert station.service is not None
+        return station.service.alarms.alarms.get(AlarmId.OUTBOX_BEHIND)
+
+    async def scenario():
+        started = asyncio.Event()
+        running = asyncio.create_task(station.run(lambda _port: started.set()))
+        await asyncio.wait({running, asyncio.create_task(started.wait())}, return_when=asyncio.FIRST_COMPLETED)
+        telling = asyncio.create_task(keep_telling(configuration.outbox, configuration.home))
+        try:
+            status = outbox_folder(configuration.home) / "status.json"
+            await until(lambda: status.exists() and '"connected":true' in status.read_text())
+            assert told().state == "normal"
+            await asyncio.to_thread(server.stop, "fast")
+            entries = [AuditEntry("ada", "quality", "tried", f"thing {number}") for number in range(40)]
+            assert station.service is not None
+            await station.service.ledger.records.audit(*entries)
+            await until(lambda: told().state == "unacknowledged")
+            assert "postgresql: 4" in told().detail
+            assert "entries wait, for " in told().detail
+            await asyncio.to_thread(server.start)
+            await until(lambda: told().state == "returned")
+        finally:
+            if not (server.folder / "data" / "postmaster.pid").exists():  # other tests use it too
+                await asyncio.to_thread(server.start)
+            telling.cancel()
+            station.stop()
+            await asyncio.gather(telling, running, return_exceptions=True)
+
+    asyncio.run(scenario())
+
+
+def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in_time_is_not(site):
+    configuration = site(alarm_after_s=60.0)
+    home, now_ms = configuration.home, time.time_ns() // 1_000_000
+    of = Lag(configuration.outbox, home)
+
+    def trouble(**values):
+        usual = {"connected": False, "told": 0, "refused": 0, "waiting": 0, "oldest_utc_ms": None, "error": "away"}
+        write_status(outbox_folder(home), {"postgresql": DestinationStatus(**{**usual, **values})})
+        return of.trouble()
+
+    assert of.trouble() == "", "it has just begun"
+    assert trouble(away_since_utc_ms=now_ms - 3_600_000) == "", "away, and nothing to tell"
+    assert trouble(waiting=3, oldest_utc_ms=now_ms - 30_000) == ""
+    assert "postgresql: 3 entries wait, for 9" in trouble(waiting=3, oldest_utc_ms=now_ms - 90_000)
+    unknown = trouble(waiting=None, away_since_utc_ms=now_ms - 90_000)
+    assert "it is not known how many entries wait, for 9" in unknown
+    assert unknown.endswith(": away")
+    assert trouble(waiting=3, oldest_utc_ms=now_ms + 3_600_000) == "", "the clock was set back"
+
+
+def test_a_process_that_says_nothing_any_more_is_an_alarm_too(site, monkeypatch):
+    configuration = site()
+    status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error="")
+    write_status(outbox_folder(configuration.home), {"postgresql": status})
+    of = Lag(configuration.outbox, configuration.home)
+    assert of.trouble() == ""
+    monkeypatch.setattr(lag, "LOST_S", -1.0)
+    assert of.trouble().startswith("the outbox's process has not been heard for ")
