@@ -20,8 +20,8 @@ PAGES = (
     "/recipes/strawberry/text",
     "/history",
     "/history/audit",
-    "/history/2",
-    "/history/2/step/1",
+    "/history/SOFT",
+    "/history/SOFT/step/1",
     "/maintenance",
     "/maintenance/hand",
     "/maintenance/image",
@@ -44,7 +44,7 @@ def edit(page: Page, field: str, value: str) -> None:
 @pytest.mark.parametrize("path", PAGES)
 def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, path: str) -> None:
     person = panel("Ada")
-    page = person.go(path)
+    page = person.go(path.replace("SOFT", str(orchard.soft.sequence)))
     assert page.evaluate(OVERFLOW) == 0
     found = [each for each in Axe().run(page).response["violations"] if each["impact"] in {"serious", "critical"}]
     assert not found, [(each["id"], [node["target"] for node in each["nodes"][:3]]) for each in found]
@@ -56,7 +56,7 @@ def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, pa
 @pytest.mark.parametrize("locale", ["de", "es"])
 def test_pages_speak_the_browsers_language(orchard: Any, panel: Any, locale: str) -> None:
     person = panel("", locale=locale)
-    for path in ("/recipes/strawberry/edit", "/history", "/history/2", "/maintenance"):
+    for path in ("/recipes/strawberry/edit", "/history", f"/history/{orchard.soft.sequence}", "/maintenance"):
         page = person.go(path)
         assert page.evaluate("document.documentElement.lang") == locale
         assert page.evaluate(OVERFLOW) == 0
@@ -126,7 +126,7 @@ def test_a_viewer_is_shown_recipes_and_may_not_change_them(orchard: Any, panel: 
 
 
 def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, panel: Any) -> None:
-    soft = next(outcome for outcome in orchard.fruit if outcome.reasons)
+    soft = orchard.soft
     page = panel().go("/history")
     page.get_by_label("Fruit number").fill(str(soft.sequence))
     page.get_by_role("button", name="Search").click()
@@ -142,7 +142,7 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
 
 
 def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) -> None:
-    soft = next(outcome for outcome in orchard.fruit if outcome.reasons)
+    soft = orchard.soft
     page = panel().go(f"/history?reason={soft.reasons[0]}")
     shown = {int(text) for text in page.locator(".row-number").all_inner_texts()}
     assert shown == {outcome.sequence for outcome in orchard.fruit if soft.reasons[0] in outcome.reasons}
