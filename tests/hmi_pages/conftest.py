@@ -218,7 +218,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     values = {
         "home": str(folder / "h"),
         "recipes_folder": str(quick_recipes(folder / "recipes")),
-        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 4.0, "move_margin_s": 8.0},
         "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
         "metrics": {"port": free_port()},
         "modbus": {"port": free_port()},
