@@ -1,6 +1,8 @@
 """Maintenance: health, moving by hand, the live image, the ball, the PLC's registers, the log."""
 
+import asyncio
 import re
+import time
 from collections import OrderedDict
 from typing import Annotated, Any, Literal
 
@@ -47,6 +49,7 @@ router = APIRouter(prefix="/maintenance")
 ENTRY = Entry("maintenance", "/maintenance")
 DEADLINE_S = 20.0
 MOVE_DEADLINE_S = 30.0
+MODE_S = 5.0
 _KEPT_FRAMES = 8
 _PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
 
@@ -68,9 +71,18 @@ async def health_part(hmi: HmiNow, wording: WordingNow) -> Response:
 
 
 @router.get("/hand")
-async def hand(request: Request, hmi: HmiNow) -> Response:
+async def hand(
+    request: Request,
+    hmi: HmiNow,
+    wording: WordingNow,
+    at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
+    lit: Annotated[Literal["yes"] | None, Query()] = None,
+) -> Response:
     """Moving the fingers and setting the light by hand."""
-    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done="")
+    done = wording.text("maintenance.lit") if lit else ""
+    if at_mm is not None:
+        done = wording.text("maintenance.jogged", width=wording.number(at_mm, 1))
+    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
 
 
 @router.post("/mode")
@@ -78,6 +90,11 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
     """Set manual mode, in which no fruit is taken, or production again."""
     asked = PanelOrder(person=person(caller.name, caller.role), order=OrderName.SET_MODE, argument=mode)
     shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
+    until_s = time.monotonic() + MODE_S
+    while shown.state == "executing" and time.monotonic() < until_s:
+        await asyncio.sleep(0.1)
+        if (await _health(hmi))["health"].mode == int(mode):
+            break
     if shown.state == "failed":
         raise RefusedError(shown.why)
     return go_to("/maintenance/hand")
@@ -85,9 +102,7 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
 
 @router.post("/jog")
 async def jog(
-    request: Request,
     hmi: HmiNow,
-    wording: WordingNow,
     caller: Maintainer,
     to: Annotated[Literal["open", "width", "stop"], Form()],
     width_mm: Annotated[str, Form(max_length=12)] = "",
@@ -99,25 +114,15 @@ async def jog(
     except ValueError:
         raise Problem(400, "problem.bad_form") from None
     jogged = await hmi.gateway.ask(asked, Jogged, deadline_s=MOVE_DEADLINE_S)
-    done = wording.text("maintenance.jogged", width=wording.number(jogged.width_mm, 1))
-    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
+    return go_to(f"/maintenance/hand?at_mm={jogged.width_mm:.1f}")
 
 
 @router.post("/leds")
-async def leds(
-    request: Request,
-    hmi: HmiNow,
-    wording: WordingNow,
-    caller: Maintainer,
-    red: Brightness,
-    green: Brightness,
-    blue: Brightness,
-) -> Response:
+async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
     asked = SetLeds(red=red, green=green, blue=blue, actor=_actor(caller))
     await hmi.gateway.ask(asked, Lit, deadline_s=DEADLINE_S)
-    done = wording.text("maintenance.lit")
-    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
+    return go_to("/maintenance/hand?lit=yes")
 
 
 @router.get("/image")

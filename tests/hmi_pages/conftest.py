@@ -77,6 +77,12 @@ def eventually(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:
     return value
 
 
+@pytest.fixture(scope="session", name="eventually")
+def eventually_fixture() -> Callable[..., Any]:
+    """Poll until something is so."""
+    return eventually
+
+
 def quick_recipes(folder: Path) -> Path:
     """The shipped recipes, comments and all, with few, hasty steps."""
     folder.mkdir()
@@ -218,7 +224,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     values = {
         "home": str(folder / "h"),
         "recipes_folder": str(quick_recipes(folder / "recipes")),
-        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 4.0, "move_margin_s": 8.0},
+        "gripper": {
+            "urcap": {"host": host},
+            "modbus_rtu": {"host": host},
+            "answer_timeout_s": 4.0,
+            "move_margin_s": 8.0,
+        },
         "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
         "metrics": {"port": free_port()},
         "modbus": {"port": free_port()},
