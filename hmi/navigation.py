@@ -12,8 +12,13 @@ PAGES = (
     "hmi.pages.frame",
     "hmi.pages.run",
     "hmi.pages.change",
+    "hmi.pages.recipes",
+    "hmi.pages.history",
     "hmi.pages.alarms",
+    "hmi.pages.maintenance",
     "hmi.pages.people",
+    "hmi.pages.jobs",
+    "hmi.api",
 )
 """Modules with `router`; where they have them, `ENTRY`, their place in the navigation, and `PARTS`."""
 

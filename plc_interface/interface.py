@@ -20,6 +20,7 @@ from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.statistics import Statistics
 from plc_interface.register_map import BY_NAME
+from plc_interface.register_telling import registers_told
 from plc_interface.station_link import StationLink, now
 from station.channel.line import Line
 from station.settings.plc import HandshakeSettings
@@ -150,7 +151,10 @@ class Interface:
     def _line(self) -> Line:
         faults = (*((self._journal.trouble,) if self._journal.trouble else ()), *self._output.faults)
         counters = {**self._server_counts(), **self._output.counters}
-        return line(self._state, counters, faults)
+        told, station = line(self._state, counters, faults), self._state.station
+        if station is None or not station.registers_wanted:
+            return told
+        return told.model_copy(update={"registers": registers_told(self._image.value)})
 
     def _wake_when_due(self) -> None:
         if self._timer is not None:

@@ -22,6 +22,7 @@ class Entry(NamedTuple):
 COMMANDS = {
     "alarms": Entry("station.commands.alarms:alarms", "See, acknowledge and shelve the station's alarms."),
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
+    "api-token": Entry("hmi.api_command:api_token", "Make and withdraw tokens for the HTTP API."),
     "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
     "demo": Entry("station.commands.demo:demo", "Run the station against a simulated world and line."),

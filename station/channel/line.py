@@ -116,6 +116,19 @@ class Open(Message):
     """Ended and not acknowledged, in order of sequence."""
 
 
+class RegisterTold(Message):
+    """One register of the PLC's by its name, for a person."""
+
+    name: str
+    address: int
+    value: str
+    """With a code's name, or the names of the set bits, beside the number."""
+    unit: str
+    writable: bool
+    """By the PLC."""
+    meaning: str
+
+
 class Line(Message):
     """The line as the interface sees it, told with every beat, for the station's alarms, metrics and pages."""
 
@@ -130,6 +143,8 @@ class Line(Message):
     """By name, as in the register map."""
     faults: tuple[str, ...]
     """Of the interface and the CAN node, one sentence each."""
+    registers: tuple[RegisterTold, ...] = ()
+    """In the order of their addresses; only where the station asked for them, once."""
 
 
 PACKML_STATE_NUMBERS = {state: number for number, state in enumerate(PackmlState, start=1)}
@@ -158,6 +173,8 @@ class StationState(Message):
     alarms: int = Field(ge=0, lt=2**32)
     """Bit n is set while the alarm with number n + 1 is active."""
     simulated: bool
+    registers_wanted: bool = False
+    """A person wants to see the PLC's registers: the next beat is to bring them."""
 
 
 class Command(Message):

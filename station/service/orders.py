@@ -5,7 +5,7 @@ import logging
 import time
 from typing import Any
 
-from station.channel.line import Command, CommandDone, CommandName, Line
+from station.channel.line import Command, CommandDone, CommandName, Line, RegisterTold
 from station.channel.panel import Recover
 from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
@@ -49,6 +49,11 @@ class Orders:
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
+        self.kept_manual = ""
+        """What a person does at the panel that needs the mode to stay as it is; empty for nothing."""
+        self.registers_wanted = False
+        """The PLC interface is to tell its registers with the next beat."""
+        self._registers: tuple[tuple[RegisterTold, ...], float] = ((), 0.0)
         self._line: Line | None = None
         self._line_at_s: float | None = None
         self._turn = asyncio.Lock()
@@ -70,10 +75,17 @@ class Orders:
             line: as it came.
         """
         self._line, self._line_at_s = line, time.monotonic()
+        if line.registers:
+            self._registers, self.registers_wanted = (line.registers, time.monotonic()), False
         self._metrics.heard("plc_interface")
         self._metrics.waiting(line.waiting)
         if line.plc_alive:
             self._metrics.heard("plc")
+
+    @property
+    def registers(self) -> tuple[tuple[RegisterTold, ...], float]:
+        """The PLC's registers as they were told last, and the monotonic time of that; none and 0 before the first."""
+        return self._registers
 
     def line_trouble(self) -> str:
         """What is wrong with the line, as far as is known; empty where nothing is."""
@@ -143,13 +155,18 @@ class Orders:
             case CommandName.CALL_OFF:
                 return await self._call_off()
             case CommandName.SET_MODE:
-                if command.argument not in MODES:
-                    return f"mode {command.argument}: expected 1 (production), 2 (maintenance) or 3 (manual)"
-                self.mode = command.argument
-                return ""
+                return self._set_mode(command.argument)
             case CommandName.CLEAR_ALARMS:
                 self._service.alarms.acknowledge_returned()
                 return ""
+
+    def _set_mode(self, mode: int) -> str:
+        if mode not in MODES:
+            return f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)"
+        if self.kept_manual and mode != self.mode:
+            return f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there"
+        self.mode = mode
+        return ""
 
     async def _change_recipe(self, number: int) -> str:
         await asyncio.to_thread(self._book.read)

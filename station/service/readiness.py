@@ -89,6 +89,7 @@ class Gate:
             error_code=service.alarms.alarms.error_code,
             alarms=service.alarms.alarms.word,
             simulated=self._crew.simulated,
+            registers_wanted=self._orders.registers_wanted,
         )
 
     def _packml(self) -> PackmlState | None:

@@ -29,6 +29,7 @@ from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
 from station.service.orders import Orders
 from station.service.panel import Panel
+from station.service.panel_rooms import PanelRooms
 from station.service.readiness import Gate
 from station.service.recipe_book import RecipeBook
 from station.service.reference import Golden
@@ -151,23 +152,31 @@ class Station:
             alarm_orders,
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
-        self._serve(stack, panel)
-        address = configuration.metrics
-        health = HealthServer(address.host, address.port, metrics, liveness, gate.readiness, versions)
+        rooms = PanelRooms(configuration, records, service, crew, orders, gate, liveness, calibrated, trail, versions)
+        self._serve(stack, panel, rooms)
+        health = HealthServer(
+            configuration.metrics.host, configuration.metrics.port, metrics, liveness, gate.readiness, versions
+        )
         port = await health.start()
         stack.push_async_callback(health.close)
-        stack.push_async_callback(crew.close)
-        await crew.open()
+        await self._open_devices(stack, crew, rooms)
         tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.keep(records), "alarms' records")
         self._begin(stack, trail.keep(), "audit trail")
         self._watch_progress(stack, liveness, (*crew.watches, CYCLE, UPKEEP))
         return tuple(tasks), port
 
-    def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel) -> None:
+    @staticmethod
+    async def _open_devices(stack: contextlib.AsyncExitStack, crew: Crew, rooms: PanelRooms) -> None:
+        """What a person moves at the panel ends before the devices are let go."""
+        stack.push_async_callback(crew.close)
+        await stack.enter_async_context(rooms)
+        await crew.open()
+
+    def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel, rooms: PanelRooms) -> None:
         stack.push_async_callback(panel.close)
         endpoint = _made_room_for(panel_endpoint(self._configuration.hmi, self._configuration.home))
-        self._begin(stack, ChannelServer(endpoint, panel.handlers).serve(), "panel server")
+        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **rooms.handlers}).serve(), "panel server")
 
     def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
         for name in names:

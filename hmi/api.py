@@ -1,0 +1,187 @@
+"""The HTTP API for a plant's own systems: results, recipes, lots, health. Described at `/api/openapi.json`."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, HTTPException, Path, Query
+
+from hmi.access import HmiNow
+from hmi.api_access import changer, reader
+from hmi.api_model import (
+    Error,
+    HealthAnswer,
+    InspectionList,
+    InspectionShort,
+    InspectionWhole,
+    LotAnswer,
+    LotBegin,
+    LotList,
+    LotName,
+    Part,
+    RecipeList,
+    RecipeShort,
+    RecipeWhole,
+)
+from hmi.roles import Right
+from station.channel.messages import RefusedError
+from station.channel.panel_maintenance_queries import GetHealth, Health
+from station.channel.panel_queries import (
+    Actor,
+    EndLot,
+    FindInspections,
+    GetInspection,
+    InspectionPage,
+    InspectionTold,
+    ListLots,
+    Lots,
+    LotTold,
+    Search,
+    StartLot,
+)
+from station.channel.panel_recipe_queries import GetRecipe, ListRecipes, RecipeRow, Recipes, RecipeTold
+from station.vocabulary import OutcomeName, Reason
+
+IN_SCHEMA = True
+DEADLINE_S = 20.0
+_TEXT = {"text/plain": {"schema": {"type": "string"}}}
+_REFUSED: dict[int | str, dict[str, Any]] = {
+    401: {"model": Error, "description": "Neither a known token nor a person who is logged in."},
+    403: {"model": Error, "description": "Forbidden, or sent by a foreign page.", "content": _TEXT},
+    409: {"model": Error, "description": "The station refused; its words are the detail."},
+    413: {"description": "The request is too large.", "content": _TEXT},
+    421: {"description": "The request is for a name that is not this station's.", "content": _TEXT},
+    503: {"model": Error, "description": "The station gave no answer in time."},
+}
+_NOT_FOUND: dict[int | str, dict[str, Any]] = {404: {"model": Error, "description": "There is none."}}
+
+router = APIRouter(prefix="/api/v1", responses=_REFUSED)
+Reader = Annotated[Actor, Depends(reader)]
+LotChanger = Annotated[Actor, Depends(changer(Right.RUN))]
+Text = Annotated[str, Query(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+RecipeName = Annotated[str, Path(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Sequence = Annotated[int, Path(ge=1, lt=2**32)]
+EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
+
+
+@router.get("/health", tags=["health"])
+async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
+    """Whether the station takes fruit, and how its parts do."""
+    told = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
+    return HealthAnswer(
+        ready=told.ready,
+        why=told.why,
+        mode=told.mode,
+        simulated=told.simulated,
+        parts=[Part(**part.model_dump()) for part in told.parts],
+        versions=told.versions,
+    )
+
+
+@router.get("/inspections", tags=["results"])
+async def inspections(
+    hmi: HmiNow,
+    _: Reader,
+    lot: Annotated[str | None, Query(max_length=32, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")] = None,
+    grower: Text | None = None,
+    fruit: Text | None = None,
+    outcome: OutcomeName | None = None,
+    reason: Reason | None = None,
+    begun_from: Annotated[datetime | None, Query(alias="from", description="Begun then or later.")] = None,
+    begun_to: Annotated[datetime | None, Query(alias="to", description="Begun before then.")] = None,
+    limit: Annotated[int, Query(ge=1, le=100)] = 50,
+    below: Annotated[int | None, Query(ge=1, le=2**32, description="From the page before.")] = None,
+) -> InspectionList:
+    """Inspections, newest first, a page at a time; all conditions given have to hold."""
+    search = Search(
+        lot=lot,
+        grower=grower,
+        fruit=fruit,
+        outcome=outcome,
+        reason=reason,
+        from_utc_ms=_utc_ms(begun_from),
+        to_utc_ms=_utc_ms(begun_to),
+    )
+    asked = FindInspections(search=search, limit=limit, below=below)
+    page = await hmi.gateway.ask(asked, InspectionPage, deadline_s=DEADLINE_S)
+    return InspectionList(inspections=[InspectionShort.of(row) for row in page.rows], below=page.below)
+
+
+@router.get("/inspections/{sequence}", tags=["results"], responses=_NOT_FOUND)
+async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionWhole:
+    """One inspection with its curve."""
+    try:
+        told = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
+    except RefusedError as error:
+        raise HTTPException(404, str(error)) from error
+    return InspectionWhole.of(told)
+
+
+@router.get("/recipes", tags=["recipes"])
+async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
+    """How all recipes stand."""
+    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return RecipeList(recipes=[RecipeShort(**_short(row)) for row in told.rows])
+
+
+@router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
+async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
+    """One recipe, with the values that are in force."""
+    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    row = next((each for each in told.rows if each.name == name), None)
+    if row is None:
+        raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
+    values = None
+    if row.in_force is not None:
+        asked = GetRecipe(name=name, revision=row.in_force)
+        values = (await hmi.gateway.ask(asked, RecipeTold, deadline_s=DEADLINE_S)).values
+    return RecipeWhole(**_short(row), values=values)
+
+
+@router.get("/lots", tags=["lots"])
+async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
+    """The last lots told of."""
+    told = await hmi.gateway.ask(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
+    return LotList(lots=[LotAnswer.of(each) for each in told.lots])
+
+
+@router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
+async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
+    """One lot."""
+    told = await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
+    if not told.lots:
+        raise HTTPException(404, f"nobody told of a lot {name}")
+    return LotAnswer.of(told.lots[0])
+
+
+@router.put("/lots/{name}", tags=["lots"])
+async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
+    """Tell of a lot's begin, by the name that the PLC gives with each trigger. Idempotent."""
+    asked = StartLot(name=name, grower=begin.grower, actor=actor)
+    return LotAnswer.of(await hmi.gateway.ask(asked, LotTold, deadline_s=DEADLINE_S))
+
+
+@router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
+async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
+    """Tell of a lot's end. Idempotent."""
+    if not (await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
+        raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
+    asked = EndLot(name=name, actor=actor)
+    return LotAnswer.of(await hmi.gateway.ask(asked, LotTold, deadline_s=DEADLINE_S))
+
+
+def _short(row: RecipeRow) -> dict[str, Any]:
+    return {
+        "name": row.name,
+        "title": row.title,
+        "plc_number": row.plc_number,
+        "revision": row.in_force,
+        "waiting": row.waiting,
+    }
+
+
+def _utc_ms(at: datetime | None) -> int | None:
+    """Without an offset it is UTC."""
+    if at is None:
+        return None
+    known = at if at.tzinfo else at.replace(tzinfo=UTC)
+    return round(1000 * min(max(known, EARLIEST), LATEST).timestamp())

@@ -1,0 +1,226 @@
+"""What the HTTP API takes and gives. Times are UTC; a field that has nothing to tell is null."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from station.channel.panel_queries import InspectionRow, InspectionTold, LotTold
+from station.vocabulary import OutcomeName
+
+LotName = Annotated[str, Field(min_length=1, max_length=32, pattern=r"^[ -~]*[!-~][ -~]*$")]
+"""Printable ASCII, as in the PLC's registers."""
+Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+
+
+class Model(BaseModel):
+    """The base: nothing unknown is taken."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Error(Model):
+    """Why a request was refused."""
+
+    detail: str = Field(description="One sentence, with what to do.")
+
+
+class Part(Model):
+    """One thing that inspecting needs."""
+
+    name: str
+    state: Literal["ok", "degraded", "fault", "unknown"]
+    age_s: float | None = Field(description="Since it was last heard.")
+    detail: str
+    remedy: str
+
+
+class HealthAnswer(Model):
+    """Whether the station takes fruit, and how its parts do."""
+
+    ready: bool = Field(description="A trigger would be accepted now.")
+    why: str = Field(description="Why not, with the remedy; empty where ready.")
+    mode: int = Field(description="PackML: 1 production, 2 maintenance, 3 manual.")
+    simulated: bool
+    parts: list[Part]
+    versions: dict[str, str]
+
+
+class InspectionShort(Model):
+    """One inspection in a list."""
+
+    sequence: int = Field(description="The inspection's number; never given twice.")
+    trigger_id: int
+    began: datetime
+    duration_s: float | None
+    lot: str
+    grower: str
+    fruit: str = Field(description="The recipe's name.")
+    outcome: OutcomeName | None = Field(description="Null while it runs.")
+    reasons: list[str] = Field(description="The first one decided; empty only for PASS.")
+
+    @classmethod
+    def of(cls, row: InspectionRow) -> "InspectionShort":
+        """From the station's answer.
+
+        Args:
+            row: of the answer.
+        """
+        return cls(
+            sequence=row.sequence,
+            trigger_id=row.trigger_id,
+            began=moment(row.began_utc_ms),
+            duration_s=None if row.duration_ms is None else row.duration_ms / 1000,
+            lot=row.lot,
+            grower=row.grower,
+            fruit=row.fruit,
+            outcome=row.outcome,
+            reasons=list(row.reasons),
+        )
+
+
+class InspectionList(Model):
+    """Newest first."""
+
+    inspections: list[InspectionShort]
+    below: int | None = Field(description="Ask with it for the next page; null where this is the last.")
+
+
+class Point(Model):
+    """One width step."""
+
+    step: int
+    width_mm: float
+    closing_mm: float | None
+    area_mm2: float | None
+    area_px: int | None
+    confidence: float | None
+    flags: list[str]
+
+
+class InspectionWhole(Model):
+    """One inspection."""
+
+    sequence: int
+    trigger_id: int
+    encoder: int
+    began: datetime
+    ended: datetime | None
+    duration_s: float | None
+    lot: str
+    simulated: bool = Field(description="A twin's device took part.")
+    outcome: OutcomeName | None = Field(description="What the PLC was told, or is to be told; null while it runs.")
+    reasons: list[str]
+    explanation: list[str]
+    late: bool | None
+    partial: bool | None
+    area_mm2: float | None = Field(description="The contact area that decided.")
+    closing_mm: float | None = Field(description="Where it was measured.")
+    confidence: float | None
+    recipe: str
+    recipe_revision: str
+    recipe_sha256: str
+    curve: list[Point]
+    devices: dict[str, str]
+    versions: dict[str, str]
+    images: list[str] = Field(description="SHA-256 of those kept.")
+    published: datetime | None = Field(description="When the PLC was told.")
+    acknowledged: datetime | None = Field(description="When the PLC took it.")
+
+    @classmethod
+    def of(cls, told: InspectionTold) -> "InspectionWhole":
+        """From the station's answer.
+
+        Args:
+            told: the answer.
+        """
+        standing = told.standing
+        return cls(
+            sequence=told.sequence,
+            trigger_id=told.trigger_id,
+            encoder=told.encoder,
+            began=moment(told.began_utc_ms),
+            ended=None if standing is None else moment(standing.ended_utc_ms),
+            duration_s=None if standing is None else standing.duration_ms / 1000,
+            lot=told.lot,
+            simulated=told.simulated,
+            outcome=None if standing is None else standing.outcome,
+            reasons=[name for name, _ in told.reasons],
+            explanation=list(told.explanation),
+            late=None if standing is None else standing.late,
+            partial=None if standing is None else standing.partial,
+            area_mm2=None if standing is None else standing.area_mm2,
+            closing_mm=None if standing is None else standing.closing_mm,
+            confidence=None if standing is None else standing.confidence,
+            recipe=told.recipe_name,
+            recipe_revision=told.recipe_revision,
+            recipe_sha256=told.recipe_sha256,
+            curve=[Point(**{**point.model_dump(), "flags": list(point.flags)}) for point in told.curve],
+            devices=told.devices,
+            versions=told.versions,
+            images=[image.sha256 for image in told.images if image.there],
+            published=None if told.published_utc_ms is None else moment(told.published_utc_ms),
+            acknowledged=None if told.acknowledged_utc_ms is None else moment(told.acknowledged_utc_ms),
+        )
+
+
+class RecipeShort(Model):
+    """How one recipe stands."""
+
+    name: str
+    title: str
+    plc_number: int | None
+    revision: int | None = Field(description="The approved one, by which fruit is inspected; null for none.")
+    waiting: int | None = Field(description="The draft that waits for approval.")
+
+
+class RecipeList(Model):
+    """By name."""
+
+    recipes: list[RecipeShort]
+
+
+class RecipeWhole(RecipeShort):
+    """A recipe in force, with its values."""
+
+    values: dict[str, Any] | None = Field(description="As its JSON Schema has them; null where none is in force.")
+
+
+class LotAnswer(Model):
+    """One lot."""
+
+    name: str
+    grower: str
+    began: datetime
+    ended: datetime | None = Field(description="Null while it runs.")
+
+    @classmethod
+    def of(cls, told: LotTold) -> "LotAnswer":
+        """From the station's answer.
+
+        Args:
+            told: the answer.
+        """
+        ended = None if told.ended_utc_ms is None else moment(told.ended_utc_ms)
+        return cls(name=told.name, grower=told.grower, began=moment(told.began_utc_ms), ended=ended)
+
+
+class LotList(Model):
+    """Newest first."""
+
+    lots: list[LotAnswer]
+
+
+class LotBegin(Model):
+    """What is told of a lot when it begins."""
+
+    grower: Grower = Field(description="Whose fruit it is.")
+
+
+def moment(utc_ms: int) -> datetime:
+    """A time of the station's.
+
+    Args:
+        utc_ms: since 1970.
+    """
+    return datetime.fromtimestamp(utc_ms / 1000, UTC)

@@ -1,0 +1,271 @@
+"""History: inspections found, one opened with every step's images and stages, files of many, the audit trail."""
+
+from collections import OrderedDict
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Form, Query, Request
+from pydantic import StringConstraints, ValidationError
+from starlette.responses import Response
+
+from hmi.access import GenuineCaller, HmiNow, caller_of
+from hmi.context import Hmi
+from hmi.limit_chart import Curve, Limit, area_chart, spark
+from hmi.navigation import Entry
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from hmi.sessions import Caller
+from station.channel.panel_queries import (
+    Actor,
+    AuditRows,
+    FindInspections,
+    GetImage,
+    GetInspection,
+    GetStages,
+    InspectionPage,
+    InspectionTold,
+    JobTold,
+    Picture,
+    ReadAudit,
+    Search,
+    Stages,
+    StartExport,
+    StartLotReport,
+)
+from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.vocabulary import Reason
+
+router = APIRouter(prefix="/history")
+ENTRY = Entry("history", "/history")
+DEADLINE_S = 20.0
+PAGE = 20
+_KEPT_STAGES = 3
+_FOR_EVER = {"cache-control": "private, max-age=31536000, immutable"}
+
+Words = Annotated[str, Query(max_length=64)]
+
+
+def search_of(
+    lot: str, grower: str, fruit: str, outcome: str, reason: str, begun_from: str, begun_to: str
+) -> Search | None:
+    """A search as it was typed; None where a value is none.
+
+    Args:
+        lot: its name; empty for all, as with the others.
+        grower: whose.
+        fruit: the recipe's name.
+        outcome: PASS, FAIL or NO_RESULT.
+        reason: as `station.vocabulary.Reason` has it.
+        begun_from: local date and time, as a browser gives it.
+        begun_to: likewise.
+    """
+    try:
+        return Search(
+            lot=lot or None,
+            grower=grower or None,
+            fruit=fruit or None,
+            outcome=outcome or None,  # type: ignore[arg-type] (checked by the model)
+            reason=Reason(reason) if reason else None,
+            from_utc_ms=_utc_ms(begun_from),
+            to_utc_ms=_utc_ms(begun_to),
+        )
+    except (ValueError, ValidationError, OverflowError):
+        return None
+
+
+@router.get("")
+async def search(
+    request: Request,
+    hmi: HmiNow,
+    lot: Words = "",
+    grower: Words = "",
+    fruit: Words = "",
+    outcome: Words = "",
+    reason: Words = "",
+    begun_from: Annotated[str, Query(alias="from", max_length=32)] = "",
+    begun_to: Annotated[str, Query(alias="to", max_length=32)] = "",
+    number: Annotated[str, Query(max_length=12)] = "",
+    below: Annotated[int | None, Query(ge=1, le=2**32)] = None,
+) -> Response:
+    """A page of what is found; with a fruit's number, that fruit."""
+    if number.strip().isascii() and number.strip().isdigit() and 0 < int(number) < 2**32:
+        return go_to(f"/history/{int(number)}")
+    asked = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
+    wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
+    found = InspectionPage(rows=(), below=None)
+    if wanted is not None:
+        find = FindInspections(search=wanted, limit=PAGE, below=below)
+        found = await hmi.gateway.ask(find, InspectionPage, deadline_s=DEADLINE_S)
+    recipes = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return show(
+        request,
+        "history.html.j2",
+        status=200 if wanted is not None else 400,
+        asked={**asked, "from": begun_from, "to": begun_to},
+        bad=wanted is None,
+        found=found,
+        below=below,
+        recipes=recipes.rows,
+        reasons=tuple(Reason),
+        spark=spark,
+        may_export=bool(caller_of(request).name),
+    )
+
+
+@router.post("/export")
+async def export(
+    hmi: HmiNow,
+    caller: GenuineCaller,
+    form: Annotated[Literal["csv", "parquet"], Form()],
+    lot: Annotated[str, Form(max_length=64)] = "",
+    grower: Annotated[str, Form(max_length=64)] = "",
+    outcome: Annotated[str, Form(max_length=64)] = "",
+    reason: Annotated[str, Form(max_length=64)] = "",
+    begun_from: Annotated[str, Form(alias="from", max_length=32)] = "",
+    begun_to: Annotated[str, Form(alias="to", max_length=32)] = "",
+) -> Response:
+    """Write what the search finds as a table."""
+    wanted = search_of(lot, grower, "", outcome, reason, begun_from, begun_to)
+    if wanted is None:
+        raise Problem(400, "problem.bad_form")
+    asked = StartExport(search=wanted, form=form, actor=_actor(caller))
+    job = await hmi.gateway.ask(asked, JobTold, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job.job}?back=/history")
+
+
+@router.post("/report")
+async def report(
+    hmi: HmiNow,
+    caller: GenuineCaller,
+    lot: Annotated[str, Form(max_length=32)],
+    form: Annotated[Literal["html", "pdf"], Form()],
+) -> Response:
+    """Write a lot's report."""
+    asked = StartLotReport(lot=lot, form=form, actor=_actor(caller))
+    job = await hmi.gateway.ask(asked, JobTold, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job.job}?back=/history")
+
+
+@router.get("/audit")
+async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
+    """The last rows of the trail."""
+    asked = ReadAudit(limit=100, action=action, subject=subject)
+    told = await hmi.gateway.ask(asked, AuditRows, deadline_s=DEADLINE_S)
+    return show(request, "history_audit.html.j2", rows=told.rows, action=action, subject=subject)
+
+
+@router.get("/image/{sha256}.png")
+async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
+    """A stored image; its address is its content, so that it is fetched once."""
+    told = await hmi.gateway.ask(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
+    return Response(told.data, media_type=told.media_type, headers=_FOR_EVER)
+
+
+@router.get("/{sequence}")
+async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
+    """One inspection whole."""
+    told = await _inspection(hmi, sequence)
+    return show(
+        request,
+        "inspection.html.j2",
+        told=told,
+        drawn=_drawn(told),
+        steps=_steps(told),
+        reference=next((each for each in told.images if each.kind == "reference" and each.there), None),
+    )
+
+
+@router.get("/{sequence}/step/{step}")
+async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Response:
+    """One step: its image, its mask, and the stages of its measurement."""
+    told = await _inspection(hmi, sequence)
+    steps = _steps(told)
+    found = next((each for each in steps if each["point"].step == step), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+    stages = None
+    if found["image"] and any(each.kind == "reference" and each.there for each in told.images):
+        stages = await _stages(hmi, sequence, step)
+    return show(
+        request,
+        "inspection_step.html.j2",
+        told=told,
+        step=found,
+        stages=stages,
+        before=step - 1 if any(each["point"].step == step - 1 for each in steps) else None,
+        after=step + 1 if any(each["point"].step == step + 1 for each in steps) else None,
+    )
+
+
+@router.get("/{sequence}/step/{step}/stage/{place}.jpg")
+async def stage(hmi: HmiNow, sequence: int, step: int, place: int) -> Response:
+    """One stage's picture."""
+    stages = await _stages(hmi, sequence, step)
+    if not 0 <= place < len(stages.pictures):
+        raise Problem(404, "problem.not_found")
+    picture = stages.pictures[place][1]
+    return Response(picture.data, media_type=picture.media_type)
+
+
+_STAGES: OrderedDict[tuple[int, int], Stages] = OrderedDict()
+"""The last steps' stages: a page asks for their pictures one by one."""
+
+
+async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
+    known = _STAGES.get((sequence, step))
+    if known is not None:
+        return known
+    if not (0 < sequence < 2**32 and 0 <= step <= 1000):
+        raise Problem(404, "problem.not_found")
+    told = await hmi.gateway.ask(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
+    _STAGES[sequence, step] = told
+    while len(_STAGES) > _KEPT_STAGES:
+        _STAGES.popitem(last=False)
+    return told
+
+
+async def _inspection(hmi: Hmi, sequence: int) -> InspectionTold:
+    if not 0 < sequence < 2**32:
+        raise Problem(404, "problem.not_found")
+    return await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
+
+
+def _steps(told: InspectionTold) -> list[dict[str, Any]]:
+    """Every point of the curve, with its image and mask where they are kept."""
+    kept = {(each.kind, each.step): each for each in told.images if each.there}
+    return [
+        {"point": point, "image": kept.get(("step", point.step)), "mask": kept.get(("mask", point.step))}
+        for point in told.curve
+    ]
+
+
+def _drawn(told: InspectionTold) -> dict[str, Any] | None:
+    """The curve with the limits of the recipe as it was."""
+    points = [
+        (point.closing_mm, point.area_mm2)
+        for point in told.curve
+        if point.closing_mm is not None and point.area_mm2 is not None and point.closing_mm >= 0
+    ]
+    if told.recipe is None:
+        return None
+    limits, early = [], None
+    try:
+        limits = [
+            Limit(each["closing_mm"], each["area_mm2"], each.get("least_area_mm2", 0.0))
+            for each in told.recipe["damage"]["area"]
+        ]
+        early = told.recipe["early_stop"]["area_mm2"]
+    except (KeyError, TypeError):  # of a form that this program does not know
+        pass
+    return {"area": area_chart([Curve("own", points)], limits, early)}
+
+
+def _utc_ms(text: str) -> int | None:
+    """A browser's local date and time, in the machine's zone."""
+    return round(1000 * datetime.fromisoformat(text).astimezone().timestamp()) if text else None
+
+
+def _actor(caller: Caller) -> Actor:
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+    return Actor(who=caller.name, role=caller.role)

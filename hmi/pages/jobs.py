@@ -1,0 +1,90 @@
+"""What takes long and is waited for: exports, reports and what-ifs, with their progress and their files."""
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request
+from pydantic import StringConstraints
+from starlette.responses import Response, StreamingResponse
+
+from hmi.access import GenuineCaller, HmiNow, WordingNow, caller_of
+from hmi.context import Hmi
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from station.channel.panel_queries import AskJob, Chunk, EndJob, JobTold, ReadJobFile
+
+router = APIRouter(prefix="/jobs")
+DEADLINE_S = 20.0
+SHOWN_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+"""For a document that a job has written: it runs nothing, and fetches nothing."""
+
+JobId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
+FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
+Back = Annotated[str, Query(max_length=200, pattern=r"^/([A-Za-z0-9_][A-Za-z0-9_/-]*)?$")]
+
+
+async def somebody(request: Request) -> None:
+    """Files are for those who are logged in: an export is all that the station knows."""
+    if not caller_of(request).name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+
+
+@router.get("/{job}")
+async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
+    """How it does."""
+    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    return show(request, "job.html.j2", job=told, back=back)
+
+
+@router.get("/{job}/part")
+async def part(hmi: HmiNow, wording: WordingNow, job: JobId) -> Response:
+    """The same as a part of the page, to be asked for again and again."""
+    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    html = hmi.renderer.render("job_part.html.j2", wording, {"job": told})
+    return Response(
+        html, media_type="text/html", headers={"x-over": "" if told.state in {"waiting", "running"} else "1"}
+    )
+
+
+@router.post("/{job}/end")
+async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
+    """Call it off."""
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+    await hmi.gateway.ask(EndJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job}")
+
+
+@router.get("/{job}/file/{name}", dependencies=[Depends(somebody)])
+async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
+    """One of its files, to be kept."""
+    return await _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
+
+
+@router.get("/{job}/show/{name}", dependencies=[Depends(somebody)])
+async def shown(hmi: HmiNow, job: JobId, name: FileName) -> Response:
+    """One of its documents, to be looked at or printed."""
+    if not name.endswith((".html", ".pdf")):
+        raise Problem(404, "problem.not_found")
+    return await _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
+
+
+async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
+    """Piece by piece, each fetched when the one before was taken."""
+    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    found = next((each for each in told.files if each.name == name), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+
+    async def pieces() -> AsyncIterator[bytes]:
+        offset = 0
+        while offset < found.size_bytes:
+            asked = ReadJobFile(job=job, name=name, offset=offset)
+            chunk = await hmi.gateway.ask(asked, Chunk, deadline_s=DEADLINE_S)
+            if not chunk.data:
+                raise Problem(409, "problem.refused")
+            offset += len(chunk.data)
+            yield chunk.data
+
+    length = {"content-length": str(found.size_bytes)}
+    return StreamingResponse(pieces(), media_type=found.media_type, headers={**headers, **length})

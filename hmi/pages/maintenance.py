@@ -1,0 +1,265 @@
+"""Maintenance: health, moving by hand, the live image, the ball, the PLC's registers, the log."""
+
+import asyncio
+import re
+import time
+from collections import OrderedDict
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Form, Query, Request
+from pydantic import StringConstraints
+from starlette.responses import Response
+
+from hmi.access import HmiNow, WordingNow, orders
+from hmi.context import Hmi
+from hmi.gateway import person
+from hmi.limit_chart import histogram
+from hmi.navigation import Entry
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from hmi.roles import Right
+from hmi.sessions import Caller
+from hmi.words import Wording
+from station.channel.messages import ChannelError, RefusedError
+from station.channel.panel_live import OrderName, OrderShown, PanelOrder
+from station.channel.panel_maintenance_queries import (
+    BallRunTold,
+    BeginBallRun,
+    CalibrationState,
+    EndBallRun,
+    GetCalibration,
+    GetCalibrationPicture,
+    GetHealth,
+    GetLiveImage,
+    GetRegisters,
+    GoOnBallRun,
+    Health,
+    Jogged,
+    JogGripper,
+    Lit,
+    LiveImage,
+    Log,
+    ReadLog,
+    Registers,
+    SetLeds,
+)
+from station.channel.panel_queries import Actor, Picture
+
+router = APIRouter(prefix="/maintenance")
+ENTRY = Entry("maintenance", "/maintenance")
+DEADLINE_S = 20.0
+MOVE_DEADLINE_S = 30.0
+MODE_S = 5.0
+_KEPT_FRAMES = 8
+_PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
+
+Maintainer = Annotated[Caller, Depends(orders(Right.MAINTAIN))]
+Level = Literal["DEBUG", "INFO", "WARNING", "ERROR"]
+Brightness = Annotated[int, Form(ge=0, le=15)]
+
+
+@router.get("")
+async def health(request: Request, hmi: HmiNow) -> Response:
+    """How everything does."""
+    return show(request, "maintenance.html.j2", tab="health", **await _health(hmi))
+
+
+@router.get("/health/part")
+async def health_part(hmi: HmiNow, wording: WordingNow) -> Response:
+    """The same, to be asked for again and again."""
+    return await _part(hmi, wording, "maintenance_health.html.j2", await _health(hmi))
+
+
+@router.get("/hand")
+async def hand(
+    request: Request,
+    hmi: HmiNow,
+    wording: WordingNow,
+    at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
+    lit: Annotated[Literal["yes"] | None, Query()] = None,
+) -> Response:
+    """Moving the fingers and setting the light by hand."""
+    done = wording.text("maintenance.lit") if lit else ""
+    if at_mm is not None:
+        done = wording.text("maintenance.jogged", width=wording.number(at_mm, 1))
+    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
+
+
+@router.post("/mode")
+async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
+    """Set manual mode, in which no fruit is taken, or production again."""
+    asked = PanelOrder(person=person(caller.name, caller.role), order=OrderName.SET_MODE, argument=mode)
+    shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
+    until_s = time.monotonic() + MODE_S
+    while shown.state == "executing" and time.monotonic() < until_s:
+        await asyncio.sleep(0.1)
+        if (await _health(hmi))["health"].mode == int(mode):
+            break
+    if shown.state == "failed":
+        raise RefusedError(shown.why)
+    return go_to("/maintenance/hand")
+
+
+@router.post("/jog")
+async def jog(
+    hmi: HmiNow,
+    caller: Maintainer,
+    to: Annotated[Literal["open", "width", "stop"], Form()],
+    width_mm: Annotated[str, Form(max_length=12)] = "",
+) -> Response:
+    """Move the fingers, or stop them; the page says where they are then, or why they do not move."""
+    try:
+        width = float(width_mm.replace(",", ".")) if to == "width" else None
+        asked = JogGripper(to=to, width_mm=width, actor=_actor(caller))
+    except ValueError:
+        raise Problem(400, "problem.bad_form") from None
+    jogged = await hmi.gateway.ask(asked, Jogged, deadline_s=MOVE_DEADLINE_S)
+    return go_to(f"/maintenance/hand?at_mm={jogged.width_mm:.1f}")
+
+
+@router.post("/leds")
+async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
+    """Set the sensor's light."""
+    asked = SetLeds(red=red, green=green, blue=blue, actor=_actor(caller))
+    await hmi.gateway.ask(asked, Lit, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/hand?lit=yes")
+
+
+@router.get("/image")
+async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+    """The live image, at the browser's pace."""
+    return show(request, "maintenance_image.html.j2", tab="image", contact=contact, **await _live(hmi, contact=contact))
+
+
+@router.get("/image/part")
+async def image_part(hmi: HmiNow, wording: WordingNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+    """The next image with what is in it; asked for when the one before was taken."""
+    return await _part(hmi, wording, "maintenance_live.html.j2", await _live(hmi, contact=contact))
+
+
+@router.get("/image/{place}.jpg")
+async def frame(place: Annotated[str, StringConstraints(pattern=r"^\d{1,20}$")]) -> Response:
+    """An image that was told of a moment ago."""
+    if place not in _FRAMES:
+        raise Problem(404, "problem.not_found")
+    return Response(_FRAMES[place].data, media_type=_FRAMES[place].media_type)
+
+
+@router.get("/sensor")
+async def sensor(request: Request, hmi: HmiNow) -> Response:
+    """Calibration and verification, guided."""
+    return show(request, "maintenance_sensor.html.j2", tab="sensor", **await _calibration(hmi))
+
+
+@router.get("/sensor/part")
+async def sensor_part(hmi: HmiNow, wording: WordingNow) -> Response:
+    """How the run at the ball does."""
+    told = await _calibration(hmi)
+    run = told["now"].run
+    over = run is None or run.state not in {"running", "waiting"}
+    state = "" if run is None else run.state
+    return await _part(hmi, wording, "maintenance_run.html.j2", told, {"x-over": "1" if over else "", "x-state": state})
+
+
+@router.get("/sensor/{kind}/{name}")
+async def sensor_picture(
+    hmi: HmiNow,
+    kind: Literal["calibration", "verification"],
+    name: Literal["area.png", "field.png", "reference.png"],
+) -> Response:
+    """A plot of what is in force."""
+    told = await hmi.gateway.ask(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
+    return Response(told.data, media_type=told.media_type)
+
+
+@router.post("/sensor/begin")
+async def begin(
+    hmi: HmiNow,
+    caller: Maintainer,
+    kind: Annotated[Literal["calibration", "verification"], Form()],
+    places: Annotated[str, Form(max_length=200)] = "",
+) -> Response:
+    """Begin a run; places are given a line each, as `4; 0`."""
+    parsed = [_PLACE.match(line) for line in places.splitlines() if line.strip()]
+    if len(parsed) > 6 or not all(parsed):
+        raise Problem(400, "problem.bad_form")
+    wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
+    asked = BeginBallRun(kind=kind, places=wanted, actor=_actor(caller))
+    await hmi.gateway.ask(asked, BallRunTold, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.post("/sensor/go-on")
+async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
+    """The ball lies there."""
+    await hmi.gateway.ask(GoOnBallRun(actor=_actor(caller)), BallRunTold, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.post("/sensor/end")
+async def end(hmi: HmiNow, caller: Maintainer) -> Response:
+    """Call the run off."""
+    await hmi.gateway.ask(EndBallRun(actor=_actor(caller)), BallRunTold, deadline_s=MOVE_DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.get("/registers")
+async def registers(request: Request, hmi: HmiNow) -> Response:
+    """The PLC's registers by their names."""
+    return show(request, "maintenance_registers.html.j2", tab="registers", told=await _registers(hmi))
+
+
+@router.get("/registers/part")
+async def registers_part(hmi: HmiNow, wording: WordingNow) -> Response:
+    """The same, to be asked for again and again."""
+    return await _part(hmi, wording, "maintenance_register_table.html.j2", {"told": await _registers(hmi)})
+
+
+@router.get("/log")
+async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
+    """The last lines of the station's log."""
+    told = await hmi.gateway.ask(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
+    return show(request, "maintenance_log.html.j2", tab="log", lines=told.lines[::-1], level=level)
+
+
+_FRAMES: OrderedDict[str, Picture] = OrderedDict()
+"""The last live images: a page is told of one, and then fetches it."""
+
+
+async def _health(hmi: Hmi) -> dict[str, Any]:
+    return {"health": await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)}
+
+
+async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
+    try:
+        told = await hmi.gateway.ask(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
+    except ChannelError as error:
+        return {"live_image": None, "why": str(error), "histograms": (), "place": ""}
+    place = str(round(1e6 * told.captured_s)) + ("1" if contact else "0")
+    _FRAMES[place] = told.picture
+    while len(_FRAMES) > _KEPT_FRAMES:
+        _FRAMES.popitem(last=False)
+    drawn = tuple(zip(("red", "green", "blue"), map(histogram, told.histogram), strict=True))
+    return {"live_image": told, "why": "", "histograms": drawn, "place": place}
+
+
+async def _calibration(hmi: Hmi) -> dict[str, Any]:
+    return {"now": await hmi.gateway.ask(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)}
+
+
+async def _registers(hmi: Hmi) -> Registers:
+    return await hmi.gateway.ask(GetRegisters(), Registers, deadline_s=DEADLINE_S)
+
+
+async def _part(
+    hmi: Hmi, wording: Wording, template: str, values: dict[str, Any], headers: dict[str, str] | None = None
+) -> Response:
+    return Response(hmi.renderer.render(template, wording, values), media_type="text/html", headers=headers)
+
+
+def _mm(text: str) -> float:
+    return float(text.replace(",", "."))
+
+
+def _actor(caller: Caller) -> Actor:
+    return Actor(who=caller.name, role=caller.role)

@@ -1,0 +1,317 @@
+"""Recipes: how they stand, edited as drafts with every limit drawn on past curves, approved by another person."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, File, Form, Query, Request, UploadFile
+from pydantic import StringConstraints
+from starlette.responses import Response
+
+from hmi.access import HmiNow, WordingNow, caller_of, orders
+from hmi.context import Hmi
+from hmi.limit_chart import Curve, Limit, area_chart, strip
+from hmi.navigation import Entry
+from hmi.page import go_to, show
+from hmi.problem import Problem
+from hmi.recipe_form import BadFieldError, Group, changed, groups, shown, with_changes
+from hmi.roles import Right
+from hmi.sessions import Caller
+from hmi.words import Wording
+from station.channel.messages import RefusedError
+from station.channel.panel_queries import Actor, JobTold
+from station.channel.panel_recipe_queries import (
+    LARGEST_TEXT,
+    ApproveRecipe,
+    Change,
+    Changes,
+    CompareRecipe,
+    ExportRecipe,
+    GetPastCurves,
+    GetRecipe,
+    GetRecipeHistory,
+    ImportRecipe,
+    ListRecipes,
+    PastCurve,
+    PastCurves,
+    RecipeHistory,
+    RecipeRow,
+    Recipes,
+    RecipeText,
+    RecipeTold,
+    RejectRecipe,
+    RevertRecipe,
+    SaveDraft,
+    StartWhatIf,
+    SubmitRecipe,
+)
+
+router = APIRouter(prefix="/recipes")
+ENTRY = Entry("recipes", "/recipes")
+DEADLINE_S = 20.0
+_PREFIX = "v:"
+"""Of a form's fields that are values of the recipe."""
+
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Reason = Annotated[str, Form(min_length=1, max_length=1000)]
+Editor = Annotated[Caller, Depends(orders(Right.EDIT_RECIPES))]
+Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
+
+
+@router.get("")
+async def recipes(request: Request, hmi: HmiNow) -> Response:
+    """How all recipes stand."""
+    return show(request, "recipes.html.j2", told=await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S))
+
+
+@router.get("/{name}")
+async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
+    """One recipe: what is in force, what waits, what differs, and what can be done."""
+    standing = await _row(hmi, name)
+    changes: tuple[Change, ...] = ()
+    if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
+        asked = CompareRecipe(name=name, new=standing.waiting)
+        changes = (await hmi.gateway.ask(asked, Changes, deadline_s=DEADLINE_S)).changes
+    values = await _values(hmi, name, standing)
+    drawn = None if values is None else await _drawn(hmi, name, values)
+    return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
+
+
+@router.get("/{name}/edit")
+async def edit(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
+    """The form."""
+    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    return await _form(request, hmi, wording, told, {}, "")
+
+
+@router.get("/{name}/chart")
+async def chart(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
+    """The chart alone, with the limits as they are typed; a field that is no number yet is left as it was."""
+    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    typed: dict[str, Any] = {}
+    for path, text in _typed(request.query_params).items():
+        try:
+            typed |= changed(told.values, {path: text})
+        except BadFieldError:
+            continue
+    drawn = await _drawn(hmi, name, with_changes(told.values, typed))
+    html = hmi.renderer.render("recipe_chart.html.j2", wording, {"drawn": drawn})
+    return Response(html, media_type="text/html")
+
+
+@router.post("/{name}/draft")
+async def save(
+    request: Request, hmi: HmiNow, wording: WordingNow, name: Name, caller: Editor, reason: Reason
+) -> Response:
+    """Save what was typed as a draft; what is wrong is said beside the form, which keeps what was typed."""
+    form = await request.form()
+    texts = {key: value for key, value in form.items() if isinstance(value, str)}
+    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    typed = _typed(texts)
+    try:
+        changes = changed(told.values, typed)
+    except BadFieldError as error:
+        why = wording.text("recipes.bad_field", field=_title(wording, error.field.key, error.field.title),
+                           expected=error.field.expected)  # fmt: skip
+        return await _form(request, hmi, wording, told, typed, why, reason)
+    if not changes:
+        return await _form(request, hmi, wording, told, typed, wording.text("recipes.nothing_changed"), reason)
+    try:
+        asked = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=_actor(caller))
+        await hmi.gateway.ask(asked, RecipeRow, deadline_s=DEADLINE_S)
+    except RefusedError as error:
+        return await _form(request, hmi, wording, told, typed, str(error), reason)
+    return go_to(f"/recipes/{name}")
+
+
+@router.post("/{name}/submit")
+async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Response:
+    """Record the file, as somebody edited it, as a draft."""
+    return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=_actor(caller)))
+
+
+@router.post("/{name}/approve")
+async def approve(
+    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+) -> Response:
+    """Put a draft in force."""
+    return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+
+
+@router.post("/{name}/reject")
+async def reject(
+    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+) -> Response:
+    """Reject a draft."""
+    return await _order(hmi, RejectRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+
+
+@router.post("/{name}/revert")
+async def revert(
+    hmi: HmiNow,
+    name: Name,
+    caller: Editor,
+    reason: Reason,
+    revision: Annotated[int | None, Form(ge=1, le=2**31)] = None,
+) -> Response:
+    """Put a revision's text back into the file."""
+    return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+
+
+@router.get("/{name}/history")
+async def history(
+    request: Request, hmi: HmiNow, name: Name, below: Annotated[int | None, Query(ge=1, le=2**31)] = None
+) -> Response:
+    """Who wrote, approved and retired its revisions, and what changed."""
+    asked = GetRecipeHistory(name=name, below=below)
+    told = await hmi.gateway.ask(asked, RecipeHistory, deadline_s=DEADLINE_S)
+    return show(request, "recipe_history.html.j2", row=await _row(hmi, name), told=told, tab="history")
+
+
+@router.get("/{name}/text")
+async def text(
+    request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
+) -> Response:
+    """The file as it is written, comments and all."""
+    told = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeTold, deadline_s=DEADLINE_S)
+    return show(request, "recipe_text.html.j2", row=told.row, text=told.text, revision=revision, tab="text")
+
+
+@router.get("/{name}/export")
+async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
+    """The file, to be edited elsewhere and imported again."""
+    told = await hmi.gateway.ask(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
+    headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
+    return Response(told.text, media_type="application/yaml", headers=headers)
+
+
+@router.post("/import")
+async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotated[UploadFile, File()]) -> Response:
+    """Put a whole recipe in the place of its file, and record it as a draft."""
+    data = await file.read(LARGEST_TEXT + 1)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Problem(400, "problem.bad_form") from None
+    if not text or len(text) > LARGEST_TEXT:
+        raise Problem(400, "problem.bad_form")
+    actor = _actor(caller)
+    row = await hmi.gateway.ask(ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
+    if row.file_state == "draft":
+        await hmi.gateway.ask(SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
+    return go_to(f"/recipes/{row.name}")
+
+
+@router.post("/{name}/whatif")
+async def whatif(
+    hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
+) -> Response:
+    """Judge the last fruit again by the file as it is."""
+    job = await hmi.gateway.ask(StartWhatIf(name=name, last=last, actor=_actor(caller)), JobTold, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
+
+
+async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
+    await hmi.gateway.ask(order, RecipeRow, deadline_s=DEADLINE_S)
+    return go_to(f"/recipes/{order.name}")
+
+
+async def _form(
+    request: Request,
+    hmi: Hmi,
+    wording: Wording,
+    told: RecipeTold,
+    typed: Mapping[str, str],
+    wrong: str,
+    reason: str = "",
+) -> Response:
+    decimal = wording.number(0.5, 1)[1]
+    made = groups(told.values)
+    texts = {field.path: typed.get(field.path, shown(field, decimal)) for group in made for field in group.fields}
+    caller = caller_of(request)
+    return show(
+        request,
+        "recipe_edit.html.j2",
+        status=400 if wrong else 200,
+        row=told.row,
+        groups=_sorted(made),
+        texts=texts,
+        prefix=_PREFIX,
+        wrong=wrong,
+        reason=reason,
+        drawn=await _drawn(hmi, told.row.name, told.values),
+        title=lambda each: _title(wording, each.key, each.title),
+        editable=caller.may(Right.EDIT_RECIPES),
+        tab="edit",
+    )
+
+
+def _sorted(made: list[Group]) -> list[tuple[Group, bool]]:
+    """What is changed often first and open; what is set once after it, folded."""
+    often = ("damage", "early_stop", "expected_width", "steps")
+    order = [each for start in often for each in made if each.path.startswith(start)]
+    return [*((each, True) for each in order), *((each, False) for each in made if each not in order)]
+
+
+def _title(wording: Wording, key: str, english: str) -> str:
+    return wording.own(key, english)
+
+
+def _typed(texts: Mapping[str, str]) -> dict[str, str]:
+    return {key.removeprefix(_PREFIX): value for key, value in texts.items() if key.startswith(_PREFIX)}
+
+
+async def _row(hmi: Hmi, name: str) -> RecipeRow:
+    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    found = next((row for row in told.rows if row.name == name), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+    return found
+
+
+async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
+    """Of the draft that waits, else of what is in force; None where neither can be read."""
+    revision = row.waiting or row.in_force
+    if revision is None:
+        return None
+    asked = GetRecipe(name=name, revision=revision)
+    return (await hmi.gateway.ask(asked, RecipeTold, deadline_s=DEADLINE_S)).values
+
+
+async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The limits on past curves; none of these where nothing was inspected yet."""
+    try:
+        past = (await hmi.gateway.ask(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
+    except RefusedError:  # there is no good file, or there are no records yet
+        past = ()
+    damage, early = values["damage"], values["early_stop"]
+    limits = [Limit(each["closing_mm"], each["area_mm2"], each["least_area_mm2"]) for each in damage["area"]]
+    curves = [
+        Curve(_kind(each), list(zip(each.closings_mm, each.areas_mm2, strict=True)))
+        for each in sorted(past, key=lambda each: each.outcome == "FAIL")
+    ]
+    width, robust = values["expected_width"], values["segmentation"]["robust"]
+    return {
+        "number": len(past),
+        "failed": sum(each.outcome == "FAIL" for each in past),
+        "area": area_chart(curves, limits, early["area_mm2"]),
+        "growth": strip(
+            [(_kind(each), each.growth_mm2_per_mm) for each in past if each.growth_mm2_per_mm is not None],
+            [("limit", damage["growth_mm2_per_mm"]), ("early", early["growth_mm2_per_mm"])],
+        ),
+        "width": strip(
+            [(_kind(each), each.onset_mm) for each in past if each.onset_mm is not None],
+            [("limit", width["smallest_mm"]), ("limit", width["largest_mm"])],
+        ),
+        "confidence": strip(
+            [(_kind(each), each.confidence) for each in past if each.confidence is not None],
+            [("limit", robust["least_confidence"])],
+        ),
+    }
+
+
+def _kind(curve: PastCurve) -> str:
+    return {"PASS": "pass", "FAIL": "fail"}.get(curve.outcome, "none")
+
+
+def _actor(caller: Caller) -> Actor:
+    return Actor(who=caller.name, role=caller.role)

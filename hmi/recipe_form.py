@@ -1,0 +1,245 @@
+"""A recipe as a form: every value with its title, description, unit and bounds from the model; and back from a form."""
+
+import re
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from typing import Any, NamedTuple
+
+from station.settings.recipe_model import Recipe
+from station.settings.schema import branches, expectation, find, resolved, schema_of
+
+FIXED = frozenset({"schema_version", "name"})
+"""What makes a recipe this one, and is not edited."""
+_LIST = re.compile(r"[;\s]+")
+
+Path = tuple[str | int, ...]
+
+
+class Field(NamedTuple):
+    """One value."""
+
+    path: str
+    """As `damage.area[0].area_mm2`."""
+    key: str
+    """Of its title in the catalogue: the path without places, as `recipe_field.damage.area.area_mm2`."""
+    title: str
+    description: str
+    unit: str
+    expected: str
+    """In words, as `a number from 0.1 to 10 mm`."""
+    kind: str
+    """`number`, `text`, `choice`, `list` or `switch`."""
+    choices: tuple[str, ...]
+    value: Any
+    nullable: bool
+
+
+class Group(NamedTuple):
+    """Fields that belong together."""
+
+    path: str
+    key: str
+    title: str
+    description: str
+    fields: tuple[Field, ...]
+
+
+class BadFieldError(Exception):
+    """What was typed is no value of its field."""
+
+    def __init__(self, field: Field) -> None:
+        super().__init__(field.path)
+        self.field = field
+
+
+def groups(values: Mapping[str, Any]) -> list[Group]:
+    """A recipe's values, group by group, in the model's order.
+
+    Args:
+        values: as a recipe has them as JSON.
+    """
+    root = schema_of(Recipe)
+    gathered: dict[Path, list[Field]] = {}
+    for path, value in _leaves(values, ()):
+        if path[0] not in FIXED:
+            gathered.setdefault(_group(path), []).append(_field(root, path, value))
+    made = []
+    for path, fields in gathered.items():
+        node = find(root, path) or {}
+        title, description = (node.get("title", ""), node.get("description", "")) if path else ("General", "")
+        made.append(Group(dotted(path), _key(path), title, description, tuple(fields)))
+    return made
+
+
+def changed(values: Mapping[str, Any], form: Mapping[str, str]) -> dict[str, Any]:
+    """What a form changes.
+
+    Args:
+        values: the recipe's as they are.
+        form: texts by the fields' paths; those that are missing stay.
+
+    Raises:
+        BadFieldError: a text is no value of its field's kind; bounds are the station's to check.
+    """
+    changes = {}
+    for group in groups(values):
+        for field in group.fields:
+            text = form.get(field.path)
+            if text is None:
+                continue
+            value = parsed(field, text)
+            if value != field.value:
+                changes[field.path] = value
+    return changes
+
+
+def parsed(field: Field, text: str) -> Any:
+    """What a person has typed into a field.
+
+    Args:
+        field: which.
+        text: with a decimal comma or point.
+
+    Raises:
+        BadFieldError: it is no value of its kind.
+    """
+    text = text.strip()
+    try:
+        match field.kind:
+            case "number":
+                return None if not text and field.nullable else _number(text)
+            case "list":
+                return [_number(part) for part in _LIST.split(text) if part]
+            case "switch":
+                return text == "true"
+            case "choice":
+                if text not in field.choices:
+                    raise BadFieldError(field)
+                return text
+            case _:
+                return text
+    except ValueError:
+        raise BadFieldError(field) from None
+
+
+def shown(field: Field, decimal: str) -> str:
+    """A field's value as a person types it.
+
+    Args:
+        field: which.
+        decimal: the language's decimal sign.
+    """
+    match field.value:
+        case None:
+            return ""
+        case bool():
+            return "true" if field.value else "false"
+        case list():
+            return "; ".join(_figure(each, decimal) for each in field.value)
+        case int() | float():
+            return _figure(field.value, decimal)
+        case _:
+            return str(field.value)
+
+
+def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The recipe's values as they would be; nothing is checked.
+
+    Args:
+        values: as they are.
+        changes: new ones by their paths.
+    """
+
+    def walk(value: Any, path: Path) -> Any:
+        if dotted(path) in changes:
+            return changes[dotted(path)]
+        if isinstance(value, dict):
+            return {key: walk(inner, (*path, key)) for key, inner in value.items()}
+        if isinstance(value, list):
+            return [walk(inner, (*path, place)) for place, inner in enumerate(value)]
+        return value
+
+    return walk(dict(values), ())
+
+
+def dotted(path: Path) -> str:
+    """A path as the recipe editor takes it.
+
+    Args:
+        path: keys and places.
+    """
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def field_keys() -> list[str]:
+    """The catalogue's keys of all fields and groups of a recipe."""
+    root = schema_of(Recipe)
+    paths = [path for path, _ in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
+    return list(dict.fromkeys([*map(_key, paths), *(_key(_group(path)) for path in paths)]))
+
+
+def _schema_leaves(root: dict[str, Any], node: dict[str, Any], path: Path) -> Iterator[tuple[Path, None]]:
+    branch = branches(node, root)[0]
+    item = resolved(branch.get("items") or {}, root)
+    if "properties" in branch:
+        for name, child in branch["properties"].items():
+            yield from _schema_leaves(root, resolved(child, root), (*path, name))
+    elif "properties" in item:
+        yield from _schema_leaves(root, item, (*path, 0))
+    else:
+        yield path, None
+
+
+def _leaves(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(inner, (*path, key))
+    elif isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        for place, inner in enumerate(value):
+            yield from _leaves(inner, (*path, place))
+    else:
+        yield path, value
+
+
+def _group(path: Path) -> Path:
+    """The innermost mapping, with the place in a list: each threshold is a group of its own."""
+    return path[:-1]
+
+
+def _key(path: Path) -> str:
+    return ".".join(["recipe_field", *([part for part in path if isinstance(part, str)] or ["general"])])
+
+
+def _field(root: dict[str, Any], path: Path, value: Any) -> Field:
+    node = find(root, path) or {}
+    branch = branches(node, root)[0]
+    choices = tuple(map(str, branch.get("enum", ())))
+    kind = "choice" if choices else _KINDS.get(branch.get("type", ""), "text")
+    return Field(
+        path=dotted(path),
+        key=_key(path),
+        title=node.get("title", str(path[-1])),
+        description=node.get("description", ""),
+        unit=node.get("unit", ""),
+        expected=expectation(node, root),
+        kind=kind,
+        choices=choices,
+        value=value,
+        nullable=any(resolved(each, root).get("type") == "null" for each in node.get("anyOf", ())),
+    )
+
+
+_KINDS = {"number": "number", "integer": "number", "array": "list", "boolean": "switch"}
+
+
+def _number(text: str) -> int | float:
+    text = text.replace(",", ".").replace("\u202f", "")
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(text)
+    return int(text) if text.lstrip("+-").isdigit() else number
+
+
+def _figure(value: float, decimal: str) -> str:
+    return f"{value:.10g}".replace(".", decimal)

@@ -1,0 +1,94 @@
+// Parts of pages that are asked for again and again, never faster than they are taken; and a recipe's chart as it is typed.
+"use strict";
+
+(() => {
+  const AFTER_FAULT_MS = 1500;
+  const PATIENCE_MS = 15000;
+  const TYPED_MS = 300;
+
+  async function fetched(address) {
+    const ended = new AbortController();
+    const timer = setTimeout(() => ended.abort(), PATIENCE_MS);
+    try {
+      const answer = await fetch(address, { signal: ended.signal, credentials: "same-origin" });
+      if (!answer.ok) {
+        throw new Error(String(answer.status));
+      }
+      return { html: await answer.text(), headers: answer.headers };
+    } finally {
+      clearTimeout(timer);
+    }
+  }
+
+  // The next image is asked for when this one is there: the browser sets the pace.
+  const shown = (part) =>
+    Promise.all(
+      [...part.querySelectorAll("img:not([loading])")].map((image) => (image.decode ? image.decode().catch(() => 0) : 0)),
+    );
+
+  async function poll(part) {
+    const everyMs = Number(part.dataset.everyMs);
+    let pauseMs = everyMs;
+    while (part.isConnected) {
+      await new Promise((done) => setTimeout(done, pauseMs));
+      if (document.hidden) {
+        continue;
+      }
+      try {
+        const { html, headers } = await fetched(part.dataset.poll);
+        const reload = part.dataset.reload;
+        if (reload && headers.get("x-state") !== reload) {
+          location.reload();
+          return;
+        }
+        const top = part.querySelector(".scroll") ? part.querySelector(".scroll").scrollTop : 0;
+        const focused = document.activeElement && part.contains(document.activeElement);
+        if (part.innerHTML !== html) {
+          part.innerHTML = html;
+          const scroll = part.querySelector(".scroll");
+          if (scroll) {
+            scroll.scrollTop = top;
+            if (focused) {
+              scroll.focus({ preventScroll: true });
+            }
+          }
+        }
+        part.classList.remove("old-part");
+        pauseMs = everyMs;
+        await shown(part);
+        if (headers.get("x-over")) {
+          return;
+        }
+      } catch {
+        part.classList.add("old-part");
+        pauseMs = AFTER_FAULT_MS;
+      }
+    }
+  }
+
+  function draw(form) {
+    const here = form.querySelector("[data-chart-here]");
+    let timer = 0;
+    let number = 0;
+    form.addEventListener("input", () => {
+      clearTimeout(timer);
+      timer = setTimeout(async () => {
+        number += 1;
+        const mine = number;
+        const typed = new URLSearchParams([...new FormData(form)].filter(([name]) => name.startsWith("v:")));
+        try {
+          const { html } = await fetched(`${form.dataset.chart}?${typed}`);
+          if (mine === number) {
+            here.innerHTML = html;
+            here.classList.remove("old-part");
+          }
+        } catch {
+          here.classList.add("old-part");
+        }
+      }, TYPED_MS);
+    });
+  }
+
+  document.querySelectorAll("[data-poll]").forEach(poll);
+  document.querySelectorAll("form[data-chart]").forEach(draw);
+})();

@@ -1,0 +1,41 @@
+"""The registers in a person's words, for the station's pages."""
+
+from collections.abc import Callable
+
+from plc_interface.register import Access, Register
+from plc_interface.register_map import REGISTERS
+from station.channel.line import RegisterTold
+
+Value = int | float | str | None
+
+
+def registers_told(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
+    """Every register of the map with what it holds, in the order of the addresses.
+
+    Args:
+        value: gives a register's value by its name; None where there is none.
+    """
+    return tuple(
+        RegisterTold(
+            name=register.name,
+            address=register.address,
+            value=_in_words(register, value(register.name)),
+            unit=register.unit,
+            writable=register.access is Access.READ_WRITE,
+            meaning=register.meaning,
+        )
+        for register in sorted(REGISTERS, key=lambda each: each.address)
+    )
+
+
+def _in_words(register: Register, value: Value) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, str):
+        return value
+    if register.bits:
+        set_bits = [bit.name for bit in register.bits if int(value) >> bit.number & 1]
+        return f"{int(value):#06x} {', '.join(set_bits)}".rstrip()
+    if code := register.codes.get(int(value)):
+        return f"{value} {code.name}"
+    return f"{value:g}" if isinstance(value, float) else str(value)

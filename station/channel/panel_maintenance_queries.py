@@ -1,0 +1,260 @@
+"""What the maintenance page asks: health, jogging, the live image, calibration, the PLC's registers, the log."""
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from station.channel.line import RegisterTold
+from station.channel.messages import Message
+from station.channel.panel_queries import Actor, Picture
+
+MOST_LINES = 500
+HISTOGRAM_BINS = 32
+
+Serial = Annotated[str, Field(max_length=64)]
+
+
+class GetHealth(Message):
+    """How everything does, with ages."""
+
+    asked: ClassVar[str] = "for the station's health"
+
+
+class PartHealth(Message):
+    """One thing that inspecting needs."""
+
+    name: str
+    state: Literal["ok", "degraded", "fault", "unknown"]
+    age_s: float | None
+    """Since it was last heard; None where never."""
+    detail: str
+    remedy: str
+
+
+class Health(Message):
+    """How everything does."""
+
+    ready: bool
+    why: str
+    mode: int
+    """PackML: 1 production, 2 maintenance, 3 manual."""
+    state: str
+    """In words."""
+    jog_refused: str
+    """Why nothing may be jogged now, with what to do; empty where it may."""
+    parts: tuple[PartHealth, ...]
+    devices: dict[str, str]
+    versions: dict[str, str]
+    progress_age_s: dict[str, float]
+    records: dict[str, int]
+    """Bytes and counts of the records."""
+    records_error: str
+    calibration_age_s: float | None
+    verification_age_s: float | None
+    simulated: bool
+
+
+class JogGripper(Message):
+    """Move the fingers, slowly and with the least force; in manual mode only. Answered with `Jogged`."""
+
+    asked: ClassVar[str] = "to jog the gripper"
+    to: Literal["open", "width", "stop"]
+    width_mm: float | None = Field(default=None, ge=0.0, le=85.0, allow_inf_nan=False)
+    """Where `to` is `width`."""
+    actor: Actor
+
+
+class Jogged(Message):
+    """Where the fingers are."""
+
+    width_mm: float
+    object_state: str
+    active: bool
+
+
+class SetLeds(Message):
+    """Set the sensor's light; in manual mode only. Answered with `Lit`."""
+
+    asked: ClassVar[str] = "to set the LEDs"
+    red: int = Field(ge=0, le=15)
+    green: int = Field(ge=0, le=15)
+    blue: int = Field(ge=0, le=15)
+    actor: Actor
+
+
+class Lit(Message):
+    """The camera has taken it."""
+
+
+class GetLiveImage(Message):
+    """The sensor's newest image."""
+
+    asked: ClassVar[str] = "for a live image"
+    contact: bool = False
+    """Draw in what is measured against the golden reference, by the active recipe's method."""
+    newer_than_s: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
+    """Monotonic time of the image that the asker has."""
+
+
+class LiveImage(Message):
+    """An image with its time and what is in it."""
+
+    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+    picture: Picture
+    captured_s: float
+    """Monotonic."""
+    age_s: float
+    faults: tuple[str, ...]
+    histogram: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+    """Pixels a bin from dark to bright, of red, green and blue."""
+    saturated_share: float
+    sharpness: float
+    """Root mean square of the image's detail, grey levels."""
+    area_px: int | None
+    """None where no contact was measured."""
+    area_mm2: float | None
+    flags: tuple[str, ...]
+    contact: str
+    """Why no contact was measured; empty where it was, or was not asked for."""
+
+
+class GetCalibration(Message):
+    """The sensor's calibration and its last verification."""
+
+    asked: ClassVar[str] = "for the calibration"
+
+
+class CheckTold(Message):
+    """One check of a calibration or verification."""
+
+    name: str
+    passed: bool
+    found: str
+    expected: str
+    remedy: str
+
+
+class CalibrationTold(Message):
+    """One calibration or verification."""
+
+    serial: str
+    id: str
+    made_utc_ms: int
+    operator: str
+    words: str
+    passed: bool
+    checks: tuple[CheckTold, ...]
+    pictures: tuple[str, ...]
+    """Names of its plots, for `GetCalibrationPicture`."""
+
+
+class RunStep(Message):
+    """What a run at the ball has said."""
+
+    number: int
+    of: int
+    title: str
+    detail: str
+
+
+class BallRunTold(Message):
+    """A calibration or verification that runs, or the last one."""
+
+    kind: Literal["calibration", "verification"]
+    state: Literal["running", "waiting", "passed", "failed", "ended"]
+    """`waiting` for the person to lay the ball."""
+    request: str
+    """What the person is to do; empty where nothing."""
+    steps: tuple[RunStep, ...]
+    """The last of each title."""
+    told: str
+    """What came of it."""
+
+
+class CalibrationState(Message):
+    """How the sensor stands."""
+
+    serial: str
+    in_use: str
+    """The scale in words."""
+    calibration: CalibrationTold | None
+    verification: CalibrationTold | None
+    age_s: float | None
+    verification_age_s: float | None
+    oldest_days: float
+    verify_every_h: float | None
+    trouble: str
+    ball_mm: float
+    run: BallRunTold | None
+    run_refused: str
+    """Why none may begin now."""
+
+
+class GetCalibrationPicture(Message):
+    """A plot of a calibration or verification. Answered with `Picture`."""
+
+    asked: ClassVar[str] = "for a calibration's plot"
+    kind: Literal["calibration", "verification"]
+    name: str = Field(pattern=r"^(area|field|reference)\.png$")
+
+
+class BeginBallRun(Message):
+    """Calibrate or verify with the ball, in manual mode: the gripper closes on it. Answered with `BallRunTold`."""
+
+    asked: ClassVar[str] = "to begin at the ball"
+    kind: Literal["calibration", "verification"]
+    places: tuple[tuple[float, float], ...] = Field(default=(), max_length=6)
+    """Further places of the ball, mm beside its first; each is asked for when its turn comes."""
+    actor: Actor
+
+
+class GoOnBallRun(Message):
+    """The ball lies where it was asked for. Answered with `BallRunTold`."""
+
+    asked: ClassVar[str] = "to go on at the ball"
+    actor: Actor
+
+
+class EndBallRun(Message):
+    """Call the run off; the jaws open. Idempotent; answered with `BallRunTold`."""
+
+    asked: ClassVar[str] = "to call the run off"
+    actor: Actor
+
+
+class GetRegisters(Message):
+    """The PLC's registers as the PLC interface has them; asked of it with its next beat."""
+
+    asked: ClassVar[str] = "for the PLC's registers"
+
+
+class Registers(Message):
+    """All of the map, in the order of their addresses."""
+
+    registers: tuple[RegisterTold, ...]
+    age_s: float | None
+    """Since the PLC interface told them; None where it has not yet."""
+
+
+class ReadLog(Message):
+    """The last lines of the log."""
+
+    asked: ClassVar[str] = "for the log"
+    limit: int = Field(default=100, ge=1, le=MOST_LINES)
+    level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
+    """The least."""
+
+
+class LogLine(Message):
+    """One line."""
+
+    utc_ms: int
+    level: str
+    logger: str
+    text: str
+
+
+class Log(Message):
+    """Newest last; of the station's process since its start."""
+
+    lines: tuple[LogLine, ...]

@@ -1,0 +1,313 @@
+"""What the operators' pages ask of the past: inspections, pictures, lots, the audit trail, and files made of them.
+
+Every answer is bounded: lists come a page at a time, files piece by piece. What takes long is a job: it is begun,
+looked at, and its files are then read.
+"""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from station.channel.line import Outcome
+from station.channel.messages import Message
+from station.vocabulary import OutcomeName, Reason
+
+LARGEST_PAGE = 100
+LARGEST_CHUNK_BYTES = 4 * 1024 * 1024
+"""Of a file, before it is written as base64: well below the channel's largest message."""
+
+Sequence = Annotated[int, Field(ge=1, lt=2**32)]
+Text = Annotated[str, Field(max_length=64)]
+Why = Annotated[str, Field(min_length=1, max_length=1000)]
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
+
+
+class Actor(Message):
+    """Who asks, as the pages have made sure of it; for the audit trail."""
+
+    who: str = Field(min_length=1, max_length=64)
+    role: str = Field(min_length=1, max_length=64)
+
+
+class Search(Message):
+    """What is looked for among the inspections: all that is given has to hold."""
+
+    lot: Annotated[str, Field(max_length=32)] | None = None
+    grower: Text | None = None
+    fruit: Text | None = None
+    """The recipe's name."""
+    from_utc_ms: UtcMs | None = None
+    to_utc_ms: UtcMs | None = None
+    outcome: OutcomeName | None = None
+    reason: Reason | None = None
+
+
+class FindInspections(Message):
+    """One page of what a search finds, newest first."""
+
+    asked: ClassVar[str] = "for inspections"
+    search: Search = Search()
+    limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
+    below: int | None = Field(default=None, ge=1, le=2**32)
+    """Of the page before; None for the first."""
+
+
+class InspectionRow(Message):
+    """One inspection in a list."""
+
+    sequence: int
+    trigger_id: int
+    began_utc_ms: int
+    lot: str
+    grower: str
+    fruit: str
+    outcome: OutcomeName | None
+    """None while it runs."""
+    reasons: tuple[str, ...]
+    areas_mm2: tuple[float | None, ...]
+    duration_ms: int | None
+
+
+class InspectionPage(Message):
+    """What was found."""
+
+    rows: tuple[InspectionRow, ...]
+    below: int | None
+    """What to ask with for the next page; None where this is the last."""
+
+
+class GetInspection(Message):
+    """All that is known of one inspection."""
+
+    asked: ClassVar[str] = "for an inspection"
+    sequence: Sequence
+
+
+class CurvePointTold(Message):
+    """One width step."""
+
+    step: int
+    width_mm: float
+    closing_mm: float | None
+    area_mm2: float | None
+    area_px: int | None
+    confidence: float | None
+    flags: tuple[str, ...]
+
+
+class ImageTold(Message):
+    """An image that was kept."""
+
+    kind: Literal["reference", "step", "mask"]
+    step: int | None
+    sha256: str
+    there: bool
+    """Whether its file still is."""
+
+
+class InspectionTold(Message):
+    """All that is known of one inspection."""
+
+    sequence: int
+    trigger_id: int
+    encoder: int
+    lot: str
+    began_utc_ms: int
+    simulated: bool
+    standing: Outcome | None
+    """What the PLC was told, or is to be told; None while it runs."""
+    judged: OutcomeName | None
+    reasons: tuple[tuple[str, str], ...]
+    """Of what stands: its name, and a sentence."""
+    explanation: tuple[str, ...]
+    curve: tuple[CurvePointTold, ...]
+    recipe_name: str
+    recipe_revision: str
+    recipe_sha256: str
+    recipe: dict[str, Any] | None
+    """Its values as they were then."""
+    phases_s: dict[str, float]
+    measures: dict[str, float | int | str | bool | None]
+    devices: dict[str, str]
+    versions: dict[str, str]
+    images: tuple[ImageTold, ...]
+    images_state: str
+    published_utc_ms: int | None
+    acknowledged_utc_ms: int | None
+
+
+class GetImage(Message):
+    """A stored image's file."""
+
+    asked: ClassVar[str] = "for an image"
+    sha256: Sha256
+
+
+class Picture(Message):
+    """A picture's file."""
+
+    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+    media_type: str
+    data: bytes
+
+
+class GetStages(Message):
+    """What the measurement made of one step's image, stage by stage, by the inspection's own recipe."""
+
+    asked: ClassVar[str] = "for a step's stages"
+    sequence: Sequence
+    step: int = Field(ge=0, le=1000)
+
+
+class Stages(Message):
+    """The stages' pictures in their order, measured again from the stored image."""
+
+    pictures: tuple[tuple[str, Picture], ...]
+    area_px: int
+    """As measured again."""
+
+
+class ListLots(Message):
+    """The last lots that were told of, or one of them."""
+
+    asked: ClassVar[str] = "for the lots"
+    limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
+    name: Annotated[str, Field(max_length=32)] | None = None
+
+
+class LotTold(Message):
+    """One lot."""
+
+    name: str
+    grower: str
+    began_utc_ms: int
+    ended_utc_ms: int | None
+    revision: int
+
+
+class Lots(Message):
+    """Newest first."""
+
+    lots: tuple[LotTold, ...]
+
+
+class StartLot(Message):
+    """Tell of a lot's begin. Idempotent; answered with `LotTold`."""
+
+    asked: ClassVar[str] = "to begin a lot"
+    name: str = Field(min_length=1, max_length=32)
+    grower: str = Field(min_length=1, max_length=64)
+    actor: Actor
+
+
+class EndLot(Message):
+    """Tell of a lot's end. Idempotent; answered with `LotTold`."""
+
+    asked: ClassVar[str] = "to end a lot"
+    name: str = Field(min_length=1, max_length=32)
+    actor: Actor
+
+
+class ReadAudit(Message):
+    """The last rows of the audit trail."""
+
+    asked: ClassVar[str] = "for the audit trail"
+    limit: int = Field(default=50, ge=1, le=LARGEST_PAGE)
+    action: Text = ""
+    """Of this action, or of all that begin so."""
+    subject: Text = ""
+    """With this text in their subject."""
+
+
+class AuditRowTold(Message):
+    """One row of the trail; `old` and `new` are JSON, shortened where they are long."""
+
+    seq: int
+    utc_ms: int
+    who: str
+    role: str
+    action: str
+    subject: str
+    reason: str
+    old: str
+    new: str
+
+
+class AuditRows(Message):
+    """Newest first."""
+
+    rows: tuple[AuditRowTold, ...]
+
+
+class StartExport(Message):
+    """Write what a search finds as a table, as a job."""
+
+    asked: ClassVar[str] = "to export inspections"
+    search: Search
+    form: Literal["csv", "parquet"]
+    actor: Actor
+
+
+class StartLotReport(Message):
+    """Write a lot's report, as a job."""
+
+    asked: ClassVar[str] = "for a lot's report"
+    lot: str = Field(max_length=32)
+    form: Literal["html", "pdf"]
+    actor: Actor
+
+
+class AskJob(Message):
+    """How a job does."""
+
+    asked: ClassVar[str] = "for a job"
+    job: str = Field(pattern=r"^[0-9a-f]{32}$")
+
+
+class EndJob(Message):
+    """Call a job off. Idempotent; answered with `JobTold`."""
+
+    asked: ClassVar[str] = "to call a job off"
+    job: str = Field(pattern=r"^[0-9a-f]{32}$")
+
+
+class JobFile(Message):
+    """A file that a job has written."""
+
+    name: str
+    size_bytes: int
+    media_type: str
+
+
+class JobTold(Message):
+    """How a job does."""
+
+    job: str
+    kind: Literal["export", "lot_report", "whatif"]
+    state: Literal["waiting", "running", "done", "failed", "ended"]
+    done: int
+    of: int
+    """0 where it is not known."""
+    told: str
+    """What it says of itself: its last words where it failed."""
+    files: tuple[JobFile, ...]
+    """Once it is done."""
+
+
+class ReadJobFile(Message):
+    """A piece of a file of a job that is done."""
+
+    asked: ClassVar[str] = "for a job's file"
+    job: str = Field(pattern=r"^[0-9a-f]{32}$")
+    name: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    offset: int = Field(default=0, ge=0, lt=2**50)
+
+
+class Chunk(Message):
+    """A piece of a file; empty at its end."""
+
+    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+    data: bytes
+    size_bytes: int
+    """Of the whole file."""

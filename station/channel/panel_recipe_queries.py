@@ -1,0 +1,251 @@
+"""What the operators' pages ask about recipes: how they stand, what changed, and a person's changes to them."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from station.channel.messages import Message
+from station.channel.panel_queries import Actor, Text, Why
+
+LARGEST_TEXT = 100_000
+"""Letters of a recipe's file."""
+MOST_CURVES = 200
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Revision = Annotated[int, Field(ge=1, le=2**31)]
+Scalar = bool | int | float | str | None
+
+
+class ListRecipes(Message):
+    """How all recipes stand."""
+
+    asked: ClassVar[str] = "for the recipes"
+
+
+class RecipeRow(Message):
+    """How one recipe stands."""
+
+    name: str
+    title: str
+    plc_number: int | None
+    """None where nothing good of it is known."""
+    in_force: int | None
+    """The approved revision; None where there is none."""
+    file_state: Literal["approved", "draft", "broken", "missing"]
+    """What its file is beside that."""
+    sha256: str
+    """Of the file's values, to base a change on; empty where the file is broken or missing."""
+    waiting: int | None
+    """The revision that waits for approval."""
+    waiting_author: str
+    waiting_reason: str
+    note: str
+    """What a person has to know or do."""
+
+
+class Recipes(Message):
+    """All recipes, by name."""
+
+    rows: tuple[RecipeRow, ...]
+    problems: tuple[str, ...]
+    """What is wrong with files of the folder."""
+    editable: bool
+    """Whether they lie in a folder of the site's; those shipped are the software's own."""
+
+
+class GetRecipe(Message):
+    """One recipe's file, or one of its revisions."""
+
+    asked: ClassVar[str] = "for a recipe"
+    name: Name
+    revision: Revision | None = None
+    """None for the file."""
+
+
+class RecipeTold(Message):
+    """A recipe's text and what it says."""
+
+    row: RecipeRow
+    text: str
+    values: dict[str, Any]
+
+
+class GetRecipeHistory(Message):
+    """A recipe's revisions, the newest first."""
+
+    asked: ClassVar[str] = "for a recipe's history"
+    name: Name
+    below: int | None = Field(default=None, ge=1)
+    """Of the page before; None for the first."""
+
+
+class Change(Message):
+    """One value that differs; both as JSON has them."""
+
+    path: str
+    old: str
+    new: str
+
+
+class RevisionTold(Message):
+    """One revision, with what changed against the one before it."""
+
+    revision: int
+    status: Literal["draft", "approved", "retired"]
+    origin: Literal["submitted", "shipped", "adopted"]
+    sha256: str
+    author: str
+    reason: str
+    created_utc_ms: int
+    approver: str
+    approval_reason: str
+    approved_utc_ms: int | None
+    retired_by: str
+    retired_reason: str
+    retired_utc_ms: int | None
+    changes: tuple[Change, ...]
+
+
+class RecipeHistory(Message):
+    """Newest first."""
+
+    revisions: tuple[RevisionTold, ...]
+    below: int | None
+
+
+class CompareRecipe(Message):
+    """Every value that differs between two forms of a recipe."""
+
+    asked: ClassVar[str] = "for a recipe's differences"
+    name: Name
+    old: Revision | None = None
+    """A revision; None for the approved one."""
+    new: Revision | None = None
+    """A revision; None for the file."""
+
+
+class Changes(Message):
+    """In the order of the file."""
+
+    changes: tuple[Change, ...]
+
+
+class SaveDraft(Message):
+    """Change values in a recipe's file, its comments kept, and record it as a draft. Answered with `RecipeRow`.
+
+    Refused as a whole where the recipe would be bad, or somebody changed it since it was looked at.
+    """
+
+    asked: ClassVar[str] = "to save a draft"
+    name: Name
+    values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
+    """New values by their dotted paths, as `damage.area[0].area_mm2`."""
+    base: str = Field(pattern=r"^[0-9a-f]{64}$")
+    """What was looked at."""
+    reason: Why
+    actor: Actor
+
+
+class SubmitRecipe(Message):
+    """Record a recipe's file as it is as a draft. Answered with `RecipeRow`."""
+
+    asked: ClassVar[str] = "to submit a recipe"
+    name: Name
+    reason: Why
+    actor: Actor
+
+
+class ApproveRecipe(Message):
+    """Put a draft in force for the next lot; its author cannot. Answered with `RecipeRow`."""
+
+    asked: ClassVar[str] = "to approve a recipe"
+    name: Name
+    revision: Revision
+    reason: Why
+    actor: Actor
+
+
+class RejectRecipe(Message):
+    """Retire a draft: it is not put in force. Answered with `RecipeRow`."""
+
+    asked: ClassVar[str] = "to reject a draft"
+    name: Name
+    revision: Revision
+    reason: Why
+    actor: Actor
+
+
+class RevertRecipe(Message):
+    """Put a revision's text back into the recipe's file. Answered with `RecipeRow`."""
+
+    asked: ClassVar[str] = "to put a recipe back"
+    name: Name
+    revision: Revision | None = None
+    """None for the approved one."""
+    reason: Why
+    actor: Actor
+
+
+class ExportRecipe(Message):
+    """A recipe's file with a first line that names what it is. Answered with `RecipeText`."""
+
+    asked: ClassVar[str] = "to export a recipe"
+    name: Name
+    revision: Revision | None = None
+
+
+class RecipeText(Message):
+    """A recipe's YAML."""
+
+    text: str
+
+
+class ImportRecipe(Message):
+    """Put a whole recipe in the place of its file. Answered with `RecipeRow`."""
+
+    asked: ClassVar[str] = "to import a recipe"
+    text: str = Field(min_length=1, max_length=LARGEST_TEXT)
+    base: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
+    """What it is based on; empty for what the text names."""
+    reason: Why
+    actor: Actor
+
+
+class GetPastCurves(Message):
+    """The last judged curves of a recipe's fruit, to see limits against."""
+
+    asked: ClassVar[str] = "for past curves"
+    name: Name
+    limit: int = Field(default=60, ge=1, le=MOST_CURVES)
+
+
+class PastCurve(Message):
+    """One fruit's curve."""
+
+    sequence: int
+    outcome: str
+    closings_mm: tuple[float, ...]
+    areas_mm2: tuple[float, ...]
+    growth_mm2_per_mm: float | None
+    """The steepest, as the judge reckons it; None with too few points."""
+    onset_mm: float | None
+    """The fruit's width."""
+    confidence: float | None
+    """The least of its points."""
+
+
+class PastCurves(Message):
+    """Newest first."""
+
+    curves: tuple[PastCurve, ...]
+
+
+class StartWhatIf(Message):
+    """Judge the last inspections again by the recipe's file as it is, as a job."""
+
+    asked: ClassVar[str] = "what a draft would have done"
+    name: Name
+    lot: Text = ""
+    """Only of this lot; all where empty."""
+    last: int = Field(default=500, ge=1, le=100_000)
+    actor: Actor

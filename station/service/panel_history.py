@@ -1,0 +1,277 @@
+"""What the pages ask of the past, answered from the records."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from datetime import UTC, datetime
+from itertools import islice
+from pathlib import Path
+
+from sqlalchemy import Connection
+
+from station.channel.messages import Message
+from station.channel.panel_queries import (
+    AskJob,
+    AuditRows,
+    AuditRowTold,
+    Chunk,
+    CurvePointTold,
+    EndJob,
+    EndLot,
+    FindInspections,
+    GetInspection,
+    ImageTold,
+    InspectionPage,
+    InspectionRow,
+    InspectionTold,
+    JobTold,
+    ListLots,
+    Lots,
+    LotTold,
+    ReadAudit,
+    ReadJobFile,
+    Search,
+    StartExport,
+    StartLot,
+    StartLotReport,
+)
+from station.channel.server import Handler
+from station.errors import StationError
+from station.records.audit import AuditEntry
+from station.records.audit_report import read_audit
+from station.records.database import reading
+from station.records.errors import RecordsError
+from station.records.lots import Lot, end_lot, read_lots, start_lot
+from station.records.model import FullRecord
+from station.records.reading import Summary, read_inspection, read_summaries
+from station.records.records import Records
+from station.records.search import LARGEST, Query, find
+from station.records.wording import sentence
+from station.service.panel_jobs import PanelJobs
+from station.service.panel_worker import PanelWorker
+
+LOOKED_THROUGH = 5000
+"""Inspections looked at for one page where a search names the fruit, which no index knows."""
+_PORTION = 250
+_LONGEST_AUDIT_VALUE = 2000
+
+
+class PanelHistory:
+    """Answers about inspections, lots, the audit trail, and files made of them.
+
+    Args:
+        records: opened, or to be opened.
+        worker: what blocks is done there.
+        jobs: what takes long is done there.
+    """
+
+    def __init__(self, records: Records, worker: PanelWorker, jobs: PanelJobs) -> None:
+        self._records, self._worker, self._jobs = records, worker, jobs
+        self._folder = records.folder
+
+    def handlers(self) -> dict[type[Message], Handler]:
+        """What answers each request."""
+        return {
+            FindInspections: self.find,
+            GetInspection: self.inspection,
+            ListLots: self.lots,
+            StartLot: self.start_lot,
+            EndLot: self.end_lot,
+            ReadAudit: self.audit,
+            StartExport: self.start_export,
+            StartLotReport: self.start_report,
+            AskJob: self.job,
+            EndJob: self.end_job,
+            ReadJobFile: self.read_file,
+        }
+
+    async def find(self, request: FindInspections) -> InspectionPage:
+        """One page of a search, newest first."""
+        return await self._worker.do(lambda: self._find(request))
+
+    async def inspection(self, request: GetInspection) -> InspectionTold:
+        """One inspection whole."""
+
+        def read() -> InspectionTold:
+            with reading(self._folder) as connection:
+                return _told(read_inspection(connection, request.sequence, self._folder))
+
+        return await self._worker.do(read)
+
+    async def lots(self, request: ListLots) -> Lots:
+        """The last lots told of."""
+
+        def read() -> Lots:
+            with reading(self._folder) as connection:
+                return Lots(lots=tuple(map(_lot, read_lots(connection, request.limit, name=request.name))))
+
+        return await self._worker.do(read)
+
+    async def start_lot(self, request: StartLot) -> LotTold:
+        """Tell of a lot's begin, with its row of the trail."""
+        lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
+        await self._note(request, "lot.told", {"grower": lot.grower})
+        return _lot(lot)
+
+    async def end_lot(self, request: EndLot) -> LotTold:
+        """Tell of a lot's end, with its row of the trail."""
+        lot = await self._records.change(lambda connection: end_lot(connection, request.name))
+        await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
+        return _lot(lot)
+
+    async def audit(self, request: ReadAudit) -> AuditRows:
+        """The last rows of the trail."""
+
+        def read() -> AuditRows:
+            with reading(self._folder) as connection:
+                rows = read_audit(connection, request.limit, request.action, request.subject)[::-1]
+            told = (
+                AuditRowTold(
+                    seq=row.seq,
+                    utc_ms=row.utc_ms,
+                    who=row.who,
+                    role=row.role,
+                    action=row.action,
+                    subject=row.subject,
+                    reason=row.reason,
+                    old=(row.old or "")[:_LONGEST_AUDIT_VALUE],
+                    new=(row.new or "")[:_LONGEST_AUDIT_VALUE],
+                )
+                for row in rows
+            )
+            return AuditRows(rows=tuple(told))
+
+        return await self._worker.do(read)
+
+    async def start_export(self, request: StartExport) -> JobTold:
+        """Write a table of inspections."""
+        if request.search.fruit is not None:
+            raise RecordsError("a table cannot be narrowed to one fruit", "name its lot or its time instead")
+        folder = self._jobs.folder()
+        target = folder / f"inspections.{request.form}"
+        await self._note(request, "records.exported", request.search.model_dump(mode="json", exclude_none=True))
+        return self._jobs.begin("export", folder, ["records", "export", str(target), *_options(request.search)])
+
+    async def start_report(self, request: StartLotReport) -> JobTold:
+        """Write a lot's report."""
+        _check_text(request.lot)
+        folder = self._jobs.folder()
+        arguments = ["records", "report", "--", request.lot, str(folder / f"lot.{request.form}")]
+        return self._jobs.begin("lot_report", folder, arguments)
+
+    async def job(self, request: AskJob) -> JobTold:
+        """How a job does."""
+        return self._jobs.told(request.job)
+
+    async def end_job(self, request: EndJob) -> JobTold:
+        """Call a job off."""
+        return await self._jobs.end(request.job)
+
+    async def read_file(self, request: ReadJobFile) -> Chunk:
+        """A piece of a job's file."""
+        return await self._worker.do(lambda: self._jobs.read(request.job, request.name, request.offset))
+
+    async def _note(self, request: StartLot | EndLot | StartExport, action: str, new: object) -> None:
+        subject = "records" if isinstance(request, StartExport) else f"lot {request.name}"
+        await self._records.audit(AuditEntry(request.actor.who, request.actor.role, action, subject, new=new))
+
+    def _find(self, request: FindInspections) -> InspectionPage:
+        search, limit = request.search, request.limit
+        query = Query(search.lot, search.grower, search.from_utc_ms, search.to_utc_ms, search.outcome, search.reason)
+        highest = LARGEST if request.below is None else request.below - 1
+        with reading(self._folder) as connection:
+            found = find(connection, query, highest)
+            if search.fruit is None:
+                numbers = list(islice(found, limit + 1))
+                rows = read_summaries(connection, numbers[:limit])
+                below = numbers[limit - 1] if len(numbers) > limit else None
+            else:
+                rows, below = _of_fruit(connection, found, search.fruit, limit)
+        return InspectionPage(rows=tuple(map(_row, rows)), below=below)
+
+
+def _of_fruit(connection: Connection, found: Iterator[int], fruit: str, limit: int) -> tuple[list[Summary], int | None]:
+    """Those of one fruit, and what to go on below; so many are looked at that a page comes in a moment."""
+    rows: list[Summary] = []
+    below = None
+    for _ in range(LOOKED_THROUGH // _PORTION):
+        numbers = list(islice(found, _PORTION))
+        rows += [row for row in read_summaries(connection, numbers) if row.fruit == fruit]
+        if len(rows) > limit:
+            return rows[:limit], rows[limit - 1].sequence
+        if len(numbers) < _PORTION:
+            return rows, None
+        below = numbers[-1]
+    return rows, below
+
+
+def _row(row: Summary) -> InspectionRow:
+    return InspectionRow.model_validate({**row._asdict(), "areas_mm2": row.areas_mm2})
+
+
+def _lot(lot: Lot) -> LotTold:
+    return LotTold(**lot._asdict())
+
+
+def _told(record: FullRecord) -> InspectionTold:
+    trigger, judged, standing, recipe = record.trigger, record.judged, record.standing, record.trigger.recipe
+    reasons = standing.reasons if standing is not None else ()
+    return InspectionTold(
+        sequence=record.sequence,
+        trigger_id=trigger.trigger_id,
+        encoder=trigger.encoder,
+        lot=trigger.lot,
+        began_utc_ms=trigger.began_utc_ms,
+        simulated=trigger.simulated,
+        standing=standing,
+        judged=judged.outcome if judged else None,
+        reasons=tuple((str(reason), sentence(reason)) for reason in reasons),
+        explanation=judged.explanation if judged else (),
+        curve=tuple(
+            CurvePointTold(**{name: value for name, value in asdict(point).items() if name != "captured_s"})
+            for point in (judged.curve if judged else ())
+        ),
+        recipe_name=recipe.name if recipe else "",
+        recipe_revision=recipe.revision if recipe else "",
+        recipe_sha256=recipe.sha256 if recipe else "",
+        recipe=json.loads(recipe.text) if recipe else None,
+        phases_s=dict(judged.phases_s) if judged else {},
+        measures=dict(judged.measures) if judged else {},
+        devices=dict(judged.devices) if judged else {},
+        versions=dict(judged.versions) if judged else {},
+        images=tuple(
+            ImageTold(kind=image.kind, step=image.step, sha256=image.sha256, there=Path(image.path).is_file())
+            for image in record.images
+        ),
+        images_state=record.images_state,
+        published_utc_ms=record.published_utc_ms,
+        acknowledged_utc_ms=record.acknowledged_utc_ms,
+    )
+
+
+def _options(search: Search) -> list[str]:
+    """A search as options of the command line."""
+    given = {
+        "lot": search.lot,
+        "grower": search.grower,
+        "outcome": search.outcome,
+        "reason": search.reason,
+        "from": None if search.from_utc_ms is None else _iso(search.from_utc_ms),
+        "to": None if search.to_utc_ms is None else _iso(search.to_utc_ms),
+    }
+    chosen = {name: str(value) for name, value in given.items() if value is not None}
+    for value in chosen.values():
+        _check_text(value)
+    return [f"--{name}={value}" for name, value in chosen.items()]
+
+
+def _iso(utc_ms: int) -> str:
+    try:
+        return datetime.fromtimestamp(utc_ms / 1000, UTC).isoformat()
+    except (ValueError, OverflowError) as error:
+        raise StationError(f"{utc_ms} ms is no time of a calendar; give another one") from error
+
+
+def _check_text(text: str) -> None:
+    if not text.isprintable():
+        raise StationError(f"{text!r} holds what cannot be printed; give a name of printable letters")

@@ -1,0 +1,250 @@
+"""What a page asks for and takes long: the station's own commands, each as a process that gives way to the cycle.
+
+A thread would share Python's one interpreter lock with the cycle; a process shares only the processor, at the lowest
+priority.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import shutil
+import signal
+import sys
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobTold
+from station.errors import StationError
+
+FOLDER = "panel_jobs"
+LONGEST_S = 1800.0
+KEPT = 8
+"""Jobs whose files are kept, the newest."""
+MOST_WAITING = 4
+_STOP_S = 5.0
+_LEAST_FREE_BYTES = 64 * 1024 * 1024
+_PROGRESS = "replayed.jsonl"
+_MEDIA = {
+    ".csv": "text/csv; charset=utf-8",
+    ".parquet": "application/vnd.apache.parquet",
+    ".html": "text/html; charset=utf-8",
+    ".pdf": "application/pdf",
+    ".json": "application/json",
+}
+
+Kind = Literal["export", "lot_report", "whatif"]
+
+log = logging.getLogger(__name__)
+
+
+class JobError(StationError):
+    """A job that cannot be begun, or is not known."""
+
+
+@dataclass(slots=True)
+class Job:
+    """One command on its way."""
+
+    id: str
+    kind: Kind
+    folder: Path
+    arguments: Sequence[str]
+    of: int = 0
+    state: Literal["waiting", "running", "done", "failed", "ended"] = "waiting"
+    told: str = ""
+    task: asyncio.Task[None] | None = field(default=None, repr=False)
+
+    @property
+    def open(self) -> bool:
+        """Whether it is not over."""
+        return self.state in {"waiting", "running"}
+
+
+class PanelJobs:
+    """Runs one job after the other.
+
+    Args:
+        home: the station's home folder.
+        command: what the arguments are given to.
+    """
+
+    def __init__(self, home: Path, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
+        self._home, self._command = home, tuple(command)
+        self._jobs: dict[str, Job] = {}
+        self._turn = asyncio.Lock()
+
+    def folder(self) -> Path:
+        """A new job's folder, whose name is its id.
+
+        Raises:
+            JobError: too many wait, or the disk is full.
+        """
+        if sum(job.open for job in self._jobs.values()) >= MOST_WAITING:
+            raise JobError(f"{MOST_WAITING} exports and replays are under way; wait for one, or call one off")
+        folder = self._home / FOLDER / uuid.uuid4().hex
+        try:
+            if not self._jobs:
+                shutil.rmtree(folder.parent, ignore_errors=True)  # of the start before
+            folder.mkdir(parents=True)
+            free_bytes = shutil.disk_usage(folder).free
+        except OSError as error:
+            raise JobError(f"{folder.parent}: {(error.strerror or str(error)).lower()}; make it writable") from error
+        if free_bytes < _LEAST_FREE_BYTES:
+            raise JobError(f"{free_bytes // 1_000_000} MB are free on the disk of {folder.parent}; free space first")
+        return folder
+
+    def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobTold:
+        """Begin a job. Not idempotent.
+
+        Args:
+            kind: what it is.
+            folder: from `folder`; what it leaves there are its files.
+            arguments: of the station's command line.
+            of: how much there is to do, where that is known.
+        """
+        job = Job(folder.name, kind, folder, arguments, of)
+        self._jobs[job.id] = job
+        job.task = asyncio.create_task(self._run(job), name=f"job {kind}")
+        self._forget()
+        return self.told(job.id)
+
+    def told(self, job_id: str) -> JobTold:
+        """How a job does.
+
+        Args:
+            job_id: its id.
+
+        Raises:
+            JobError: there is none.
+        """
+        job = self._get(job_id)
+        files = tuple(
+            JobFile(name=path.name, size_bytes=path.stat().st_size, media_type=_MEDIA[path.suffix])
+            for path in sorted(job.folder.iterdir() if job.state == "done" else ())
+            if path.suffix in _MEDIA
+        )
+        return JobTold(
+            job=job.id, kind=job.kind, state=job.state, done=self._done(job), of=job.of, told=job.told, files=files
+        )
+
+    def read(self, job_id: str, name: str, offset: int) -> Chunk:
+        """A piece of a job's file. Blocks.
+
+        Args:
+            job_id: of a job that is done.
+            name: the file's.
+            offset: bytes from its beginning.
+
+        Raises:
+            JobError: there is no such file.
+        """
+        told = self.told(job_id)
+        if name not in {file.name for file in told.files}:
+            raise JobError(f"there is no file {name} of this job; begin it again")
+        try:
+            with (self._get(job_id).folder / name).open("rb") as file:
+                size_bytes = file.seek(0, os.SEEK_END)
+                file.seek(min(offset, size_bytes))
+                return Chunk(data=file.read(LARGEST_CHUNK_BYTES), size_bytes=size_bytes)
+        except OSError as error:
+            raise JobError(f"{name} cannot be read: {error.strerror}; begin the job again") from error
+
+    async def end(self, job_id: str) -> JobTold:
+        """Call a job off. Idempotent.
+
+        Args:
+            job_id: its id.
+        """
+        job = self._get(job_id)
+        if job.task is not None and job.open:
+            job.task.cancel()
+            await asyncio.gather(job.task, return_exceptions=True)
+            if job.open:  # cancelled before it ran at all
+                job.state = "ended"
+        return self.told(job_id)
+
+    async def close(self) -> None:
+        """End what runs. Idempotent."""
+        for job_id in list(self._jobs):
+            await self.end(job_id)
+
+    async def _run(self, job: Job) -> None:
+        try:
+            async with self._turn:
+                job.state = "running"
+                async with asyncio.timeout(LONGEST_S):
+                    code, words = await self._carry_out(job)
+            job.state = "failed" if code else "done"
+            job.told = words
+        except TimeoutError:
+            job.state, job.told = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
+        except OSError as error:
+            job.state, job.told = "failed", f"it could not be started: {error.strerror}"
+        except asyncio.CancelledError:
+            job.state = "ended"
+            raise
+        finally:
+            if job.state != "done":
+                shutil.rmtree(job.folder, ignore_errors=True)
+
+    async def _carry_out(self, job: Job) -> tuple[int, str]:
+        """Exit code and last words."""
+        environment = {
+            **{name: value for name, value in os.environ.items() if not name.startswith("STATION_")},
+            "STATION_HOME": str(self._home),
+            "OMP_NUM_THREADS": "1",
+        }
+        process = await asyncio.create_subprocess_exec(
+            *self._command,
+            *job.arguments,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+            env=environment,
+            cwd=self._home,
+            start_new_session=True,
+        )
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, process.pid, 19)
+        try:
+            _, stderr = await process.communicate()
+        finally:
+            await _ended(process)
+        words = stderr.decode("utf-8", "replace").strip().splitlines()
+        return process.returncode or 0, words[-1][:1000] if process.returncode and words else ""
+
+    def _done(self, job: Job) -> int:
+        """Of a what-if, from the file that it appends to; its first line is a heading."""
+        if job.state == "done":
+            return job.of
+        with contextlib.suppress(OSError):
+            return max(0, (job.folder / _PROGRESS).read_bytes().count(b"\n") - 1)
+        return 0
+
+    def _get(self, job_id: str) -> Job:
+        if job_id not in self._jobs:
+            raise JobError("this job is not known any more; begin it again")
+        return self._jobs[job_id]
+
+    def _forget(self) -> None:
+        over = [job for job in self._jobs.values() if not job.open]
+        for job in over[: max(0, len(self._jobs) - KEPT)]:
+            shutil.rmtree(job.folder, ignore_errors=True)
+            del self._jobs[job.id]
+
+
+async def _ended(process: asyncio.subprocess.Process) -> None:
+    """Whatever happens, the process and all that it has started are gone."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            process.terminate()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_STOP_S):
+                await process.wait()
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    await process.wait()

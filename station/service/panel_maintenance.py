@@ -1,0 +1,282 @@
+"""What the maintenance page asks: health, jogging in manual mode, the live image, the PLC's registers, the log."""
+
+import asyncio
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from station.channel.messages import Message
+from station.channel.panel_maintenance_queries import (
+    HISTOGRAM_BINS,
+    GetHealth,
+    GetLiveImage,
+    GetRegisters,
+    Health,
+    Jogged,
+    JogGripper,
+    Lit,
+    LiveImage,
+    Log,
+    PartHealth,
+    ReadLog,
+    Registers,
+    SetLeds,
+)
+from station.channel.panel_queries import Actor, Picture
+from station.channel.server import Handler
+from station.devices.camera.interface import Frame, Image, Leds
+from station.errors import StationError
+from station.inspection.states import STATES, State
+from station.records.audit import AuditEntry
+from station.service.calibrated import Calibrated
+from station.service.crew import GRIPPER, Crew
+from station.service.health import Liveness
+from station.service.orders import Orders
+from station.service.panel_log import LogRing
+from station.service.panel_worker import PanelWorker
+from station.service.readiness import Gate
+from station.service.reference import GOLDEN, sharpness
+from station.service.service import Service
+from station.service.trail import Trail
+from station.settings.segmentation import Segmentation
+from station.vision.contact import Contact, Method
+from station.vision.methods import make_method
+from station.vocabulary import Refusal
+
+MANUAL = 3
+"""PackML's unit mode in which a person moves things by hand."""
+JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
+"""The gripper's slowest and weakest."""
+FRAME_DEADLINE_S = 2.0
+REGISTERS_DEADLINE_S = 3.0
+_JOGGED = {State.IDLE, State.STOPPED, State.CARRIED}
+"""Where the cycle moves nothing by itself."""
+_SATURATED_LEVEL = 250
+_JPEG_QUALITY = 85
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
+
+
+class NotNowError(StationError):
+    """What a person asks for is not done in this state; the message says what has to be done first."""
+
+
+class PanelMaintenance:
+    """Answers the maintenance page.
+
+    Args:
+        service: the cycle.
+        crew: the devices.
+        orders: the mode, and what the PLC interface told.
+        gate: what inspecting needs, with ages.
+        liveness: what has to make progress.
+        calibrated: the scale, and the golden reference.
+        trail: told of everything that is moved.
+        home: where the golden reference of a sensor that is not calibrated lies.
+        worker: pictures are made there.
+        log: the last lines.
+        versions: of the programs.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        crew: Crew,
+        orders: Orders,
+        gate: Gate,
+        liveness: Liveness,
+        calibrated: Calibrated,
+        trail: Trail,
+        home: Path,
+        worker: PanelWorker,
+        log: LogRing,
+        versions: Mapping[str, str],
+    ) -> None:
+        self._service, self._crew, self._orders, self._gate = service, crew, orders, gate
+        self._liveness, self._calibrated, self._trail, self._home = liveness, calibrated, trail, home
+        self._worker, self._log, self._versions = worker, log, dict(versions)
+        self._moving = asyncio.Lock()
+        self._method: tuple[object, Method] | None = None
+
+    def handlers(self) -> dict[type[Message], Handler]:
+        """What answers each request."""
+        return {
+            GetHealth: self.health,
+            JogGripper: self.jog,
+            SetLeds: self.set_leds,
+            GetLiveImage: self.live_image,
+            GetRegisters: self.registers,
+            ReadLog: self.log_lines,
+        }
+
+    def refusal(self) -> str:
+        """Why nothing may be moved by hand now, with what to do; empty where it may."""
+        service, facts, mode = self._service, STATES[self._service.state], self._orders.mode
+        if service.stop_asked:
+            return "The station is told to end."
+        if facts.refusal is Refusal.BUSY:
+            return "An inspection is under way: wait for its end."
+        if mode != MANUAL:
+            return f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then."
+        if service.state not in _JOGGED:
+            return facts.sentence
+        if self._orders.kept_manual and not self._moving.locked():
+            return f"{self._orders.kept_manual} is under way: let it end, or call it off."
+        return ""
+
+    async def health(self, _request: GetHealth) -> Health:
+        """How everything does."""
+        readiness, records, figures = self._gate.readiness(), self._service.ledger.records, self._calibrated.figures
+        status = await self._worker.do(records.status)
+        return Health(
+            ready=readiness.ready,
+            why=readiness.why,
+            mode=self._orders.mode,
+            state=STATES[self._service.state].sentence,
+            jog_refused=self.refusal(),
+            parts=tuple(
+                PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
+                for each in readiness.dependencies
+            ),
+            devices=self._crew.names,
+            versions=self._versions,
+            progress_age_s=self._liveness.ages_s(),
+            records={
+                "database_bytes": status.database_bytes,
+                "image_bytes": status.image_bytes,
+                "free_bytes": status.free_bytes,
+                "queue": status.queue,
+                "images_waiting": status.images_waiting,
+                "writes": status.writes,
+            },
+            records_error=status.error,
+            calibration_age_s=figures.age_s,
+            verification_age_s=figures.verification_age_s,
+            simulated=self._crew.simulated,
+        )
+
+    async def jog(self, request: JogGripper) -> Jogged:
+        """Move the fingers, or stop them.
+
+        Raises:
+            NotNowError: it is not the time for it.
+            GripperError: they did not get there.
+        """
+        gripper, width_mm = self._crew.cell.gripper, request.width_mm
+        if (request.to == "width") != (width_mm is not None):
+            raise StationError("to jog the gripper: expected a width where it is to go to one, and none elsewhere")
+        self._check(request.actor, "jog", request.to)
+        if request.to == "stop":
+            reading = await gripper.stop()
+        else:
+            if width_mm is not None and width_mm > gripper.max_width_mm:
+                raise StationError(f"the fingers open to {gripper.max_width_mm:.1f} mm, not to {width_mm:g} mm")
+            if self._moving.locked():
+                raise NotNowError("the fingers move already: wait for them, or stop them")
+            async with self._moving:
+                self._orders.kept_manual = "jogging"
+                try:
+                    wide_mm = gripper.max_width_mm if width_mm is None else width_mm
+                    reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
+                finally:
+                    self._orders.kept_manual = ""
+        self._crew.watches[GRIPPER].heard()
+        where = f"{reading.width_mm:.1f} mm"
+        self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
+        return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
+
+    async def set_leds(self, request: SetLeds) -> Lit:
+        """Set the sensor's light; the next start of the camera sets its own again."""
+        self._check(request.actor, "leds", "camera")
+        await self._crew.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
+        self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
+        return Lit()
+
+    async def live_image(self, request: GetLiveImage) -> LiveImage:
+        """The newest image; it is only measured while nothing is inspected."""
+        frame = await self._crew.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
+        active = self._service.active
+        why = ""
+        if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
+            why = "An inspection is under way: the image is shown as it is."
+        elif request.contact and active is None:
+            why = "No recipe is active: its method measures the contact."
+        segmentation = active.recipe.segmentation if request.contact and active is not None and not why else None
+        return await self._worker.do(lambda: self._live(frame, segmentation, why))
+
+    async def registers(self, _request: GetRegisters) -> Registers:
+        """The PLC's registers, asked for with the next beat; after a while what was told last."""
+        asked_s = time.monotonic()
+        self._orders.registers_wanted = True
+        while self._orders.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
+            await asyncio.sleep(0.05)
+        told, at_s = self._orders.registers
+        return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
+
+    async def log_lines(self, request: ReadLog) -> Log:
+        """The last lines of the log."""
+        return Log(lines=self._log.last(request.limit, request.level))
+
+    def _check(self, actor: Actor, command: str, subject: str) -> None:
+        if why := self.refusal():
+            self._note(actor, command, subject, {"done": False, "why": why})
+            raise NotNowError(why)
+
+    def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
+        self._trail.note(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+
+    def _live(self, frame: Frame, segmentation: Segmentation | None, why: str) -> LiveImage:
+        image, contact = frame.image, None
+        shown = image
+        if segmentation is not None:
+            contact, why = self._contact(segmentation, image)
+            shown = image if contact is None else _outlined(image, contact)
+        data = cv2.imencode(".jpg", shown, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
+        blue, green, red = (_histogram(image[:, :, channel]) for channel in range(3))
+        scale_mm = self._calibrated.in_force.mm_per_px
+        return LiveImage(
+            picture=Picture(media_type="image/jpeg", data=data),
+            captured_s=frame.captured_s,
+            age_s=time.monotonic() - frame.captured_s,
+            faults=tuple(sorted(fault.value for fault in frame.faults)),
+            histogram=(red, green, blue),
+            saturated_share=float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL)),
+            sharpness=sharpness(image),
+            area_px=contact.area_px if contact else None,
+            area_mm2=contact.area_px * scale_mm**2 if contact else None,
+            flags=tuple(sorted(flag.value for flag in contact.flags)) if contact else (),
+            contact=why,
+        )
+
+    def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, str]:
+        """The contact against the golden reference, or why there is none measured."""
+        path = self._calibrated.golden() or self._home / GOLDEN
+        try:
+            key = (path, path.stat().st_mtime_ns, segmentation)
+        except OSError:
+            return None, "There is no golden reference yet: calibrate, or let the station inspect once."
+        if self._method is None or self._method[0] != key:
+            picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+            if picture is None:
+                return None, f"The golden reference {path.name} cannot be read: calibrate again."
+            self._method = key, make_method([np.asarray(picture, np.uint8)], segmentation)
+        try:
+            return self._method[1].measure(image), ""
+        except ValueError:
+            return None, "The image has another size than the golden reference: calibrate again."
+
+
+def _outlined(image: Image, contact: Contact) -> Image:
+    drawn = image.copy()
+    outlines, _ = cv2.findContours(contact.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(drawn, outlines, -1, _BLACK, 3)
+    cv2.drawContours(drawn, outlines, -1, _WHITE, 1)
+    return drawn
+
+
+def _histogram(channel: np.ndarray) -> tuple[int, ...]:
+    return tuple(
+        int(count) for count in np.bincount(channel.ravel() // (256 // HISTOGRAM_BINS), minlength=HISTOGRAM_BINS)
+    )

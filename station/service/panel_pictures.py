@@ -1,0 +1,104 @@
+"""Stored images for the pages, and what the measurement makes of them, stage by stage."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from station.channel.messages import Message
+from station.channel.panel_queries import GetImage, GetStages, Picture, Stages
+from station.channel.server import Handler
+from station.records.database import reading
+from station.records.errors import RecordsError
+from station.records.images import image_path
+from station.records.model import FullRecord, StoredImage
+from station.records.reading import read_inspection
+from station.service.panel_worker import PanelWorker
+from station.settings.problems import SettingsError
+from station.settings.recipe_form import parse_recipe
+from station.vision.contact import Image
+from station.vision.methods import make_method
+
+LARGEST_IMAGE_BYTES = 8 * 1024 * 1024
+_JPEG_QUALITY = 88
+
+
+class PanelPictures:
+    """Answers with pictures.
+
+    Args:
+        folder: the records' folder.
+        worker: what blocks is done there.
+    """
+
+    def __init__(self, folder: Path, worker: PanelWorker) -> None:
+        self._folder, self._worker = folder, worker
+
+    def handlers(self) -> dict[type[Message], Handler]:
+        """What answers each request."""
+        return {GetImage: self.image, GetStages: self.stages}
+
+    async def image(self, request: GetImage) -> Picture:
+        """One stored image."""
+
+        def read() -> Picture:
+            return Picture(media_type="image/png", data=_file(image_path(self._folder, request.sha256)))
+
+        return await self._worker.do(read)
+
+    async def stages(self, request: GetStages) -> Stages:
+        """One step measured again with its stages."""
+        return await self._worker.do(lambda: self._stages(request))
+
+    def _stages(self, request: GetStages) -> Stages:
+        with reading(self._folder) as connection:
+            record = read_inspection(connection, request.sequence, self._folder)
+        if record.trigger.recipe is None:
+            raise RecordsError(f"inspection {request.sequence} has no recipe", "look at another one")
+        try:
+            recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
+        except SettingsError as error:
+            raise RecordsError("its recipe is of a form that this program does not take", str(error)) from error
+        reference = _picture(_kept(record, "reference", None))
+        image = _picture(_kept(record, "step", request.step))
+        if reference.shape != image.shape:
+            raise RecordsError("its reference and this image differ in size", "look at another step")
+        pictures: list[tuple[str, Picture]] = []
+
+        def take(name: str, picture: np.ndarray) -> None:
+            pictures.append((name, _jpeg(picture)))
+
+        contact = make_method([reference], recipe.segmentation).measure(image, take)
+        return Stages(pictures=tuple(pictures), area_px=contact.area_px)
+
+
+def _kept(record: FullRecord, kind: str, step: int | None) -> StoredImage:
+    for image in record.images:
+        if image.kind == kind and image.step == step:
+            return image
+    what = "reference" if step is None else f"image of step {step}"
+    raise RecordsError(
+        f"the {what} of inspection {record.sequence} was not kept ({record.images_state})",
+        "look at another one; records.images_quota_mb and records.accepted_share say what is kept",
+    )
+
+
+def _file(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST_IMAGE_BYTES:
+            raise RecordsError("the image's file is larger than any of a sensor", f"look at {path}")
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordsError("the image is not kept any more", "the oldest images make room for new ones") from error
+
+
+def _picture(image: StoredImage) -> Image:
+    picture = cv2.imdecode(np.frombuffer(_file(Path(image.path)), np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        raise RecordsError("the image's file is damaged", "run `station records check`")
+    return np.asarray(picture, np.uint8)
+
+
+def _jpeg(picture: np.ndarray) -> Picture:
+    data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
+    return Picture(media_type="image/jpeg", data=data)

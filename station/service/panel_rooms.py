@@ -1,0 +1,96 @@
+"""What answers the pages Recipes, History and Maintenance, put together for the panel's server."""
+
+import contextlib
+from collections.abc import Mapping
+from typing import Self
+
+from station.channel.messages import Message
+from station.channel.server import Handler
+from station.records.records import Records
+from station.service.calibrated import Calibrated
+from station.service.crew import Crew
+from station.service.health import Liveness
+from station.service.orders import Orders
+from station.service.panel_ball import PanelBall
+from station.service.panel_history import PanelHistory
+from station.service.panel_jobs import PanelJobs
+from station.service.panel_log import LogRing
+from station.service.panel_maintenance import PanelMaintenance
+from station.service.panel_pictures import PanelPictures
+from station.service.panel_recipes import PanelRecipes
+from station.service.panel_worker import PanelWorker
+from station.service.readiness import Gate
+from station.service.service import Service
+from station.service.trail import Trail
+from station.settings.configuration import Configuration
+
+
+class PanelRooms:
+    """Their handlers; keep it open with `async with` for as long as they answer, and close it before the devices.
+
+    Args:
+        configuration: the site's.
+        records: opened, or to be opened.
+        service: the cycle.
+        crew: the devices.
+        orders: the mode.
+        gate: what inspecting needs.
+        liveness: what has to make progress.
+        calibrated: the scale.
+        trail: told of everything that a person does.
+        versions: of the programs.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        records: Records,
+        service: Service,
+        crew: Crew,
+        orders: Orders,
+        gate: Gate,
+        liveness: Liveness,
+        calibrated: Calibrated,
+        trail: Trail,
+        versions: Mapping[str, str],
+    ) -> None:
+        self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
+        history = PanelHistory(records, self._worker, self._jobs)
+        recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker, self._jobs)
+        maintenance = PanelMaintenance(
+            service,
+            crew,
+            orders,
+            gate,
+            liveness,
+            calibrated,
+            trail,
+            configuration.home,
+            self._worker,
+            self._log,
+            versions,
+        )
+        self._ball = PanelBall(
+            configuration, crew, orders, calibrated, records, trail, self._worker, maintenance.refusal
+        )
+        self.handlers: dict[type[Message], Handler] = {
+            **history.handlers(),
+            **PanelPictures(records.folder, self._worker).handlers(),
+            **recipes.handlers(),
+            **maintenance.handlers(),
+            **self._ball.handlers(),
+        }
+        """What answers each request."""
+        self._open = contextlib.AsyncExitStack()
+
+    async def __aenter__(self) -> Self:
+        """Keep the log from now on."""
+        self._open.callback(self._worker.close)
+        self._open.enter_context(self._log)
+        self._open.push_async_callback(self._jobs.close)
+        self._open.push_async_callback(self._ball.close)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Call off what runs."""
+        await self._open.aclose()

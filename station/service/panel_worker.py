@@ -1,0 +1,53 @@
+"""One thread for what the pages ask: neither disk nor pictures hold the cycle up, and pages take one core at most."""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from station.errors import StationError
+
+T = TypeVar("T")
+
+LONGEST_S = 20.0
+MOST_WAITING = 32
+
+
+class PanelBusyError(StationError):
+    """Too much is asked for at once, or it takes too long."""
+
+
+class PanelWorker:
+    """Answers one question after the other. Close it at the end."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, "panel")
+        self._waiting = 0
+
+    async def do(self, work: Callable[[], T]) -> T:
+        """Have something done in the thread.
+
+        Args:
+            work: blocks, for a moment.
+
+        Raises:
+            PanelBusyError: it is not begun, or its end is not waited for; what is begun still comes to its end.
+            StationError: as the work raises it.
+        """
+        if self._waiting >= MOST_WAITING:
+            raise PanelBusyError(f"{self._waiting} questions of the pages wait already; ask again in a moment")
+        self._waiting += 1
+        future = self._thread.submit(work)
+        future.add_done_callback(lambda _: self._done())
+        try:
+            async with asyncio.timeout(LONGEST_S):
+                return await asyncio.wrap_future(future)
+        except TimeoutError:
+            raise PanelBusyError(f"no answer within {LONGEST_S:g} s; ask for less, or again in a moment") from None
+
+    def _done(self) -> None:
+        self._waiting -= 1
+
+    def close(self) -> None:
+        """End the thread, after what it is doing. Blocks so long."""
+        self._thread.shutdown(cancel_futures=True)

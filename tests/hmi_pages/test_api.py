@@ -1,0 +1,145 @@
+"""The HTTP API as a plant's system uses it, and as somebody who should not."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+
+from hmi.roles import Role
+from station.channel.panel_queries import AuditRows, ReadAudit
+
+pytestmark = pytest.mark.timeout(400)
+
+PIN = "735192"
+OPERATIONS = (
+    ("GET", "/api/v1/health"),
+    ("GET", "/api/v1/inspections"),
+    ("GET", "/api/v1/inspections/{sequence}"),
+    ("GET", "/api/v1/recipes"),
+    ("GET", "/api/v1/recipes/{name}"),
+    ("GET", "/api/v1/lots"),
+    ("GET", "/api/v1/lots/{name}"),
+    ("PUT", "/api/v1/lots/{name}"),
+    ("POST", "/api/v1/lots/{name}/end"),
+)
+
+
+@pytest.fixture(scope="module")
+def reading(token_of: Callable[[str, Role], str]) -> str:
+    return token_of("reading", Role.VIEWER)
+
+
+@pytest.fixture(scope="module")
+def writing(token_of: Callable[[str, Role], str]) -> str:
+    return token_of("writing", Role.OPERATOR)
+
+
+@pytest.fixture(scope="module")
+def schema(orchard: Any) -> Any:
+    return schemathesis.openapi.from_url(f"{orchard.address}/api/openapi.json")
+
+
+def test_every_operation_is_tried(schema: Any) -> None:
+    known = {(each.ok().method.upper(), each.ok().path) for each in schema.get_all_operations()}
+    assert known == set(OPERATIONS)
+
+
+@pytest.mark.parametrize(("method", "path"), OPERATIONS)
+def test_no_5xx_and_no_undocumented_answer(schema: Any, writing: str, method: str, path: str) -> None:
+    operation = schema[path][method]
+
+    @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @given(case=operation.as_strategy())
+    def check(case: Any) -> None:
+        case.call_and_validate(headers={"Authorization": f"Bearer {writing}"}, timeout=60)
+
+    check()
+
+
+def test_results_are_found_by_their_reason_and_told_whole(orchard: Any, api: Any, reading: str) -> None:
+    soft = orchard.soft
+    page = api("GET", f"/api/v1/inspections?reason={soft.reasons[0]}&limit=100", token=reading).body
+    assert soft.sequence in [each["sequence"] for each in page["inspections"]]
+    whole = api("GET", f"/api/v1/inspections/{soft.sequence}", token=reading).body
+    assert whole["outcome"] == soft.outcome
+    assert whole["reasons"] == [str(reason) for reason in soft.reasons]
+    assert len(whole["curve"]) >= 3
+    assert whole["recipe"] == "strawberry"
+
+
+def test_pages_of_results_neither_overlap_nor_leave_out(orchard: Any, api: Any, reading: str) -> None:
+    seen, below = [], ""
+    for _ in range(10):
+        page = api("GET", f"/api/v1/inspections?limit=1{below}", token=reading).body
+        seen += [each["sequence"] for each in page["inspections"]]
+        if page["below"] is None:
+            break
+        below = f"&below={page['below']}"
+    assert seen == sorted((outcome.sequence for outcome in orchard.fruit), reverse=True)
+
+
+def test_a_lot_is_begun_and_ended_and_the_trail_knows_by_whom(orchard: Any, api: Any, writing: str) -> None:
+    begun = api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"})
+    assert (begun.status, begun.body["grower"], begun.body["ended"]) == (200, "Hof Süd", None)
+    assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"}).body == begun.body
+    assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "another"}).status == 409
+    assert api("POST", "/api/v1/lots/L-7/end", token=writing).body["ended"] is not None
+    assert api("GET", "/api/v1/lots/L-7", token=writing).body["ended"] is not None
+    rows = orchard.over_the_panel(
+        lambda client: client.ask(ReadAudit(action="lot.", subject="L-7"), AuditRows, deadline_s=20)
+    ).rows
+    assert {(row.who, row.role, row.action) for row in rows} == {
+        ("writing", "operator", "lot.told"),
+        ("writing", "operator", "lot.ended"),
+    }
+
+
+@pytest.mark.parametrize("path", ["/api/v1/health", "/api/v1/inspections", "/api/v1/lots", "/api/v1/recipes"])
+def test_nobody_reads_without_a_token(api: Any, path: str) -> None:
+    assert api("GET", path).status == 401
+    assert api("GET", path, token="fst_" + "x" * 43).status == 401
+    assert api("GET", path, token="x" * 5000).status == 401
+
+
+def test_a_withdrawn_token_counts_no_more(site: Any, api: Any, token_of: Any) -> None:
+    token = token_of("leaving", Role.VIEWER)
+    assert api("GET", "/api/v1/health", token=token).status == 200
+    token_of.__self__.remove("leaving")
+    assert api("GET", "/api/v1/health", token=token).status == 401
+
+
+def test_a_readers_token_changes_nothing(api: Any, reading: str) -> None:
+    assert api("PUT", "/api/v1/lots/NO", token=reading, json_body={"grower": "x"}).status == 403
+    assert api("GET", "/api/v1/lots/NO", token=reading).status == 404
+
+
+def test_foreign_pages_names_and_too_much_are_refused(api: Any, writing: str) -> None:
+    order = {"token": writing, "json_body": {"grower": "x"}}
+    assert api("PUT", "/api/v1/lots/NO", **order, origin="https://evil.example").status == 403
+    assert api("PUT", "/api/v1/lots/NO", **order, sec_fetch_site="cross-site").status == 403
+    assert api("PUT", "/api/v1/lots/NO", **order, host="evil.example").status == 421
+    assert api("PUT", "/api/v1/lots/NO", b"x" * 300_000, token=writing).status == 413
+    assert api("GET", "/api/v1/lots/NO", token=writing).status == 404
+
+
+def test_a_browsers_order_needs_the_pages_token_once(api: Any) -> None:
+    page = api("GET", "/people")
+    cookie = page.headers["set-cookie"].split(";")[0]
+    token = re.search(r'name="csrf" value="([^"]+)"', page.body)
+    assert token is not None
+    form = f"csrf={token[1]}&name=Ada&pin={PIN}&back=/".encode()
+    form_type = {"content_type": "application/x-www-form-urlencoded"}
+    logged_in = api("POST", "/people/log-in", form, cookie=cookie, **form_type)
+    assert logged_in.status == 303
+    cookie = logged_in.headers["set-cookie"].split(";")[0]
+    assert api("GET", "/api/v1/health", cookie=cookie).status == 200
+    order = {"cookie": cookie, "json_body": {"grower": "x"}}
+    assert api("PUT", "/api/v1/lots/BY-HAND", **order).status == 403
+    assert api("PUT", "/api/v1/lots/BY-HAND", **order, x_csrf_token="forged").status == 403
+    fresh = re.search(r'name="csrf" value="([^"]+)"', api("GET", "/people", cookie=cookie).body)
+    assert fresh is not None
+    assert api("PUT", "/api/v1/lots/BY-HAND", **order, x_csrf_token=fresh[1]).status == 200
+    assert api("PUT", "/api/v1/lots/BY-HAND", **order, x_csrf_token=fresh[1]).status == 409

@@ -1,0 +1,154 @@
+"""What the station does for the pages, without a browser: jobs, the worker, forms, charts."""
+
+import asyncio
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmi.limit_chart import Curve, Limit, area_chart, strip
+from hmi.recipe_form import BadFieldError, changed, groups, shown
+from station.channel.panel_queries import JobTold
+from station.service.panel_jobs import MOST_WAITING, JobError, PanelJobs
+from station.service.panel_worker import MOST_WAITING as MOST_QUESTIONS
+from station.service.panel_worker import PanelBusyError, PanelWorker
+from station.settings.recipe import load_recipes
+
+PATIENCE_S = 60.0
+WRITE = "import sys, pathlib; pathlib.Path(sys.argv[1], 'inspections.csv').write_bytes(b'x' * 5_000_000)"
+FAIL = "import sys; sys.exit('the disk is full')"
+WAIT = "import sys, time, pathlib; pathlib.Path(sys.argv[1], 'begun').touch(); time.sleep(600)"
+
+
+async def until(jobs: PanelJobs, job: str, wanted: Callable[[JobTold], Any]) -> JobTold:
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not wanted(told := jobs.told(job)):
+        assert time.monotonic() < deadline_s, told
+        await asyncio.sleep(0.02)
+    return told
+
+
+def with_jobs(home: Path, code: str, work: Callable[[PanelJobs], Any]) -> None:
+    async def run() -> None:
+        jobs = PanelJobs(home, (sys.executable, "-c", code))
+        try:
+            await work(jobs)
+        finally:
+            await jobs.close()
+
+    asyncio.run(run())
+
+
+def test_a_jobs_file_is_read_piece_by_piece_and_nothing_else_is(tmp_path: Path) -> None:
+    async def work(jobs: PanelJobs) -> None:
+        folder = jobs.folder()
+        job = jobs.begin("export", folder, [str(folder)]).job
+        told = await until(jobs, job, lambda told: told.state == "done")
+        assert [(file.name, file.size_bytes) for file in told.files] == [("inspections.csv", 5_000_000)]
+        first = jobs.read(job, "inspections.csv", 0)
+        second = jobs.read(job, "inspections.csv", len(first.data))
+        assert len(first.data) + len(second.data) == first.size_bytes == 5_000_000
+        assert jobs.read(job, "inspections.csv", 5_000_000).data == b""
+        (folder / "secret").write_text("x")
+        for name in ("secret", "../inspections.csv", "/etc/passwd"):
+            with pytest.raises(JobError):
+                jobs.read(job, name, 0)
+
+    with_jobs(tmp_path, WRITE, work)
+
+
+def test_a_job_that_fails_tells_its_last_words_and_leaves_nothing(tmp_path: Path) -> None:
+    async def work(jobs: PanelJobs) -> None:
+        folder = jobs.folder()
+        told = await until(jobs, jobs.begin("export", folder, [str(folder)]).job, lambda told: told.state == "failed")
+        assert told.told == "the disk is full"
+        assert told.files == ()
+        assert not folder.exists()
+
+    with_jobs(tmp_path, FAIL, work)
+
+
+def test_a_job_called_off_ends_its_process_and_too_many_are_refused(tmp_path: Path) -> None:
+    async def work(jobs: PanelJobs) -> None:
+        folders = []
+        begun = []
+        for _ in range(MOST_WAITING):
+            folders.append(jobs.folder())
+            begun.append(jobs.begin("export", folders[-1], [str(folders[-1])]).job)
+        with pytest.raises(JobError):
+            jobs.folder()
+        await until(jobs, begun[0], lambda _: (folders[0] / "begun").exists())
+        assert psutil.Process().children()
+        for job in begun:
+            assert (await jobs.end(job)).state == "ended"
+        assert not psutil.Process().children()
+        assert not any(folder.exists() for folder in folders)
+        jobs.folder()
+
+    with_jobs(tmp_path, WAIT, work)
+
+
+def test_the_worker_refuses_more_than_it_can_hold() -> None:
+    async def run() -> None:
+        worker, going = PanelWorker(), threading.Event()
+        try:
+            asked = [asyncio.create_task(worker.do(lambda: going.wait(PATIENCE_S))) for _ in range(MOST_QUESTIONS)]
+            await asyncio.sleep(0)
+            with pytest.raises(PanelBusyError):
+                await worker.do(lambda: None)
+            going.set()
+            assert await asyncio.gather(*asked) == [True] * MOST_QUESTIONS
+            assert await worker.do(lambda: 7) == 7
+        finally:
+            going.set()
+            worker.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_form_sent_back_as_it_was_shown_changes_nothing(decimal: str) -> None:
+    for recipe in load_recipes().values():
+        values = recipe.model_dump(mode="json")
+        form = {field.path: shown(field, decimal) for group in groups(values) for field in group.fields}
+        assert changed(values, form) == {}
+
+
+def test_a_form_tells_numbers_lists_and_nothing_apart() -> None:
+    values = load_recipes()["strawberry"].model_dump(mode="json")
+    typed = {"steps.result_closings_mm": "3; 4,5", "steps.start_width_mm": "", "damage.area[0].area_mm2": " 99,5 "}
+    assert changed(values, typed) == {"steps.result_closings_mm": [3, 4.5], "damage.area[0].area_mm2": 99.5}
+    for path, text in (("damage.area[0].area_mm2", "nan"), ("steps.number", "many"), ("steps.start", "middle")):
+        with pytest.raises(BadFieldError):
+            changed(values, {path: text})
+
+
+areas = st.floats(0, 260, allow_nan=False)
+
+
+@given(st.lists(st.tuples(st.floats(0, 50), areas), max_size=30), st.floats(0.5, 50), st.floats(1, 260), areas)
+def test_nothing_is_drawn_outside_a_chart(points: Any, closing_mm: float, limit_mm2: float, early_mm2: float) -> None:
+    chart = area_chart([Curve("own", points)], [Limit(closing_mm, limit_mm2, 0.0)], early_mm2)
+    places = [place for _, _, marked in chart.curves for place in marked]
+    places += [(mark.x, mark.y) for mark in chart.marks]
+    assert all(62 <= x <= 702 and 0 <= y <= 284 for x, y in places)
+    assert chart.early_y is not None
+    for (x, y), (value, area) in zip(chart.curves[0][2], points, strict=True):
+        mark = chart.marks[0]
+        assert (x - mark.x) * (value - closing_mm) >= 0
+        assert (mark.y - y) * (area - limit_mm2) >= 0
+
+
+@given(st.lists(st.tuples(st.sampled_from(["pass", "fail"]), st.floats(0, 1e4)), max_size=40), st.floats(0, 1e4))
+def test_a_strip_shows_every_fruit_on_its_side_of_the_limit(values: Any, limit: float) -> None:
+    drawn = strip(values, [("limit", limit)])
+    assert len(drawn.dots) == len(values)
+    for (_, value), (_, x, _) in zip(values, drawn.dots, strict=True):
+        assert (x - drawn.lines[0].x) * (value - limit) >= 0
