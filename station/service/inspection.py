@@ -73,6 +73,12 @@ class Inspection:
         if why and why not in self.explanation:
             self.explanation.append(why)
 
+    def forget_pictures(self) -> None:
+        """Let go of the frames, which are in the records by now or never will be."""
+        self.steps.clear()
+        self.seen.clear()
+        self.reference_image = None
+
     def press(self) -> Press:
         """What was measured so far, for the judge."""
         onset_mm = self.onset_mm

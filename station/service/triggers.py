@@ -32,7 +32,7 @@ class Triggers:
         return self._inspections.get(self._last[1])
 
     def accepted(self, request: Begin, now: Inspection) -> None:
-        """A trigger is durable and its inspection has begun.
+        """A trigger is durable and its inspection has begun; those before it were told and need no pictures any more.
 
         Args:
             request: the trigger.
@@ -40,6 +40,8 @@ class Triggers:
         """
         assert now.sequence is not None  # noqa: S101 (it is durable)
         self._last = (request, now.sequence)
+        for told in self._inspections.values():
+            told.forget_pictures()
         self._inspections[now.sequence] = now
         self._outcomes[now.sequence] = asyncio.get_running_loop().create_future()
         while len(self._outcomes) > _REMEMBERED:
