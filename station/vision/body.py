@@ -40,7 +40,7 @@ _HALF_FROM_PX = 2.5
 _STIFFNESS = 0.05
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_LEVEL = 1e-3
-_LEAST_BACKGROUND, _LOWEST = 0.02, 0.03
+_LEAST_BACKGROUND, _WELL_KNOWN, _LOWEST = 0.02, 0.1, 0.03
 
 _Floats = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Body(NamedTuple):
     coherence: float
     """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1.
 
-    0 where hardly any background is left, since the slope of the whole body is then in the change as well."""
+    Less where hardly any background is left, since the slope of the whole body is then in the change as well."""
     textured: bool
     """Whether seeds or drupelets turn the change's direction within a ninth of the radius; a smooth body does not."""
 
@@ -116,8 +116,8 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         level *= moved.evening
         cap = max(_quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
         if last:
-            if _is_seen(moved.background):
-                coherence = _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
+            known = min(1.0, float(moved.background.mean()) / _WELL_KNOWN)
+            coherence = known * _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
             share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * coherence + _SHARE_OF_FIELD * region.mean()
             share = float(np.clip(share, *_SHARES))
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
