@@ -119,7 +119,9 @@ async def _problem(request: Request, error: Exception) -> Response:
 async def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101 (what it is registered for)
     key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
-    return _told(request, error.status_code, wording_of(request).text(key) if key else str(error.detail))
+    answer = _told(request, error.status_code, wording_of(request).text(key) if key else str(error.detail))
+    answer.headers.update(error.headers or {})
+    return answer
 
 
 async def _bad_form(request: Request, error: Exception) -> Response:
