@@ -86,7 +86,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
     operator.until(".alarm", "cause gone, not acknowledged")
     operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge").click()
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
-    operator.page.get_by_role("link", name="History").click()
+    operator.page.locator("main").get_by_role("link", name="History").click()
 
     def history():  # which is written behind
         operator.page.reload()
