@@ -137,7 +137,7 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
 
 def _smooth_from(moved: Movement, region: Mask) -> float:
     """The coherence from which on a body is smooth: the larger it is, the more places there are to disagree."""
-    if not _is_seen(moved.background):
+    if float(moved.background.mean()) < _WELL_KNOWN:
         return _SMOOTH_SMALL
     return min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
 
