@@ -178,7 +178,7 @@ def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
         rig.twin.write(Command(activate=True, go_to=True, position=99))
         assert (await rig.driver.read()).echoed_count == 99
 
-    on_wire(scenario)
+    on_wire(scenario, answer_timeout_s=0.2)
 
 
 def test_an_answer_to_a_cancelled_question_is_not_taken_for_the_next(on_wire: OnWire):
