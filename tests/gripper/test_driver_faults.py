@@ -92,7 +92,7 @@ def test_an_activation_that_never_ends_is_given_up(on_wire: OnWire):
         with pytest.raises(GripperTimeoutError, match="activation"):
             await rig.driver.activate()
 
-    on_wire(scenario, activation_timeout_s=1.0)
+    on_wire(scenario, activation_timeout_s=1.0, answer_timeout_s=0.5)
 
 
 def test_a_passing_report_of_no_communication_is_forgiven_and_a_lasting_one_is_not(on_wire: OnWire):
@@ -107,7 +107,7 @@ def test_a_passing_report_of_no_communication_is_forgiven_and_a_lasting_one_is_n
         with pytest.raises(GripperFaultError, match="terminator"):
             await moving
 
-    on_wire(scenario)
+    on_wire(scenario, answer_timeout_s=0.5)
 
 
 @pytest.mark.parametrize("fault", ["no_communication", "over_temperature"])
@@ -178,7 +178,7 @@ def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
         rig.twin.write(Command(activate=True, go_to=True, position=99))
         assert (await rig.driver.read()).echoed_count == 99
 
-    on_wire(scenario, answer_timeout_s=0.2)
+    on_wire(scenario)
 
 
 def test_an_answer_to_a_cancelled_question_is_not_taken_for_the_next(on_wire: OnWire):
