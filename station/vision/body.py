@@ -32,8 +32,6 @@ _SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
 _SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
 _SPAN = 1.9
 _INNER_SHARE = 0.6
-
-
 _STEPS = 80
 _FIRST_EVERY = 2
 _HALF_FROM_PX = 2.5
@@ -74,7 +72,8 @@ class Body(NamedTuple):
     coherence: float
     """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1.
 
-    Less where hardly any background is left, since the slope of the whole body is then in the change as well."""
+    Less where hardly any background is left, since the slope of the whole body is then in the change as well.
+    """
     textured: bool
     """Whether seeds or drupelets turn the change's direction within a ninth of the radius; a smooth body does not."""
 

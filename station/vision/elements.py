@@ -8,7 +8,6 @@ from station.vision.contact import FloatImage, Mask
 
 _BLUR_PX = 2.0
 _STRONG_QUANTILE = 0.8
-_SPARSE = 2
 _SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.09, 0.45
 _SHARE_OF_FEW, _FEW_PX, _MANY_PX = 0.27, 34.0, 50.0
 _LEVELS_TRIED = (0.7, 1.4)
@@ -30,7 +29,7 @@ def level(length: FloatImage, region: Mask, body: Body) -> float:
     radius_px = np.sqrt(cv2.countNonZero(region) / np.pi)
     few = float(np.clip((_MANY_PX - radius_px) / (_MANY_PX - _FEW_PX), 0, 1))
     share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * body.coherence + _SHARE_OF_FEW * few
-    strong = length[::_SPARSE, ::_SPARSE][region[::_SPARSE, ::_SPARSE] > 0]
+    strong = length[region > 0]
     place = int(_STRONG_QUANTILE * (strong.size - 1))
     return share * float(np.partition(strong, place)[place])
 
