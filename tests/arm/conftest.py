@@ -46,7 +46,8 @@ class Bench:
             "joint_speed_rad_s": 2.0,
             "joint_acceleration_rad_s2": 8.0,
             "watchdog_hz": 1.0,
-            "stale_after_s": 0.3,
+            "stale_after_s": 1.0,
+            "link_lost_after_s": 2.0,
         }
         return ArmSettings.model_validate(base | changes)
 

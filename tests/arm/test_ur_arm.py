@@ -364,7 +364,7 @@ def test_a_controller_that_falls_silent_in_the_constructor_is_killed(bench, heal
     async def run():
         async with bench() as made:
             made.faults.set("rtde_silent")
-            async with UrArm(made.settings(constructor_limit_s=1.0)) as arm, healthy(arm):
+            async with UrArm(made.settings(constructor_limit_s=3.0)) as arm, healthy(arm):
                 await until(lambda: arm.process_id is not None)
                 hung = psutil.Process(arm.process_id)
                 ticks = 0
@@ -445,7 +445,7 @@ def test_an_order_does_not_wait_for_ever_for_its_turn(healthy_arm):
 @pytest.mark.parametrize("fault", ["stuck", "delayed"])
 def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault):
     async def run():
-        async with healthy_arm(link_lost_after_s=3.0) as (bench, arm):
+        async with healthy_arm(stale_after_s=0.3, link_lost_after_s=4.0) as (bench, arm):
             bench.faults.set(fault, 0.4)
             await until(lambda: has_cause(arm, ArmCause.STALE))
             state = await arm.state()
