@@ -28,6 +28,8 @@ from station.supervision.supervisor import Supervisor
 FRUITS = ("strawberry", "raspberry", "blueberry")
 _LOT = "DEMO"
 _FAULT_EVERY = 4
+# A desk's machine is no real-time controller, and no arm can come to harm here by a state that is a little old.
+_PATIENCE = {"STATION_ARM_STALE_AFTER_S": "0.5", "STATION_ARM_LINK_LOST_AFTER_S": "2.0"}
 
 
 @click.command("demo")
@@ -58,6 +60,8 @@ def demo(
     and Modbus TCP. Logs and records lie in the home folder's `demo`.
     """
     os.environ["STATION_HOME"] = str(load_configuration().home.resolve() / "demo")
+    for name, value in _PATIENCE.items():
+        os.environ.setdefault(name, value)
     site = load_configuration()
     _refuse_real_devices(site)
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
