@@ -1,14 +1,12 @@
 """`station hmi`: the operators' pages."""
 
 import asyncio
-import logging
-import sys
-import time
 from pathlib import Path
 
 import click
 
 from hmi.process import serve
+from station.logs import configure_logging
 from station.settings.configuration import load_configuration
 
 
@@ -19,9 +17,5 @@ def hmi(config: Path | None) -> None:
 
     It shows the station through its channel; while the station is away the pages say so and go on by themselves.
     """
-    handler = logging.StreamHandler(sys.stderr)
-    formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
-    formatter.converter = time.gmtime
-    handler.setFormatter(formatter)
-    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    configure_logging("hmi")
     asyncio.run(serve(load_configuration(config)))

@@ -7,8 +7,9 @@ import click
 
 from plc_interface.can.command import check_can
 from plc_interface.generate.files import DOCUMENTS, drifted_files, write_files
-from plc_interface.process import log_to_stderr, serve
+from plc_interface.process import serve
 from station.errors import StationError
+from station.logs import configure_logging
 from station.settings.configuration import load_configuration
 
 
@@ -27,7 +28,7 @@ def run(config: Path | None) -> None:
 
     The station may come and go meanwhile: while it does not answer, the PLC reads so and its triggers are refused.
     """
-    log_to_stderr()
+    configure_logging("plc")
     asyncio.run(serve(load_configuration(config)))
 
 

@@ -3,8 +3,6 @@
 import asyncio
 import logging
 import signal
-import sys
-import time
 from importlib.metadata import version
 
 from plc_interface.codec import WordOrder
@@ -75,14 +73,3 @@ async def serve(configuration: Configuration) -> None:
         await interface.stop()
         await output.stop()
         journal.close()
-
-
-def log_to_stderr() -> None:
-    """One line an event, with its time in UTC and its place; what the libraries have to say, our own parts say."""
-    handler = logging.StreamHandler(sys.stderr)
-    formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
-    formatter.converter = time.gmtime
-    handler.setFormatter(formatter)
-    logging.basicConfig(level=logging.INFO, handlers=[handler])
-    for library in ("pymodbus", "can", "canopen"):
-        logging.getLogger(library).setLevel(logging.CRITICAL)

@@ -29,7 +29,7 @@ FRUITS = ("strawberry", "raspberry", "blueberry")
 _LOT = "DEMO"
 _FAULT_EVERY = 4
 # A desk's machine is no real-time controller, and no arm can come to harm here by a state that is a little old.
-_PATIENCE = {"STATION_ARM_STALE_AFTER_S": "0.5", "STATION_ARM_LINK_LOST_AFTER_S": "2.0"}
+_PATIENCE = {"stale_after_s": 0.5, "link_lost_after_s": 2.0}
 
 
 @click.command("demo")
@@ -59,9 +59,10 @@ def demo(
     Arm, gripper, sensor and PLC are simulated, what is between them is real: RTDE, the gripper's socket, camera frames
     and Modbus TCP. Logs and records lie in the home folder's `demo`.
     """
-    os.environ["STATION_HOME"] = str(load_configuration().home.resolve() / "demo")
-    for name, value in _PATIENCE.items():
-        os.environ.setdefault(name, value)
+    asked = load_configuration()
+    os.environ["STATION_HOME"] = str(asked.home.resolve() / "demo")
+    for name in _PATIENCE.keys() - asked.arm.model_fields_set:
+        os.environ[f"STATION_ARM_{name.upper()}"] = str(_PATIENCE[name])
     site = load_configuration()
     _refuse_real_devices(site)
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}

@@ -10,10 +10,10 @@ import click
 
 from station.commands.records_options import config_option
 from station.errors import StationError
+from station.logs import configure_logging
 from station.outbox.lag import LOST_S
 from station.outbox.status import outbox_folder, read_status
 from station.outbox.telling import destinations, keep_telling
-from station.service.logs import configure_logging
 from station.settings.configuration import Configuration, load_configuration
 from station.supervision.notify import feed_watchdog, notify
 

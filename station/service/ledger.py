@@ -7,11 +7,12 @@ from dataclasses import replace
 
 from station.channel.line import Open, Outcome
 from station.inspection.cycle import Event
+from station.logs import inspecting
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.crew import Crew
+from station.service.fruit_line import fruit_line
 from station.service.inspection import Inspection
-from station.service.logs import fruit_line, inspecting
 from station.service.triggers import Pending, Triggers
 from station.vocabulary import Reason
 

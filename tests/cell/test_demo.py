@@ -1,5 +1,6 @@
 """`station demo` as a person uses it: all processes, all protocols, fruit after fruit."""
 
+import json
 import os
 import re
 import signal
@@ -50,6 +51,9 @@ def test_every_fruit_is_decided_once_and_the_records_agree(demo, tmp_path):
     assert {row[3] for row in rows} == {"blueberry"}
     assert "2 fruits: " in output
     assert "damaged and passed: 0" in output
+    for name in ("plc", "hmi"):
+        lines = (tmp_path / "demo" / "logs" / f"{name}.log").read_text().splitlines()
+        assert {json.loads(line)["process"] for line in lines} == {name}
     listed = records_of(tmp_path / "demo")
     for row in rows:
         if row[5] in {"PASS", "FAIL", "NO_RESULT"}:

@@ -10,7 +10,8 @@ import pytest
 import structlog
 
 from station.channel.line import Reason
-from station.service.logs import configure_logging, fruit_line, inspecting
+from station.logs import configure_logging, inspecting
+from station.service.fruit_line import fruit_line
 
 
 @pytest.fixture

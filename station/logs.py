@@ -3,20 +3,24 @@
 import logging
 import re
 import sys
-from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Literal, TextIO
 
 import structlog
 from structlog.typing import EventDict, Processor
 
-from station.channel.line import Outcome
-from station.records.wording import sparkline
-
 _SECRET = re.compile(
     r"password|passwd|secret|token|api_?key|private_?key|credential|authorization|\bpin\b", re.IGNORECASE
 )
 HIDDEN = "(hidden)"
+# What a fieldbus library has to say, the PLC interface says in its own words.
+_LIBRARIES = {
+    "alembic": logging.WARNING,
+    "uvicorn": logging.WARNING,
+    "pymodbus": logging.CRITICAL,
+    "can": logging.CRITICAL,
+    "canopen": logging.CRITICAL,
+}
 
 
 def configure_logging(
@@ -71,8 +75,8 @@ def configure_logging(
     handler.of_the_station = True  # type: ignore[attr-defined]
     root.addHandler(handler)
     root.setLevel(level)
-    for chatty in ("alembic", "uvicorn"):
-        logging.getLogger(chatty).setLevel(logging.WARNING)
+    for name, least in _LIBRARIES.items():
+        logging.getLogger(name).setLevel(least)
     structlog.configure(
         processors=[
             structlog.stdlib.filter_by_level,
@@ -88,31 +92,6 @@ def configure_logging(
 def inspecting(sequence: int) -> AbstractContextManager[None]:
     """Put the inspection's sequence into every line logged inside, also by tasks begun inside."""
     return structlog.contextvars.bound_contextvars(sequence=sequence)
-
-
-def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_mm2: Sequence[float | None]) -> str:
-    """One fruit in one line that a person reads: sequence, fruit, curve as a sparkline, outcome, why, time.
-
-    Args:
-        outcome: what the PLC is told.
-        fruit: the recipe's name.
-        explanation: why, in sentences.
-        areas_mm2: the curve, step by step.
-    """
-    area = "no area" if outcome.area_mm2 is None else f"{outcome.area_mm2:.1f} mm²"
-    if outcome.closing_mm is not None:
-        area = f"{area} at {outcome.closing_mm:.1f} mm"
-    why = "; ".join(explanation) or ", ".join(outcome.reasons)
-    parts = [
-        f"fruit {outcome.sequence}",
-        f"trigger {outcome.trigger_id}",
-        fruit or "no recipe",
-        sparkline(areas_mm2) or "-",
-        outcome.outcome,
-        area,
-        f"{outcome.duration_ms / 1000:.2f} s",
-    ]
-    return "  ".join([*parts, *(["late"] if outcome.late else []), *([why] if why else [])])
 
 
 def _hide_secrets(_logger: Any, _method: str, event: EventDict) -> EventDict:
