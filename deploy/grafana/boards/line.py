@@ -35,7 +35,7 @@ RATES = (
     prom(
         "lines", "Reject rate and its band", "percentunit",
         "Failed of judged, over one hour, with the last seven days and what chance allows on top of them. Above the "
-        "band look at rejected fruit: is the lot bad, or the measurement?",
+        "band look at rejected fruit: the lot is bad, or the measurement is.",
         REJECTS,
         (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{fruit}}"),
         (f"station_fruit:reject_ratio:7d{{{HERE}}}", "{{fruit}}, seven days"),

@@ -21,10 +21,10 @@ LOTS = (
         GROUP BY 1, 2, fruit, station ORDER BY min(began) DESC LIMIT 200""", width=24),
 )  # fmt: skip
 GROWERS = (
-    sql("table", "Growers", "percentunit", "Who brings what, worst first, of at least ten fruit.", "records.md",
+    sql("table", "Growers", "percentunit", "Who brings what, worst first.", "records.md",
         f"""SELECT {GROWER} AS grower, fruit, count(*)::text AS inspected, {FAILED} AS failed
         FROM inspections_of_growers WHERE {HERE}
-        GROUP BY 1, fruit HAVING count(*) >= 10 ORDER BY 4 DESC NULLS LAST""", width=12),
+        GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""", width=12),
     sql("bars", "Failed by grower and day", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
         f"""SELECT date_trunc('day', began) AS time, {GROWER} AS metric, {FAILED} AS failed
         FROM inspections_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""", width=12),
