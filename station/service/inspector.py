@@ -100,6 +100,7 @@ class Inspector:
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, str(error))
             self._alarms.raise_(error.alarm, str(error))
+            self._metrics.reference_refused(error.alarm)
             return False
         now.reference_image = Image("reference", None, image)
         now.measures["gate_factor"] = self._calibrated.gate_factor  # without it no image can be measured again

@@ -23,6 +23,7 @@ from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
 from station.channel.line import Outcome
+from station.inspection.alarm_table import ALARMS
 from station.outbox.status import OutboxStatus
 from station.records.records import Status
 from station.service.metrics_table import LABELS, OTHER, TABLE, Row
@@ -47,7 +48,7 @@ class Metrics:
         self._clock = clock
         self._values: dict[str, set[str]] = {}
         self._heard_s: dict[str, float] = {}
-        self._active: set[tuple[str, str]] = set()
+        self._active: set[tuple[str, str]] = {(alarm, row.priority) for alarm, row in ALARMS.items()}
         self._reference: tuple[float, float] | None = None
         self._status: Callable[[], Status] | None = None
         self._figures: Callable[[], Sequence[float | None]] | None = None
@@ -56,25 +57,36 @@ class Metrics:
         self._made: dict[str, Any] = {
             key: _made(row, buckets, self.registry) for key, row in TABLE.items() if not row.at_scrape
         }
+        for key, row in TABLE.items():
+            for values in () if row.at_scrape else row.known:
+                self._of(key, **dict(zip(row.labels, values, strict=True)))
         self.registry.register(_AtScrape(self._at_scrape))
         self._made["build"].info(
             {"version": self._label("version", version), "python": self._label("python", platform.python_version())}
         )
 
-    def inspection(self, fruit: str, outcome: Outcome, phases_s: Mapping[str, float] | None = None) -> None:
+    def inspection(
+        self,
+        fruit: str,
+        outcome: Outcome,
+        phases_s: Mapping[str, float] | None = None,
+        deadline_s: float | None = None,
+    ) -> None:
         """Count one inspection; call it when `Records.published` says that it is the first time.
 
         Args:
             fruit: the recipe's name, empty for none.
             outcome: what the PLC was given.
             phases_s: how long each phase took.
+            deadline_s: how long it might take, where that is still known.
         """
         fruit = fruit or "none"
         reason = outcome.reasons[0] if outcome.reasons else "none"
         self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
         self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
-        if outcome.late:
-            self._of("late", fruit=fruit).inc()
+        self._of("late", fruit=fruit).inc(outcome.late)
+        if deadline_s is not None:
+            self._of("deadline", fruit=fruit).set(deadline_s)
         if outcome.area_mm2 is not None:
             self._of("area", fruit=fruit).observe(outcome.area_mm2)
         if outcome.closing_mm is not None:
@@ -89,6 +101,10 @@ class Metrics:
     def reference(self, age_s: float, drift_grey_levels: float) -> None:
         """Tell the age of the reference in use, which grows from now on, and its distance from the golden one."""
         self._reference = (self._clock() - age_s, drift_grey_levels)
+
+    def reference_refused(self, alarm: str) -> None:
+        """Count a picture of the untouched gel that could not be a reference, by the alarm that tells why."""
+        self._of("references_refused", id=alarm).inc()
 
     def refused(self, reason: str) -> None:
         """Count a trigger that was not accepted, by its `Refusal`."""
@@ -242,7 +258,8 @@ def _families(gauges: Values, counters: Values) -> Iterator[Metric]:
     for kind, families in ((GaugeMetricFamily, gauges), (CounterMetricFamily, counters)):
         for key, values in families.items():
             family = kind(TABLE[key].name, TABLE[key].help, labels=TABLE[key].labels)
-            for labels, value in values.items():
+            known: Mapping[tuple[str, ...], float | None] = dict.fromkeys(TABLE[key].known, 0.0)
+            for labels, value in {**known, **values}.items():
                 if value is not None:
                     family.add_metric(labels, value)
             yield family

@@ -7,6 +7,10 @@ bytes as base units, `_total` for counters. Lengths and areas are in mm and mm²
 from typing import Literal, NamedTuple
 
 from station.channel.line import Reason, Refusal
+from station.devices.camera.interface import FrameFault
+from station.inspection.alarm_table import ALARMS
+from station.records import errors
+from station.service.reference import ALARMS as REFERENCE_ALARMS
 
 OTHER = "other"
 """What a label reads whose value is not one of its own, or one too many."""
@@ -43,11 +47,25 @@ class Row(NamedTuple):
     """A histogram's upper bounds; empty where they follow the inspection's deadline."""
     at_scrape: bool = False
     """Asked for when it is scraped instead of being set."""
+    known: tuple[tuple[str, ...], ...] = ()
+    """What its labels read from the start, at 0: what begins with its first event has no increase to show then."""
 
 
 _MM2 = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0, 130.0, 160.0, 200.0, 260.0)
 _MM = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 20.0)
 _PHASE_S = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+
+_FAILURES = tuple(
+    (error.code,)
+    for error in (
+        errors.DiskFullError,
+        errors.ReadOnlyError,
+        errors.DiskError,
+        errors.LockedError,
+        errors.DamagedError,
+        errors.RecordsDeadlineError,
+    )
+)
 
 TABLE: dict[str, Row] = {
     "inspections": Row(
@@ -57,6 +75,9 @@ TABLE: dict[str, Row] = {
         "Inspections whose outcome the PLC was given, by the first reason; none where passed",
     ),
     "late": Row("station_inspections_late", "counter", ("fruit",), "Inspections that ended after their deadline"),
+    "deadline": Row(
+        "station_inspection_deadline_seconds", "gauge", ("fruit",), "Longest that its last inspection might take"
+    ),
     "duration": Row(
         "station_inspection_duration_seconds",
         "histogram",
@@ -68,7 +89,20 @@ TABLE: dict[str, Row] = {
     ),
     "area": Row("station_contact_area_mm2", "histogram", ("fruit",), "Contact area that decided", _MM2),
     "closing": Row("station_closing_mm", "histogram", ("fruit",), "Closing at which the area decided", _MM),
-    "frames": Row("station_frames", "counter", ("state",), "Frames by what is wrong with them; good where nothing"),
+    "frames": Row(
+        "station_frames",
+        "counter",
+        ("state",),
+        "Frames by what is wrong with them; good where nothing",
+        known=tuple((state,) for state in ("good", *FrameFault)),
+    ),
+    "references_refused": Row(
+        "station_references_refused",
+        "counter",
+        ("id",),
+        "Pictures of the untouched gel that could not be a reference, by the alarm that tells why",
+        known=tuple((alarm,) for alarm in REFERENCE_ALARMS),
+    ),
     "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use", at_scrape=True),
     "reference_drift": Row(
         "station_reference_drift_grey_levels",
@@ -94,7 +128,13 @@ TABLE: dict[str, Row] = {
         "Relative change of the ball's area since the calibration, by the last verification",
         at_scrape=True,
     ),
-    "refused": Row("station_triggers_refused", "counter", ("reason",), "Triggers that were not accepted"),
+    "refused": Row(
+        "station_triggers_refused",
+        "counter",
+        ("reason",),
+        "Triggers that were not accepted",
+        known=tuple((refusal,) for refusal in Refusal),
+    ),
     "unexpected": Row("station_unexpected_events", "counter", (), "Events that the cycle's table does not list"),
     "link_age": Row(
         "station_link_age_seconds",
@@ -103,14 +143,31 @@ TABLE: dict[str, Row] = {
         "Time since a device, process or heartbeat was last heard",
         at_scrape=True,
     ),
-    "alarms": Row("station_alarms_active", "gauge", ("id", "priority"), "1 while an alarm's cause is there"),
+    "alarms": Row(
+        "station_alarms_active",
+        "gauge",
+        ("id", "priority"),
+        "1 while an alarm's cause is there",
+        known=tuple((alarm, row.priority) for alarm, row in ALARMS.items()),
+    ),
     "waiting": Row("station_outcomes_waiting", "gauge", (), "Outcomes that the PLC has not acknowledged"),
-    "restarts": Row("station_process_restarts", "counter", ("process",), "Times a process was started again"),
+    "restarts": Row(
+        "station_process_restarts",
+        "counter",
+        ("process",),
+        "Times a process was started again",
+        known=tuple((process,) for process in ("service", "plc", "hmi", "outbox")),
+    ),
     "ready": Row("station_ready", "gauge", (), "1 while a trigger would be accepted"),
     "build": Row("station_build", "info", ("version", "python"), "What runs"),
     "records_writes": Row("station_records_writes", "counter", (), "Transactions made durable", at_scrape=True),
     "records_failures": Row(
-        "station_records_failures", "counter", ("code",), "Requests to the records that failed", at_scrape=True
+        "station_records_failures",
+        "counter",
+        ("code",),
+        "Requests to the records that failed",
+        at_scrape=True,
+        known=_FAILURES,
     ),
     "records_queue": Row("station_records_queue", "gauge", (), "Requests that wait for the database", at_scrape=True),
     "records_images_queue": Row(
@@ -119,7 +176,12 @@ TABLE: dict[str, Row] = {
     "records_bytes": Row("station_records_bytes", "gauge", ("kind",), "Space that the records take", at_scrape=True),
     "records_free": Row("station_records_free_bytes", "gauge", (), "Space left on the records' disk", at_scrape=True),
     "records_images": Row(
-        "station_records_images", "counter", ("result",), "Images by what became of them", at_scrape=True
+        "station_records_images",
+        "counter",
+        ("result",),
+        "Images by what became of them",
+        at_scrape=True,
+        known=(("kept",), ("dropped",), ("failed",), ("removed",)),
     ),
     "outbox_connected": Row(
         "station_outbox_connected", "gauge", ("destination",), "1 while another system can be told", at_scrape=True

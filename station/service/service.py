@@ -130,7 +130,8 @@ class Service:
         if first:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
-            self._metrics.inspection(fruit, outcome, None if now is None else now.phases_s)
+            known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
+            self._metrics.inspection(fruit, outcome, *known)
             self._outcomes.saw(outcome)
             self.on_published(outcome)
         running = self.ledger.running

@@ -7,6 +7,7 @@ from prometheus_client.openmetrics.parser import text_string_to_metric_families 
 from prometheus_client.parser import text_string_to_metric_families as parse
 
 from station.channel.line import Reason, Refusal
+from station.inspection.alarm_table import ALARMS, AlarmId
 from station.outbox.status import DestinationStatus, OutboxStatus
 from station.records.model import InspectionRecord, Trigger
 from station.records.records import Records, Status
@@ -29,7 +30,7 @@ def scraped(metrics):
 
 
 def everything_told(metrics, outcome):
-    metrics.inspection("strawberry", outcome, {"approach": 0.8})
+    metrics.inspection("strawberry", outcome, {"approach": 0.8}, 9.5)
     failed = outcome.model_copy(update={"outcome": "FAIL", "reasons": (Reason.AREA_OVER_LIMIT, Reason.EARLY_STOP)})
     metrics.inspection("strawberry", failed)
     late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "closing_mm": None}
@@ -37,6 +38,7 @@ def everything_told(metrics, outcome):
     metrics.frame()
     metrics.frame("torn", 2)
     metrics.reference(3.0, 1.25)
+    metrics.reference_refused(AlarmId.REFERENCE_BAD)
     metrics.refused(Refusal.BUSY)
     metrics.unexpected()
     metrics.heard("camera")
@@ -108,6 +110,9 @@ def test_the_figures_are_those_told(metrics, outcome, clock):
         "8.0",
         "8.4",
     }
+    assert found["station_inspections_late_total", fruit] == 0
+    assert found["station_inspection_deadline_seconds", fruit] == 9.5
+    assert found["station_references_refused_total", ("id", "reference_bad")] == 1
     assert found["station_frames_total", ("state", "torn")] == 2
     assert found["station_link_age_seconds", ("link", "camera")] == 2.0
     assert found[("station_reference_age_seconds",)] == 5.0
@@ -124,6 +129,20 @@ def test_what_is_not_known_is_absent_and_not_nought(metrics):
     assert not [key for key in found if key[0] == "station_link_age_seconds"]
     metrics.watch_records(lambda: Status(0, {}, 0, 0, {}, 0, 0, 0, None, ""))
     assert ("station_records_last_write_age_seconds",) not in scraped(metrics)
+
+
+def test_what_may_be_counted_is_there_before_it_happens(metrics):
+    metrics.watch_records(lambda: Status(0, {"disk_full": 2}, 0, 0, {}, 0, 0, 0, None, ""))
+    found = scraped(metrics)
+    for alarm, row in ALARMS.items():
+        assert found["station_alarms_active", ("id", alarm), ("priority", row.priority)] == 0
+    assert found["station_frames_total", ("state", "good")] == found["station_frames_total", ("state", "torn")] == 0
+    assert found["station_triggers_refused_total", ("reason", "busy")] == 0
+    assert found["station_process_restarts_total", ("process", "plc")] == 0
+    assert found["station_references_refused_total", ("id", "reference_bad")] == 0
+    assert found["station_records_failures_total", ("code", "locked")] == 0
+    assert found["station_records_failures_total", ("code", "disk_full")] == 2
+    assert found["station_records_images_total", ("result", "kept")] == 0
 
 
 def test_no_value_makes_the_number_of_series_grow(metrics, outcome):

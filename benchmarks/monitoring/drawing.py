@@ -1,0 +1,227 @@
+"""A dashboard's panels, drawn from what Prometheus and PostgreSQL answer, in Grafana's places: to be looked at.
+
+This is not Grafana: it shows that a panel has the right data, unit and legend, not how Grafana renders it.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from .asking import Panel
+from .prometheus import Series
+
+_CELL_IN, _ROW_IN = 0.62, 0.36
+_COLORS = ("#1f4e79", "#c55a11", "#2e7d32", "#7b1fa2", "#00838f", "#8d6e63", "#b3261e", "#5d6d00", "#455a64", "#ad1457")
+_OUTCOMES = {"PASS": "#2e7d32", "FAIL": "#b3261e", "NO_RESULT": "#757575"}
+_LONGEST = 34
+_ROWS = 7
+_BEHIND = {"percentunit": " %", "s": " s", "lengthmm": " mm", "cps": " /s"}
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
+
+
+class Rows(NamedTuple):
+    """A statement's answer."""
+
+    columns: list[str]
+    rows: list[tuple[Any, ...]]
+
+
+Answer = list[Series] | Rows
+Ask = Callable[[Panel, dict[str, Any]], Answer]
+"""Asks one of a panel's targets: over time, or once where the panel is a number or a table."""
+
+
+def draw(board: dict[str, Any], panels: Sequence[Panel], ask: Ask, file: Path, title: str) -> None:
+    """Draw a whole dashboard as one picture.
+
+    Args:
+        board: its JSON.
+        panels: its panels.
+        ask: answers them.
+        file: the PNG.
+        title: above it.
+    """
+    height = max(each["gridPos"]["y"] + each["gridPos"]["h"] for each in board["panels"])
+    with mpl.rc_context({"font.size": 7.5, "axes.titlesize": 8.5, "axes.titleweight": "bold"}):
+        figure = Figure(figsize=(24 * _CELL_IN, height * _ROW_IN + 0.6))
+        figure.suptitle(title, x=0.01, ha="left", y=1 - 0.1 / (height * _ROW_IN), va="top", fontsize=10)
+        scale = height * _ROW_IN / (height * _ROW_IN + 0.6)
+        for row in (each for each in board["panels"] if each["type"] == "row"):
+            figure.text(
+                0.01, scale * (1 - (row["gridPos"]["y"] + 0.7) / height), row["title"], fontsize=9, color="#555555"
+            )
+        for panel in panels:
+            place = panel.data["gridPos"]
+            low = place["y"] + place["h"]
+            box = (
+                (place["x"] + 1.1) / 24, scale * (1 - (low - 1.5) / height),
+                (place["w"] - 1.5) / 24, scale * (place["h"] - 2.6) / height,
+            )  # fmt: skip
+            axes = figure.add_axes(box)
+            axes.set_title(panel.title, loc="left")
+            answers = [(target, ask(panel, target)) for target in panel.targets]
+            _DRAWN[panel.data["type"]](axes, panel, answers)
+        figure.savefig(file, dpi=80)
+
+
+def value_of(unit: str, value: float) -> str:
+    """A value with its unit, as Grafana would write it, nearly.
+
+    Args:
+        unit: Grafana's id.
+        value: the number.
+    """
+    behind = unit.removeprefix("suffix:") if unit.startswith("suffix:") else _BEHIND.get(unit, "")
+    if unit == "percentunit":
+        value *= 100
+    elif unit == "bool_yes_no":
+        return "yes" if value else "no"
+    elif unit == "s" and value > 2 * 86_400:
+        value, behind = value / 86_400, " days"
+    elif unit == "bytes":
+        value, behind = next(((value / size, f" {name}B") for size, name in _PREFIXES if value >= size), (value, " B"))
+    return f"{value:,.4g}{behind}"
+
+
+def _name(target: dict[str, Any], series: Series) -> str:
+    legend = target.get("legendFormat") or ", ".join(
+        f"{value}" for key, value in series.labels.items() if key != "__name__"
+    )
+    text = re.sub(r"\{\{\s*(\w+)\s*\}\}", lambda match: series.labels.get(match[1], ""), legend)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def _times(series: Series) -> list[float]:
+    return [float(date2num(datetime.fromtimestamp(at_s, UTC))) for at_s, _ in series.points]
+
+
+def _lines(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
+    custom = panel.data["fieldConfig"]["defaults"].get("custom", {})
+    stacked = custom.get("stacking", {}).get("mode") == "normal"
+    found = [(_name(target, each), each) for target, answer in answers for each in _series(answer)]
+    if stacked and custom.get("drawStyle") != "bars":
+        grid = sorted({at for _, each in found for at in _times(each)})
+        heights = []
+        for _, each in found:
+            known = dict(zip(_times(each), (value for _, value in each.points), strict=True))
+            heights.append([known.get(at, 0.0) for at in grid])
+        axes.stackplot(
+            grid,
+            heights,
+            labels=[name for name, _ in found],
+            colors=[_color(n, i) for i, (n, _) in enumerate(found)],
+            alpha=0.7,
+        )
+    else:
+        low: dict[float, float] = {}
+        for number, (name, each) in enumerate(found):
+            times, values = _times(each), [value for _, value in each.points]
+            if stacked:
+                under = [low.get(at, 0.0) for at in times]
+                axes.bar(times, values, 0.02, bottom=under, label=name, color=_color(name, number))
+                low |= {at: a + b for at, a, b in zip(times, under, values, strict=True)}
+            else:
+                axes.plot(
+                    times,
+                    values,
+                    label=name,
+                    color=_color(name, number),
+                    linewidth=1.0,
+                    marker="." if len(times) < 3 else "",
+                )
+    axes.set_ylim(bottom=0)
+    locator = AutoDateLocator(maxticks=6)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    unit = panel.data["fieldConfig"]["defaults"]["unit"]
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: value_of(unit, value)))
+    axes.grid(color="#dddddd", linewidth=0.5)
+    axes.spines[["top", "right"]].set_visible(False)
+    if found:
+        axes.legend(loc="upper left", fontsize=5.5, ncols=2 if len(found) > 6 else 1, framealpha=0.7)
+
+
+def _number(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
+    axes.set_axis_off()
+    unit = panel.data["fieldConfig"]["defaults"]["unit"]
+    told = [
+        (_name(target, each), each.points[-1][1])
+        for target, answer in answers
+        if isinstance(answer, list)
+        for each in answer
+    ]
+    told += [(answer.columns[0], float(answer.rows[0][0])) for _, answer in answers if isinstance(answer, Rows)]
+    for number, (name, value) in enumerate(told):
+        x = (number + 0.5) / len(told)
+        text = name if unit == "none" else value_of(unit, value)
+        axes.text(x, 0.55, text, ha="center", va="center", fontsize=13 if len(text) < 12 else 9, color=_COLORS[0])
+        axes.text(x, 0.05, "" if unit == "none" else name, ha="center", va="center", fontsize=6.5, color="#555555")
+
+
+def _table(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
+    axes.set_axis_off()
+    unit = panel.data["fieldConfig"]["defaults"]["unit"]
+    answer = answers[0][1]
+    if isinstance(answer, Rows):
+        columns, rows = answer.columns, [[_cell(unit, each) for each in row] for row in answer.rows]
+    else:
+        columns = [*(key for key in answer[0].labels if key != "__name__"), "value"]
+        rows = [
+            [*(each.labels.get(key, "") for key in columns[:-1]), value_of(unit, each.points[-1][1])] for each in answer
+        ]
+    drawn = axes.table(rows[:_ROWS], colLabels=columns, loc="upper center", cellLoc="left", edges="horizontal")
+    drawn.auto_set_font_size(value=False)
+    drawn.set_fontsize(6.5)
+    if len(rows) > _ROWS:
+        axes.text(0.0, -0.02, f"and {len(rows) - _ROWS} more", fontsize=6.5, color="#555555", va="top")
+
+
+def _heat(axes: Axes, _panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
+    found = sorted(_series(answers[0][1]), key=lambda each: float(each.labels["le"]))
+    times = _times(found[0])
+    at_most = [dict(zip(_times(each), (value for _, value in each.points), strict=True)) for each in found]
+    cells = [
+        [max(0.0, upper.get(at, 0.0) - (at_most[row - 1].get(at, 0.0) if row else 0.0)) for at in times]
+        for row, upper in enumerate(at_most)
+    ]
+    drawn = axes.pcolormesh(times, range(len(found)), cells, cmap="YlOrRd", shading="nearest")
+    axes.set_yticks(range(len(found)), [each.labels["le"] for each in found], fontsize=5.5)
+    axes.set_ylabel("≤ mm²")
+    locator = AutoDateLocator(maxticks=6)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.figure.colorbar(drawn, ax=axes, label="fruit", pad=0.01)
+
+
+def _series(answer: Answer) -> list[Series]:
+    """A statement's rows over time as series: time, metric, value."""
+    if not isinstance(answer, Rows):
+        return answer
+    found: dict[str, list[tuple[float, float]]] = {}
+    for at, metric, value in answer.rows:
+        found.setdefault(str(metric), []).append((at.timestamp(), float("nan") if value is None else float(value)))
+    return [Series({"metric": name}, points) for name, points in found.items()]
+
+
+def _cell(unit: str, value: Any) -> str:
+    if isinstance(value, float):
+        return value_of(unit, value)
+    if isinstance(value, datetime):
+        return f"{value:%Y-%m-%d %H:%M}"
+    text = "" if value is None else str(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def _color(name: str, number: int) -> str:
+    return _OUTCOMES.get(name, _COLORS[number % len(_COLORS)])
+
+
+_DRAWN = {"timeseries": _lines, "stat": _number, "table": _table, "heatmap": _heat}

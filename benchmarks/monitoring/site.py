@@ -1,0 +1,170 @@
+"""A demonstration as a person starts it, with a calibrated sensor, an outbox into a real PostgreSQL, and Prometheus."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from station.calibration.model import Calibration, FieldMap, Noise, Verification, stamp
+from station.calibration.store import CalibrationStore
+from station.records.database import FILE_NAME
+
+from .prometheus import Prometheus, running, write_configuration
+
+STATION = "station-1"
+SEED = 71
+"""Of which the first two fruits are sound and the third is not."""
+_LIMIT_S = 240.0
+_STARTS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """A demonstration that has ended, and what was heard of it."""
+
+    prometheus: Prometheus
+    metrics: str
+    """Its /metrics, after the last fruit."""
+    began_s: float
+    at_s: float
+    """When that was; nothing was scraped much later."""
+
+
+def ports(count: int) -> list[int]:
+    """So many different loopback ports that nobody listens on."""
+    with ExitStack() as stack:
+        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for probe in probes:
+            probe.bind(("127.0.0.1", 0))
+        return [probe.getsockname()[1] for probe in probes]
+
+
+@contextmanager
+def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator[Site]:
+    """Run the demonstration under a Prometheus that is still there when it has ended.
+
+    Args:
+        folder: for everything.
+        server: the PostgreSQL, with our tables.
+        fruits: how many are inspected.
+        host: a loopback address of its own for arm and gripper.
+    """
+    modbus, metrics, hmi, camera, console = ports(5)
+    values = {
+        "modbus": {"port": modbus},
+        "metrics": {"port": metrics},
+        "hmi": {"port": hmi},
+        "arm": {"host": host, "stale_after_s": 1.0},
+        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
+        "records": {"free_reserve_mb": 1},
+        "outbox": {
+            "station": STATION,
+            "longest_pause_s": 0.5,
+            "postgresql": {"enabled": True, "host": str(server.folder), "user": "fruit", "tls": "disable"},
+        },
+        "service": {"patience": 10.0},
+    }
+    file = folder / "station.yaml"
+    file.write_text(json.dumps(values))
+    home = folder / "demo"
+    home.mkdir()
+    _calibrated(home, f"TWIN-{camera}")
+    environment = {
+        **os.environ, "STATION_HOME": str(folder), "STATION_CONFIG": str(file), "OMP_NUM_THREADS": "1",
+    }  # fmt: skip
+    station = [sys.executable, "-m", "station"]
+    options = ["--console", str(console), "--fruit", "blueberry", "--damaged", "0.4", "--seed", str(SEED)]
+    configuration = write_configuration(folder, "1s", {STATION: f"127.0.0.1:{metrics}"})
+    with ExitStack() as stack:
+        prometheus = stack.enter_context(running(folder, configuration))
+        began_s = time.time()
+        database = home / "records" / FILE_NAME
+        demo = _started(stack, [*station, "demo", *options], folder / "demo.log", environment, database)
+        at_home = {**environment, "STATION_HOME": str(home)}
+        stack.enter_context(_process([*station, "outbox", "run"], folder / "outbox.log", at_home))
+        until_s = time.monotonic() + _LIMIT_S
+        while _decided(prometheus) < fruits or _told(server) < fruits or not _scraped_often(prometheus):
+            if demo.poll() is not None or time.monotonic() > until_s:
+                logs = [(folder / f"{name}.log").read_text()[-2000:] for name in ("demo", "outbox")]
+                raise RuntimeError(f"the demonstration ended early, or hangs: {logs}")
+            time.sleep(0.5)
+        with urllib.request.urlopen(f"http://127.0.0.1:{metrics}/metrics", timeout=30) as answer:
+            text, at_s = answer.read().decode(), time.time()
+        demo.send_signal(signal.SIGTERM)
+        demo.wait(60)
+        yield Site(prometheus, text, began_s, at_s)
+
+
+def _started(
+    stack: ExitStack, command: list[str], log: Path, environment: dict[str, str], database: Path
+) -> subprocess.Popen[bytes]:
+    """The demonstration, once it has begun its records; a busy machine may need more than the time it has to start."""
+    for _ in range(_STARTS):
+        demo = stack.enter_context(_process(command, log, environment))
+        while demo.poll() is None:
+            if database.exists():
+                return demo
+            time.sleep(0.2)
+    raise RuntimeError(f"the demonstration does not start: {log.read_text()[-2000:]}")
+
+
+@contextmanager
+def _process(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
+    with log.open("wb") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(60)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _decided(prometheus: Prometheus) -> float:
+    found = prometheus.now("sum(station_inspections_total)")
+    return found[0].points[0][1] if found else 0.0
+
+
+def _scraped_often(prometheus: Prometheus) -> bool:
+    """Whether also the youngest count has been seen to stand still: before that it has no rate."""
+    found = prometheus.now("min(count_over_time(station_inspections_total[5m]))")
+    return bool(found) and found[0].points[0][1] >= 3
+
+
+def _told(server: Any) -> int:
+    with server.connect() as connection:
+        return connection.execute("SELECT count(*) FROM inspections WHERE outcome IS NOT NULL").fetchone()[0]
+
+
+def _calibrated(home: Path, serial: str) -> None:
+    """As if the sensor had been calibrated weeks ago and verified today; its golden reference is still to be taken."""
+    now = datetime.now(UTC)
+    calibration = Calibration(
+        id=stamp(now - timedelta(days=20)), serial=serial, unit="twin", operator="demonstration", simulated=True,
+        program="0", ball_mm=24.0, holder_mm=18.0, width_px=240, height_px=320, mm_per_px=0.0266,
+        scale_uncertainty=0.15, scale_measured=False, places=(), curve=(), onset_mm=42.0, zero_mm=0.0,
+        noise=Noise(pixel_levels=(1.0, 1.0, 1.0), gate=0.5, gate_factor=1.0, drift_levels=1.0),
+        light_levels=(90.0, 90.0, 90.0), sharpness_levels=2.0,
+        field=FieldMap(rows=1, columns=1, light_levels=((90.0, 90.0, 90.0),), noise_levels=(1.0,)), checks=(),
+    )  # fmt: skip
+    verification = Verification(
+        id=stamp(now - timedelta(hours=5)), serial=serial, calibration=calibration.id, operator="demonstration",
+        passed=True, area_ratio=0.98, onset_mm=42.0, checks=(), curve=(),
+    )  # fmt: skip
+    store = CalibrationStore(home)
+    store.add_calibration(calibration, {})
+    store.add_verification(verification, {})

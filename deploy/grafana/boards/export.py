@@ -1,0 +1,26 @@
+"""What each dashboard's file has to hold."""
+
+import json
+from pathlib import Path
+
+from grafana_foundation_sdk.cog.encoder import JSONEncoder
+
+from deploy.grafana.boards import fleet, line, quality, station
+
+FOLDER = Path(__file__).resolve().parents[1] / "dashboards"
+BOARDS = {"line": line, "station": station, "quality": quality, "fleet": fleet}
+
+
+def exported(folder: Path = FOLDER) -> dict[Path, str]:
+    """Each file's text.
+
+    Args:
+        folder: where they lie.
+    """
+    return {
+        folder / f"{name}.json": json.dumps(
+            module.dashboard().build(), cls=JSONEncoder, indent=2, sort_keys=True, ensure_ascii=False
+        )
+        + "\n"
+        for name, module in BOARDS.items()
+    }

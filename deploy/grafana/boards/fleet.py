@@ -1,0 +1,50 @@
+"""All stations side by side: for whoever plans where to go next."""
+
+from typing import Any
+
+from deploy.grafana.boards.panel import board, chosen, prom
+
+HERE = 'station=~"$station"'
+UP = f'up{{job="station", {HERE}}}'
+ROWS = (
+    prom("number", "Stations that answer", "short", "Of those that Prometheus knows.", "reliability.md",
+         (f"sum({UP})", "answer"), (f"count({UP})", "known"), width=6),
+    prom("number", "Ready", "short", "How many would accept a trigger.", "metrics.md",
+         (f"sum(station_ready{{{HERE}}})", "ready"), width=6),
+    prom("number", "Alarms", "short", "That stand now, by priority.", "alarms.md",
+         (f"sum by (priority) (station_alarms_active{{{HERE}}})", "{{priority}}"), width=6),
+    prom("number", "Fruit a minute", "short", "By all of them.", "cycle-time.md",
+         (f"60 * sum(station_fruit_outcome:inspections:rate15m{{{HERE}}})", "fruit"), width=6),
+)  # fmt: skip
+COMPARED = (
+    prom("lines", "Answers", "bool_yes_no", "0 is a machine that is off, or a network that is cut.", "reliability.md",
+         (UP, "{{station}}"), largest=1),
+    prom("lines", "Alarms", "short", "How many stand.", "alarms.md",
+         (f"sum by (station) (station_alarms_active{{{HERE}}})", "{{station}}")),
+    prom("lines", "Throughput", "short", "Fruit a minute.", "cycle-time.md",
+         (f"60 * sum by (station) (station_fruit_outcome:inspections:rate15m{{{HERE}}})", "{{station}}")),
+    prom("lines", "Reject rate", "percentunit", "Over one hour. One station that differs from the others on the same "
+         "fruit measures differently: verify it.", "alarms.md#reject-rate",
+         (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),
+    prom("lines", "Not judged", "percentunit", "Over one hour.", "alarms.md#many-no-result",
+         (f"station_fruit:unjudged_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),
+    prom("lines", "Share of the deadline", "percentunit", "Of the slowest twentieth.", "alarms.md#deadline-missed",
+         (f"station_fruit:cycle_share:p95_15m{{{HERE}}}", "{{station}}, {{fruit}}")),
+    prom("lines", "Drift of the reference", "suffix: grey levels", "Which sensor is next.",
+         "alarms.md#reference-drifting", (f"station_reference_drift_grey_levels{{{HERE}}}", "{{station}}")),
+    prom("lines", "Free space", "bytes", "On the records' disks.", "alarms.md#disk-low",
+         (f"station_records_free_bytes{{{HERE}}}", "{{station}}")),
+    prom("lines", "Behind by", "s", "How old the first record is that another system was not told.",
+         "alarms.md#outbox-behind", (f"station_outbox_lag_seconds{{{HERE}}}", "{{station}}, {{destination}}")),
+    prom("table", "Calibrations", "s", "Their ages: the oldest is calibrated next.", "alarms.md#calibration-old",
+         f"sort_desc(max by (station) (station_calibration_age_seconds{{{HERE}}}))", width=12),
+    prom("table", "Versions", "none", "What runs where.", "metrics.md",
+         f"max by (station, version, python) (station_build_info{{{HERE}}})", width=12),
+)  # fmt: skip
+
+
+def dashboard() -> Any:
+    """The dashboard."""
+    station = chosen("station", "Stations", "label_values(station_build_info, station)", several=True)
+    about = "Which station needs somebody?"
+    return board("fruit-fleet", "Fleet", about, (station,), {"Now": ROWS, "Side by side": COMPARED})

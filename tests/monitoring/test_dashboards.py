@@ -1,0 +1,63 @@
+"""The dashboards as they are committed."""
+
+import re
+
+import pytest
+import yaml
+
+from benchmarks.monitoring.asking import DASHBOARDS, dashboards, panels
+from benchmarks.monitoring.document import headings
+from deploy.grafana.boards.export import exported
+
+ROOT = DASHBOARDS.parents[2]
+PANELS = panels()
+PROVISIONING = DASHBOARDS.parent / "provisioning"
+
+
+def test_the_files_are_what_the_code_makes():
+    for path, text in exported().items():
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run python -m deploy.grafana.boards"
+    assert set(exported()) == set(DASHBOARDS.glob("*.json"))
+
+
+@pytest.mark.parametrize("panel", PANELS, ids=lambda panel: f"{panel.board} {panel.title}")
+def test_a_panel_has_a_unit_a_description_and_a_link(panel):
+    data = panel.data
+    assert data["fieldConfig"]["defaults"]["unit"]
+    assert data["description"].endswith(".")
+    assert data["targets"]
+    path, _, anchor = data["links"][0]["url"].removeprefix("${docs}/").partition("#")
+    assert (ROOT / "docs" / path).is_file(), path
+    assert not anchor or anchor in headings(ROOT / "docs" / path), anchor
+
+
+@pytest.mark.parametrize("name", dashboards())
+def test_a_dashboard_can_be_loaded(name):
+    board = dashboards()[name]
+    variables = {each["name"] for each in board["templating"]["list"]}
+    asked = " ".join(str(panel.data) for panel in PANELS if panel.board == name)
+    for variable in re.findall(r"\$\{?([a-z_]+)(?::\w+)?\}?", re.sub(r"\$__\w+", "", asked)):
+        assert variable in variables
+    numbers = [panel.data["id"] for panel in PANELS if panel.board == name]
+    assert len(set(numbers)) == len(numbers)
+    cells = [
+        (panel.data["gridPos"]["x"] + x, panel.data["gridPos"]["y"] + y)
+        for panel in PANELS
+        if panel.board == name
+        for x in range(panel.data["gridPos"]["w"])
+        for y in range(panel.data["gridPos"]["h"])
+    ]
+    assert len(set(cells)) == len(cells), "panels overlap"
+    assert all(x < 24 for x, _ in cells)
+
+
+def test_uids_are_unique_and_datasources_are_provisioned():
+    uids = [board["uid"] for board in dashboards().values()]
+    assert len(set(uids)) == len(uids) == 4
+    known = yaml.safe_load((PROVISIONING / "datasources" / "fruit-station.yaml").read_text())["datasources"]
+    asked = {
+        (target["datasource"]["type"], target["datasource"]["uid"]) for panel in PANELS for target in panel.targets
+    }
+    assert asked == {(each["type"], each["uid"]) for each in known}
+    secrets = [each["secureJsonData"]["password"] for each in known if "secureJsonData" in each]
+    assert all(re.fullmatch(r"\$\{\w+\}", secret) for secret in secrets)

@@ -1,0 +1,72 @@
+"""A real Prometheus scrapes a demonstration, which tells a real PostgreSQL: whatever is asked is answered."""
+
+import math
+import os
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families as parse
+
+from benchmarks.archive import postgres
+from benchmarks.monitoring.asking import panels, promql, rules, sql, used
+from benchmarks.monitoring.site import STATION, demonstration
+from station.service.metrics_table import TABLE, exposed_name
+
+FRUITS = 3
+NEVER_ON_A_DEMONSTRATION = {"NoStations": "absent(), asked for by what it looks for"}
+
+
+def unanswered(site):
+    """Rules and panels that Prometheus has nothing for."""
+    asked = [
+        *((f"rule {name}", expr) for name, expr in rules()),
+        *(
+            (f"{panel.board}: {panel.title}", promql(target["expr"], STATION, "1m", week="3s"))
+            for panel in panels()
+            for target in panel.targets
+            if "expr" in target
+        ),
+    ]
+    assert len(asked) > 100
+    answers = {what: site.prometheus.now(expr, site.at_s) for what, expr in asked}
+    return [what for what, found in answers.items() if all(math.isnan(each.points[0][1]) for each in found)]
+
+
+def empty(server, begin, end):
+    """Panels that PostgreSQL has no rows for."""
+    with server.connect() as connection:
+        return [
+            panel.title
+            for panel in panels()
+            for target in panel.targets
+            if "rawSql" in target
+            and not connection.execute(
+                sql(target["rawSql"], begin, end, station=[STATION], fruit=["blueberry", "o'fruit"]).encode()
+            ).fetchall()
+        ]
+
+
+@pytest.mark.timeout(600)
+def test_every_question_is_answered_and_no_metric_is_unused(promtool, postgresql_programs, tmp_path):
+    host = f"127.89.{os.getpid() % 250 + 1}.1"
+    with (
+        postgres.throwaway(postgresql_programs) as server,
+        demonstration(tmp_path, server, FRUITS, host) as site,
+    ):
+        assert promtool("check", "metrics", given=site.metrics) == ""
+        assert unanswered(site) == []
+        assert empty(server, "2020-01-01", "2100-01-01") == []
+        stored = {each["__name__"] for each in site.prometheus.get('series?match[]={job="station"}')}
+        alive = {alert["labels"]["alertname"] for alert in site.prometheus.get("alerts")["alerts"]}
+        assert "Watchdog" in alive
+        loaded = [rule for group in site.prometheus.get("rules")["groups"] for rule in group["rules"]]
+        assert [rule["name"] for rule in loaded if rule["health"] != "ok"] == []
+    parts = ("_bucket", "_sum", "_count")
+    scraped = {
+        name: next((name.removesuffix(part) for part in parts if name.endswith(part)), name)
+        for name in stored
+        if name.startswith(("station_", "process_")) and ":" not in name
+    }
+    assert {exposed_name(row) for row in TABLE.values()} <= set(scraped.values()), "a metric that never appeared"
+    families = {scraped[name] for name in used(set(scraped))}
+    assert set(scraped.values()) - families == set(), "metrics that nobody asks for"
+    assert {family.name for family in parse(site.metrics)}
