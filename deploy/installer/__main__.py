@@ -90,7 +90,7 @@ def _act(chosen: argparse.Namespace, layout: Layout, services: Services) -> None
             say(f"would {step.sentence}")
         return
     installation.run()
-    say(f"{source.name} is installed; configure it in {layout.configuration}")
+    say(f"{installation.release.name} is installed; configure it in {layout.configuration}")
 
 
 def _roll_back(chosen: argparse.Namespace, layout: Layout, services: Services) -> None:

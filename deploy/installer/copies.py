@@ -83,7 +83,7 @@ def _copied(path: Path, to: Path) -> None:
 
 
 def _copied_file(path: Path | str, to: Path | str) -> None:
-    """Copy a file, unless it has gone meanwhile: what the running station is about to put in place has a passing name."""
+    """Copy a file, unless it has gone meanwhile: what the station is about to put in place has a passing name."""
     with contextlib.suppress(FileNotFoundError):
         shutil.copy2(path, to)
 

@@ -1,4 +1,4 @@
-"""Install, or upgrade: everything is made and checked beside what runs, then switched, and switched back if it is not well."""
+"""Install, or upgrade: all is made and checked beside what runs, then switched, and switched back if it is not well."""
 
 import shutil
 from collections.abc import Callable
@@ -68,7 +68,7 @@ class Installation:
             precautions.check_quiet(self._layout, self._old)
 
     def steps(self) -> list[Step]:
-        """What is to be done, in order. Each may be done again; together they lead from any state to the installed one."""
+        """What is to be done, in order. Each may be done again; together they lead there from any state between."""
         layout, name = self._layout, self.release.name
         upgrading = [
             Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),

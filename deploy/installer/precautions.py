@@ -56,8 +56,8 @@ def check_room(layout: Layout) -> None:
         free = shutil.disk_usage(place).free
         if free < size_bytes:
             raise Refused(
-                f"{place} has {free / 1e6:.0f} MB of free space, {size_bytes / 1e6:.0f} MB are needed for the program and "
-                "a copy of the records: free space, or mount another disk at /var/backups"
+                f"{place} has {free / 1e6:.0f} MB of free space, {size_bytes / 1e6:.0f} MB are needed for the program "
+                "and a copy of the records: free space, or mount another disk at /var/backups"
             )
 
 

@@ -32,7 +32,7 @@ def run(
         Its output.
 
     Raises:
-        Failed: it could not be started, did not end in time, or ended with another exit code than 0; with its last words.
+        Failed: it could not be started, did not end in time, or its exit code was not 0; with its last words.
     """
     words = [str(part) for part in command]
     try:
@@ -77,7 +77,7 @@ def known_user() -> bool:
 
 
 def own(layout: Layout, path: Path, user: str, group: str) -> None:
-    """Give a path to a user and a group where the system has them; nothing is done in a scratch root, or without the right.
+    """Give a path to a user and a group; nothing is done in a scratch root, by another user than root, or without them.
 
     Args:
         layout: whose path it is.

@@ -7,6 +7,7 @@ import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from installer.layout import Layout, read_note, write_note
@@ -21,7 +22,7 @@ ROOM_BYTES = 1_500_000_000
 """Of a release and of what pip unpacks meanwhile: measured, docs/deployment.md, and half as much again."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Source:
     """A checkout or an unpacked archive of the project.
 
@@ -31,7 +32,7 @@ class Source:
 
     folder: Path
 
-    @property
+    @cached_property
     def version(self) -> str:
         """As `pyproject.toml` says."""
         return tomllib.loads((self.folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
@@ -39,8 +40,9 @@ class Source:
     @property
     def name(self) -> str:
         """The release's: the version, and eight digits of what it is made of."""
-        return f"{self.version}+{self.fingerprint()[:8]}"
+        return f"{self.version}+{self.fingerprint[:8]}"
 
+    @cached_property
     def fingerprint(self) -> str:
         """A hash over all that is installed from here."""
         digest = hashlib.sha256()
@@ -59,7 +61,7 @@ class Source:
         missing = [name for name in wanted if not (self.folder / name).exists()]
         if missing:
             raise Refused(
-                f"{self.folder} has no {', '.join(missing)}: run deploy/install of a checkout or of an unpacked archive "
+                f"{self.folder} has no {', '.join(missing)}: run deploy/install of a checkout or an unpacked archive "
                 "of the project, not a copy of it alone"
             )
 
@@ -113,7 +115,7 @@ def make(layout: Layout, source: Source, packages: Packages) -> Path:
     run(release / "venv" / "bin" / "station", "--version")
     _open_to_all(release)
     size_bytes = sum(file.lstat().st_size for file in release.rglob("*") if file.is_file() and not file.is_symlink())
-    stamp = {"version": source.version, "fingerprint": source.fingerprint(), "python": sys.version, "bytes": size_bytes}
+    stamp = {"version": source.version, "fingerprint": source.fingerprint, "python": sys.version, "bytes": size_bytes}
     write_note(release / STAMP, stamp)
     say(f"made {release.name}: {size_bytes / 1e6:.0f} MB in {time.monotonic() - began:.0f} s")
     return release

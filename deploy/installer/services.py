@@ -1,5 +1,7 @@
 """The system's services: systemd, or the files that tell it what to do in a scratch root."""
 
+# ruff: noqa: D102 (the protocol tells what each method does)
+
 import os
 import shutil
 from pathlib import Path
@@ -66,11 +68,10 @@ class Systemd:
         self._booted = Path("/run/systemd/system").is_dir()
 
     def make_user(self) -> None:
-        run("systemd-sysusers", f"/etc/sysusers.d/{NAME}.conf")
+        run("systemd-sysusers", f"{NAME}.conf")
 
     def remove_user(self) -> None:
-        if f"{NAME}:" in Path("/etc/passwd").read_text(encoding="utf-8"):
-            run("userdel", NAME)
+        _remove_user(self._layout)
 
     def enable(self) -> None:
         run("systemctl", "enable", UNIT, TIMER)
@@ -125,11 +126,10 @@ class ScratchRoot:
 
     def make_user(self) -> None:
         if self._users.exists() and os.geteuid() == 0:
-            run("systemd-sysusers", f"--root={self._layout.root}", f"/etc/sysusers.d/{NAME}.conf")
+            run("systemd-sysusers", f"--root={self._layout.root}", f"{NAME}.conf")
 
     def remove_user(self) -> None:
-        if self._users.exists() and f"{NAME}:" in self._users.read_text(encoding="utf-8"):
-            run("userdel", "--prefix", self._layout.root, NAME)
+        _remove_user(self._layout, "--prefix", str(self._layout.root))
 
     def enable(self) -> None:
         self._systemctl("enable")
@@ -153,3 +153,11 @@ class ScratchRoot:
     def _systemctl(self, verb: str) -> None:
         if shutil.which("systemctl"):
             run("systemctl", f"--root={self._layout.root}", verb, UNIT, TIMER)
+
+
+def _remove_user(layout: Layout, *options: str) -> None:
+    """Remove the user and the group of that name; the group goes with the user only where login.defs says so."""
+    for file, program in (("/etc/passwd", "userdel"), ("/etc/group", "groupdel")):
+        listed = layout.place(file)
+        if listed.exists() and any(line.startswith(f"{NAME}:") for line in listed.read_text("utf-8").splitlines()):
+            run(program, *options, NAME)

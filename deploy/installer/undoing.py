@@ -40,6 +40,4 @@ def undo(layout: Layout, services: Services, *, purge: bool) -> None:
     site_files.take_away_folders(layout, note.get("folders", []))
     if not purge:
         kept = [str(path) for path in (layout.settings, layout.home, layout.backups) if path.exists()]
-        say(
-            f"kept: {', '.join(kept) or 'nothing'}{f' and the user {NAME}' if kept else ''}; --undo --purge removes them"
-        )
+        say(f"kept: {', '.join([*kept, f'the user {NAME}']) if kept else 'nothing'}; --undo --purge removes them")

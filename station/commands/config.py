@@ -26,7 +26,7 @@ def config() -> None:
 @config.command()
 @_config
 def check(config: Path | None) -> None:
-    """Check the configuration with its environment variables, and say all that is wrong; exit code 2 where it is bad."""
+    """Check the configuration with its environment variables, and say all that is wrong; exit code 2 if any."""
     site = load_configuration(config)
     click.echo(f"OK: home {site.home}, camera {site.camera.driver}, arm {site.arm.host}, gripper {site.gripper.driver}")
 

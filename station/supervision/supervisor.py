@@ -3,8 +3,8 @@
 What is given up stays down while the rest goes on: without the station's process the PLC interface still tells the PLC
 that the station is lost, which is the safe output, and a person has to mend the cause and start again.
 
-The supervisor has one itself, systemd, and feeds its watchdog by what it hears of all its programs: while one of them is
-silent, or while the supervisor itself is stuck, nothing is fed.
+The supervisor has one itself, systemd, and feeds its watchdog by what it hears of all its programs: while one of them
+is silent, or while the supervisor itself is stuck, nothing is fed.
 """
 
 import asyncio
@@ -247,9 +247,7 @@ class Supervisor:
         child.restarts.append(now_s)
         child.restarts_in_all += 1
         self._tell_restarts()
-        notify(
-            f"STATUS=running; {child.program.name} {trouble} and was started again, {child.restarts_in_all} times in all"
-        )
+        notify(f"STATUS=running; {child.program.name} {trouble}: restart {child.restarts_in_all} since the start")
         await child.start()
 
     def _tell_restarts(self) -> None:
