@@ -76,7 +76,7 @@ def check_quiet(layout: Layout, release: Path) -> None:
     try:
         lots = station(layout, release, "records", "lot", "list").splitlines()
         since = (datetime.now(UTC) - QUIET).isoformat(timespec="seconds")
-        lately = station(layout, release, "records", "list", "--last", "1", "--from", since).strip()
+        lately = station(layout, release, "records", "list", "--last", "1", "--from", since).splitlines()
     except Failed as error:
         raise Refused(
             f"the records cannot be asked whether a lot is under way; --during-lot goes on without: {error}"
@@ -86,7 +86,7 @@ def check_quiet(layout: Layout, release: Path) -> None:
             f"the lot {running[0]} is under way: end it first (station records lot end {running[0]}), "
             "or upgrade all the same with --during-lot"
         )
-    if lately:
+    if len(lately) > 1:  # below the table's head
         raise Refused(
             f"fruit was inspected within the last {QUIET.total_seconds() / 60:.0f} minutes: stop the line and wait, "
             "or upgrade all the same with --during-lot"

@@ -119,6 +119,19 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
             checks.check_room(layout(tmp_path))
 
 
+def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monkeypatch):
+    checks, layout = installer("precautions"), installer("layout").Layout(tmp_path)
+    checks.check_quiet(layout, tmp_path)  # nothing was ever recorded
+    (layout.home / "records").mkdir(parents=True)
+    (layout.home / "records/records.sqlite3").touch()
+    rows = ["number  begun (UTC)"]
+    monkeypatch.setattr(checks, "station", lambda *words: "\n".join(rows) if "--from" in words else "A-16: M, ended")
+    checks.check_quiet(layout, tmp_path)
+    rows.append("4711    2026-06-30")
+    with pytest.raises(installer("words").Refused, match="inspected within the last 10 minutes: stop the line"):
+        checks.check_quiet(layout, tmp_path)
+
+
 def test_no_python_is_said_by_the_shell(tmp_path, root):
     done = subprocess.run(
         [root / "deploy/install", "--help"], env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=False
@@ -134,7 +147,7 @@ def test_no_python_is_said_by_the_shell(tmp_path, root):
 
 
 def test_a_part_of_the_project_is_no_source(tmp_path, root, install):
-    shutil.copytree_of(root / "deploy", tmp_path / "deploy")
+    shutil.copytree(root / "deploy", tmp_path / "deploy")
     (tmp_path / "root").mkdir()
     refused = install("--root", tmp_path / "root", program=tmp_path)
     assert refused.returncode == 2

@@ -103,8 +103,11 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
 
 
 def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
-    tmp_path, installer, installation, releases, tree_of
+    tmp_path, installer, installation, releases, tree_of, monkeypatch
 ):
+    # Both ask programs, which takes long; the test above has them asked.
+    monkeypatch.setattr(installer("configuration"), "try_with", lambda _layout, _release: ())
+    monkeypatch.setattr(installer("configuration"), "migrate", lambda _layout, _release: None)
     layouts, services = installer("layout"), installer("services").ScratchRoot
     shutil.copytree(releases, tmp_path / "old", symlinks=True)
 
