@@ -1,6 +1,7 @@
 """Copies of all that a site cannot make again: records, state and configuration."""
 
 import contextlib
+import itertools
 import shutil
 import sqlite3
 from datetime import UTC, datetime
@@ -32,7 +33,8 @@ def make_copy(layout: Layout, release: Path, kind: str) -> Path:
         Failed: the records could not be copied, as for want of space.
     """
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
-    copy = layout.backups / f"{kind}{stamp}"
+    names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
+    copy = next(path for name in names if not (path := layout.backups / name).exists())
     partial = layout.backups / f".{copy.name}.partial"
     _clear_partial(layout.backups)
     partial.mkdir(mode=0o750)

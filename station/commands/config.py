@@ -1,11 +1,14 @@
 """`station config`: look at the configuration, check it, and bring an earlier program's up to date."""
 
+import ipaddress
 import os
 from pathlib import Path
 
 import click
 
+from station.settings.conduits import Zone
 from station.settings.configuration import load_configuration
+from station.settings.firewall import rules
 from station.settings.migration import migrated
 from station.settings.problems import Problem, SettingsError
 from station.settings.yaml_loader import LARGEST_FILE_BYTES
@@ -18,6 +21,24 @@ _config = click.option(
 )
 
 
+def _networks(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
+    try:
+        return tuple(str(ipaddress.ip_network(each.strip())) for text in given for each in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{error}; write 10.10.30.5 or 10.10.30.0/24") from error
+
+
+def _zones(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[Zone, tuple[str, ...]]:
+    known = {zone.value: zone for zone in Zone if zone is not Zone.STATION}
+    found: dict[Zone, tuple[str, ...]] = {}
+    for text in given:
+        name, _, networks = text.partition("=")
+        if name not in known:
+            raise click.BadParameter(f"{name!r} is no zone: {', '.join(known)}")
+        found[known[name]] = _networks(context, option, (networks,))
+    return found
+
+
 @click.group()
 def config() -> None:
     """Look at the configuration, check it, and bring an earlier program's up to date."""
@@ -26,7 +47,7 @@ def config() -> None:
 @config.command()
 @_config
 def check(config: Path | None) -> None:
-    """Check the configuration with its environment variables, and say all that is wrong; exit code 2 if any."""
+    """Check the configuration with its environment variables, and say all that is wrong."""
     site = load_configuration(config)
     click.echo(f"OK: home {site.home}, camera {site.camera.driver}, arm {site.arm.host}, gripper {site.gripper.driver}")
 
@@ -53,6 +74,20 @@ def migrate(file: Path, *, write: bool) -> None:
         click.echo(f"{file}: nothing to change")
     elif write:
         _replace(file, changed.text)
+
+
+@config.command()
+@_config
+@click.option(
+    "--zone", "zones", metavar="NAME=ADDRESS,…", multiple=True, callback=_zones,
+    help="Addresses or networks of a zone: cell, line, operators, monitoring, archive. May be repeated.",
+)  # fmt: skip
+@click.option(
+    "--maintenance", metavar="ADDRESS", multiple=True, callback=_networks, help="From where SSH, time and names come."
+)
+def firewall(config: Path | None, zones: dict[Zone, tuple[str, ...]], maintenance: tuple[str, ...]) -> None:
+    """Write rules of nftables that open what this configuration uses, for the zones named, and nothing else."""
+    click.echo(rules(load_configuration(config), zones, maintenance), nl=False)
 
 
 def _text(file: Path) -> str:

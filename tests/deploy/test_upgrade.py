@@ -73,14 +73,16 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
     installation(layout, stand_in, "0.2.0").check(during_lot=False)
 
     # A new version that does not become ready: the old one is back, with its configuration and its records.
-    with pytest.raises(failed, match=r"0\.3\.0\+.* is not in use: 0\.1\.0\+.* is again"):
-        installation(layout, stand_in, "0.3.0").run()
+    (layout.home / "no-pages").touch()
+    with pytest.raises(failed, match=r"0\.2\.0\+.* is not in use: 0\.1\.0\+.* is again"):
+        installation(layout, stand_in, "0.2.0").run()
+    (layout.home / "no-pages").unlink()
     assert version() == "0.1.0"
     assert settings.read_text() == ours
     assert form_of(layout) == form
     assert not layout.upgrade.exists()
 
-    # A good one.
+    # The same with its cause mended.
     installation(layout, stand_in, "0.2.0").run()
     assert version() == "0.2.0"
     assert "logged_out_after_s: 60.0" in settings.read_text()
