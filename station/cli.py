@@ -25,6 +25,7 @@ COMMANDS = {
     "api-token": Entry("hmi.api_command:api_token", "Make and withdraw tokens for the HTTP API."),
     "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
+    "config": Entry("station.commands.config:config", "Look at the configuration, check it, bring it up to date."),
     "demo": Entry("station.commands.demo:demo", "Run the station against a simulated world and line."),
     "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),

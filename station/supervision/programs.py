@@ -40,5 +40,6 @@ def _config(config: Path | None) -> tuple[str, ...]:
 
 
 def _program(name: str, logs: Path | None, *arguments: str) -> Program:
-    command = (sys.executable, "-m", "station", *arguments)
+    # -P: a folder `station` where somebody happens to stand is not this program.
+    command = (sys.executable, "-P", "-m", "station", *arguments)
     return Program(name, command, output=logs / f"{name}.log" if logs else None)

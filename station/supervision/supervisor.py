@@ -2,6 +2,9 @@
 
 What is given up stays down while the rest goes on: without the station's process the PLC interface still tells the PLC
 that the station is lost, which is the safe output, and a person has to mend the cause and start again.
+
+The supervisor has one itself, systemd, and feeds its watchdog by what it hears of all its programs: while one of them
+is silent, or while the supervisor itself is stuck, nothing is fed.
 """
 
 import asyncio
@@ -18,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from station.errors import StationError
-from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE
+from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, tell
 
 RESTARTS = 5
@@ -61,7 +64,8 @@ class _Child:
         self._listening.settimeout(0.0)
         self._listening.bind(str(self._address))
         self.ready = self.given_up = False
-        self._heard_s = 0.0
+        self.heard_s = 0.0
+        """When it was started, or last said that it makes progress; monotonic."""
 
     async def start(self) -> None:
         self.ready = False
@@ -82,7 +86,7 @@ class _Child:
                 stderr=output,
                 start_new_session=True,
             )
-        self._heard_s = time.monotonic()
+        self.heard_s = time.monotonic()
 
     def listen(self) -> None:
         """Take what the process has said since the last call."""
@@ -94,7 +98,7 @@ class _Child:
             lines = message.split(b"\n")
             self.ready |= b"READY=1" in lines
             if self.ready and not {b"READY=1", b"WATCHDOG=1"}.isdisjoint(lines):
-                self._heard_s = time.monotonic()
+                self.heard_s = time.monotonic()
 
     def trouble(self) -> str:
         """What is wrong with the process, empty where nothing is."""
@@ -102,7 +106,7 @@ class _Child:
             return "is not running"
         if self.process.returncode is not None:
             return f"ended with {_named(self.process.returncode)}"
-        silent_s = time.monotonic() - self._heard_s
+        silent_s = time.monotonic() - self.heard_s
         if not self.ready and silent_s > self.program.start_limit_s:
             return f"was not ready after {self.program.start_limit_s:g} s"
         if self.ready and silent_s > self.program.watchdog_s:
@@ -147,6 +151,7 @@ class Supervisor:
         self._environment = dict(os.environ if environment is None else environment)
         self._children: list[_Child] = []
         self._restarts_file = Path()
+        self._fed_s = 0.0
 
     @property
     def restarts(self) -> dict[str, int]:
@@ -182,9 +187,11 @@ class Supervisor:
                     await child.start()
                     await self._until(child, ended)
                 if not ended.is_set():
+                    notify(f"STATUS=running: {', '.join(child.program.name for child in self._children)}")
                     on_ready()
                 await self._keep(ended)
             finally:
+                notify("STOPPING=1")
                 await asyncio.shield(self._stop())
         if given_up := [child.program.name for child in self._children if child.given_up]:
             raise SupervisionError(f"given up: {', '.join(given_up)}; mend the cause and start the station again")
@@ -206,7 +213,14 @@ class Supervisor:
                 child.listen()
                 if not child.given_up and (trouble := child.trouble()):
                     await self._restart(child, trouble)
+            self._feed()
             await self._look((), ended)
+
+    def _feed(self) -> None:
+        """Feed the watchdog above once every program that is kept running was heard since the last time."""
+        if all(child.ready and child.heard_s > self._fed_s for child in self._children if not child.given_up):
+            notify("WATCHDOG=1")
+            self._fed_s = time.monotonic()
 
     async def _look(self, children: Iterable[_Child], ended: asyncio.Event) -> None:
         with contextlib.suppress(TimeoutError):
@@ -223,6 +237,7 @@ class Supervisor:
         if len(child.restarts) >= RESTARTS:
             child.given_up = True
             self._tell_restarts()
+            notify(f"STATUS=given up: {child.program.name}, which {trouble}; mend the cause and start again")
             log.critical(
                 "the process %s %s, after %d restarts within %g s: it is given up; mend the cause and start again",
                 child.program.name, trouble, RESTARTS, RESTARTS_WITHIN_S,
@@ -232,6 +247,7 @@ class Supervisor:
         child.restarts.append(now_s)
         child.restarts_in_all += 1
         self._tell_restarts()
+        notify(f"STATUS=running; {child.program.name} {trouble}: restart {child.restarts_in_all} since the start")
         await child.start()
 
     def _tell_restarts(self) -> None:

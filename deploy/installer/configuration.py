@@ -1,0 +1,48 @@
+"""The site's configuration under another release."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from installer.layout import Layout
+from installer.programs import run
+from installer.words import Failed, Refused, say
+
+
+def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
+    """See on a copy whether the configuration would be good.
+
+    Args:
+        layout: whose.
+        release: the one to come.
+
+    Returns:
+        What would have to be changed in the file.
+
+    Raises:
+        Refused: it would not be; with all that is wrong with it.
+    """
+    program = release / "venv" / "bin" / "station"
+    with tempfile.TemporaryDirectory(prefix="station-config-") as folder:
+        copy = Path(folder) / layout.configuration.name
+        shutil.copyfile(layout.configuration, copy)
+        try:
+            said = run(program, "config", "migrate", "--write", copy, environment=layout.environment())
+            run(program, "config", "check", "--config", copy, environment=layout.environment())
+        except Failed as error:
+            wrong = str(error).partition("\n")[2].replace(str(copy), str(layout.configuration))
+            raise Refused(f"{layout.configuration} is not good for {release.name}:\n{wrong}") from error
+    changes = tuple(line.removeprefix(f"{copy}: ") for line in said.splitlines())
+    return () if changes == ("nothing to change",) else changes
+
+
+def migrate(layout: Layout, release: Path) -> None:
+    """Bring the configuration into the words of a release. Doing so again changes nothing.
+
+    Args:
+        layout: whose.
+        release: the one to come.
+    """
+    program = release / "venv" / "bin" / "station"
+    for line in run(program, "config", "migrate", "--write", layout.configuration).splitlines():
+        say(line)

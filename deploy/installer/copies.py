@@ -1,0 +1,95 @@
+"""Copies of all that a site cannot make again: records, state and configuration."""
+
+import contextlib
+import itertools
+import shutil
+import sqlite3
+from datetime import UTC, datetime
+from pathlib import Path
+
+from installer.layout import Layout
+from installer.programs import LONG_S, own, station
+from installer.words import say
+
+LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs"})
+"""Of the home folder: the records are copied by the station itself, the rest is of the moment."""
+RECORDS, STATE, SETTINGS = "records", "state", "settings"
+DAILY = "daily-"
+_DATABASE = Path("records.sqlite3")
+
+
+def make_copy(layout: Layout, release: Path, kind: str) -> Path:
+    """Copy records, state and configuration into a new folder, while the station runs or not.
+
+    Args:
+        layout: of what.
+        release: whose program copies the records.
+        kind: the first part of the folder's name.
+
+    Returns:
+        The folder. It has this name only when it is complete.
+
+    Raises:
+        Failed: the records could not be copied, as for want of space.
+    """
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
+    copy = next(path for name in names if not (path := layout.backups / name).exists())
+    partial = layout.backups / f".{copy.name}.partial"
+    _clear_partial(layout.backups)
+    partial.mkdir(mode=0o750)
+    own(layout, partial, "fruit-station", "fruit-station")
+    if (layout.home / RECORDS / _DATABASE).exists():
+        station(layout, release, "records", "backup", partial / RECORDS, limit_s=LONG_S)
+    kept = [path.name for path in layout.home.iterdir() if path.name not in LEFT_OUT] if layout.home.is_dir() else []
+    for name in kept:
+        _copied(layout.home / name, partial / STATE / name)
+    _copied(layout.settings, partial / SETTINGS)
+    partial.rename(copy)
+    return copy
+
+
+def thin_out(layout: Layout, kind: str, keep: int) -> None:
+    """Remove all copies of a kind but the newest.
+
+    Args:
+        layout: of what.
+        kind: as for `make_copy`.
+        keep: how many stay.
+    """
+    found = sorted(path for path in layout.backups.glob(f"{kind}*") if path.is_dir())
+    for path in found[: max(0, len(found) - keep)]:
+        shutil.rmtree(path)
+        say(f"removed {path}, which was older than the last {keep}")
+
+
+def form(folder: Path) -> str:
+    """The form of a records' database, as its migrations name it; empty where there is none.
+
+    Args:
+        folder: of the records, or of their copy.
+    """
+    if not (folder / _DATABASE).exists():
+        return ""
+    with contextlib.closing(sqlite3.connect(folder / _DATABASE)) as connection:
+        row = connection.execute("SELECT version_num FROM alembic_version").fetchone()
+    return str(row[0]) if row else ""
+
+
+def _copied(path: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        shutil.copytree(path, to, symlinks=True, copy_function=_copied_file)
+    elif path.is_file():
+        _copied_file(path, to)
+
+
+def _copied_file(path: Path | str, to: Path | str) -> None:
+    """Copy a file, unless it has gone meanwhile: what the station is about to put in place has a passing name."""
+    with contextlib.suppress(FileNotFoundError):
+        shutil.copy2(path, to)
+
+
+def _clear_partial(folder: Path) -> None:
+    for path in folder.glob(".*.partial"):
+        shutil.rmtree(path, ignore_errors=True)

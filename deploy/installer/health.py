@@ -1,0 +1,84 @@
+"""Whether a station that was started is well."""
+
+import http.client
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from installer.layout import Layout
+from installer.programs import station
+from installer.words import Failed
+
+LIMIT_S = 120.0
+_ASK_S = 3.0
+
+
+def ready(layout: Layout, release: Path) -> bool:
+    """Whether it would accept a trigger now; also False where it cannot be asked.
+
+    Args:
+        layout: whose configuration says where it answers.
+        release: the one in use.
+    """
+    try:
+        return _asked(*_address(layout, release), "/readyz")[0] == http.HTTPStatus.OK
+    except (Failed, OSError, http.client.HTTPException):
+        return False
+
+
+def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: bool, limit_s: float = LIMIT_S) -> None:
+    """Wait until the station is alive, is of this version, and is ready again if it was before.
+
+    A station without devices is alive and not ready: on a first start nothing else is to be expected.
+
+    Args:
+        layout: whose configuration says where it answers.
+        release: the one that was started.
+        version: which version has to answer.
+        was_ready: whether the one before it would have accepted a trigger.
+        limit_s: how long to wait.
+
+    Raises:
+        Failed: it is not, by then; with what it says.
+    """
+    address, deadline_s, said = _address(layout, release), time.monotonic() + limit_s, "it does not answer"
+    while time.monotonic() < deadline_s:
+        try:
+            said = _trouble(address, version, was_ready=was_ready)
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            said = f"it does not answer: {error}"
+        if not said:
+            return
+        time.sleep(0.5)
+    raise Failed(f"the station is not well {limit_s:g} s after its start: {said}")
+
+
+def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
+    status, _ = _asked(*address, "/livez")
+    if status != http.HTTPStatus.OK:
+        return "/livez says that it stands still"
+    found = _asked(*address, "/version")[1].get("fruit-station")
+    if found != version:
+        return f"version {found} answers, not {version}"
+    status, answer = _asked(*address, "/readyz")
+    return (
+        f"it was ready before and is not now: {answer.get('why')}" if was_ready and status != http.HTTPStatus.OK else ""
+    )
+
+
+def _address(layout: Layout, release: Path) -> tuple[str, int]:
+    metrics = json.loads(station(layout, release, "config", "show"))["metrics"]
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(metrics["host"], metrics["host"])  # noqa: S104 (asked, not listened on)
+    return host, metrics["port"]
+
+
+def _asked(host: str, port: int, path: str) -> tuple[int, dict[str, Any]]:
+    connection = http.client.HTTPConnection(host, port, timeout=_ASK_S)
+    try:
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        content = answer.read()
+    finally:
+        connection.close()
+    return answer.status, json.loads(content) if content.startswith(b"{") else {}

@@ -1,0 +1,160 @@
+"""Install, or upgrade: all is made and checked beside what runs, then switched, and switched back if it is not well."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from installer import configuration, copies, precautions, site_files
+from installer.health import LIMIT_S, ready, wait_until_well
+from installer.layout import Layout, point, target, write_note
+from installer.release import STAMP, Packages, Source, complete, make
+from installer.rolling_back import roll_back
+from installer.services import Services
+from installer.words import Failed, say
+
+BEFORE = "before-upgrade-"
+_COPIES_KEPT = 3
+
+
+class Step(NamedTuple):
+    """One thing to do, told before it is done."""
+
+    sentence: str
+    do: Callable[[], object]
+
+
+class Installation:
+    """One run of the installer.
+
+    Args:
+        layout: where.
+        services: of the system there.
+        source: what is installed.
+        packages: from where the packages come.
+        limit_s: how long the station may take to be well.
+    """
+
+    def __init__(
+        self, layout: Layout, services: Services, source: Source, packages: Packages, limit_s: float = LIMIT_S
+    ) -> None:
+        self._layout, self._services, self._source, self._packages = layout, services, source, packages
+        self._limit_s = limit_s
+        self.release = layout.releases / source.name
+        self._old = target(layout.current)
+        self._copy: Path | None = None
+        self._was_ready = False
+        self._changes: tuple[str, ...] = ()
+
+    @property
+    def is_upgrade(self) -> bool:
+        """Whether another release is in use."""
+        return self._old is not None and self._old != self.release and complete(self._old)
+
+    def check(self, *, during_lot: bool) -> None:
+        """See that it can be done.
+
+        Args:
+            during_lot: whether it may be done while a lot is under way.
+
+        Raises:
+            Refused: it cannot.
+        """
+        precautions.check_machine(self._layout)
+        self._source.check()
+        if not complete(self.release):
+            precautions.check_room(self._layout)
+        if self.is_upgrade and self._old is not None and not during_lot:
+            precautions.check_quiet(self._layout, self._old)
+
+    def steps(self) -> list[Step]:
+        """What is to be done, in order. Each may be done again; together they lead there from any state between."""
+        layout, name = self._layout, self.release.name
+        upgrading = [
+            Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),
+            Step(f"copy records, state and configuration to {layout.backups}", self._make_copy),
+            Step("end the running station in order", self._stop),
+            Step(f"bring {layout.configuration} into the words of {name}", self._migrate),
+        ]
+        return [
+            Step(f"make the release {name} in {layout.releases}", self._make),
+            *(upgrading if self.is_upgrade else []),
+            Step("put units, rules and the command `station` in place", self._put),
+            Step(f"make the user, {layout.settings}, {layout.home} and {layout.backups}", self._make_places),
+            Step(f"have {layout.current} lead to {name}", self._switch),
+            Step("start the station now and at each boot, and wait until it is well", self._start),
+            Step("remove releases that are neither in use nor the one before", self._remove_old),
+        ]
+
+    def run(self) -> None:
+        """Do it.
+
+        Raises:
+            Refused: the configuration is not good for the new release; the old one runs on.
+            Failed: a step did not come to its end. Of an upgrade, the old release is in use again.
+        """
+        switched = False
+        for step in self.steps():
+            say(step.sentence)
+            switched |= self.is_upgrade and step.do == self._stop
+            try:
+                step.do()
+            except (Failed, OSError) as error:
+                if not switched:
+                    raise
+                say(str(error))
+                roll_back(self._layout, self._services, self._limit_s)
+                raise Failed(
+                    f"{self.release.name} is not in use: {self._describe_old()} is again; mend the cause"
+                ) from error
+
+    def _describe_old(self) -> str:
+        return self._old.name if self._old else "nothing"
+
+    def _make(self) -> None:
+        site_files.make_folder(self._layout, self._layout.program)
+        make(self._layout, self._source, self._packages)
+
+    def _try_configuration(self) -> None:
+        self._changes = configuration.try_with(self._layout, self.release)
+
+    def _make_copy(self) -> None:
+        assert self._old is not None  # noqa: S101 (an upgrade has one)
+        self._was_ready = self._services.running() and ready(self._layout, self._old)
+        self._copy = copies.make_copy(self._layout, self._old, BEFORE)
+        copies.thin_out(self._layout, BEFORE, _COPIES_KEPT)
+        note = {"from": self._old.name, "to": self.release.name, "copy": self._copy.name, "changes": self._changes}
+        write_note(self._layout.upgrade, note)
+        point(self._layout.previous, self._old)
+
+    def _stop(self) -> None:
+        self._services.stop()
+
+    def _migrate(self) -> None:
+        configuration.migrate(self._layout, self.release)
+
+    def _put(self) -> None:
+        site_files.put(self._layout, self.release)
+
+    def _make_places(self) -> None:
+        self._services.make_user()
+        site_files.make_folders(self._layout)
+
+    def _switch(self) -> None:
+        point(self._layout.current, self.release)
+
+    def _start(self) -> None:
+        self._services.reload()
+        self._services.enable()
+        if self._services.start():
+            wait_until_well(
+                self._layout, self.release, self._source.version, was_ready=self._was_ready, limit_s=self._limit_s
+            )
+
+    def _remove_old(self) -> None:
+        kept = {self.release, target(self._layout.previous)}
+        for release in self._layout.releases.iterdir():
+            if release not in kept:
+                (release / STAMP).unlink(missing_ok=True)
+                shutil.rmtree(release)
+                say(f"removed {release.name}")

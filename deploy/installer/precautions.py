@@ -1,0 +1,97 @@
+"""What has to be true before anything is changed."""
+
+import importlib.util
+import os
+import shutil
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from installer.layout import Layout
+from installer.programs import station
+from installer.release import ROOM_BYTES
+from installer.words import Failed, Refused
+
+QUIET = timedelta(minutes=10)
+_PROGRAMS = {"runuser": "util-linux", "systemctl": "systemd", "systemd-sysusers": "systemd", "userdel": "passwd"}
+
+
+def check_machine(layout: Layout) -> None:
+    """See that this user, this Python and these programs can do it.
+
+    Args:
+        layout: what is to be changed.
+
+    Raises:
+        Refused: they cannot.
+    """
+    if layout.is_system and os.geteuid() != 0:
+        raise Refused("only root may install below /: sudo deploy/install (or --root DIR for a trial)")
+    if not layout.root.is_dir():
+        raise Refused(f"--root {layout.root} is no folder: make it first")
+    if importlib.util.find_spec("ensurepip") is None:
+        raise Refused("this Python cannot make virtual environments: apt-get install python3-venv")
+    missing = {package for program, package in _PROGRAMS.items() if layout.is_system and not shutil.which(program)}
+    if missing:
+        raise Refused(f"programs are missing: apt-get install {' '.join(sorted(missing))}")
+
+
+def check_room(layout: Layout) -> None:
+    """See that the disks have room for a release, and for a copy of the records.
+
+    Args:
+        layout: where both go.
+
+    Raises:
+        Refused: they do not.
+    """
+    records = layout.home / "records"
+    wanted = [(layout.program, ROOM_BYTES), (layout.backups, sum(file.stat().st_size for file in _files(records)))]
+    disks: dict[int, tuple[Path, int]] = {}
+    for path, size_bytes in wanted:
+        place = next(parent for parent in (path, *path.parents) if parent.is_dir())
+        disk = place.stat().st_dev
+        disks[disk] = (place, disks.get(disk, (place, 0))[1] + size_bytes)
+    for place, size_bytes in disks.values():
+        free = shutil.disk_usage(place).free
+        if free < size_bytes:
+            raise Refused(
+                f"{place} has {free / 1e6:.0f} MB of free space, {size_bytes / 1e6:.0f} MB are needed for the program "
+                "and a copy of the records: free space, or mount another disk at /var/backups"
+            )
+
+
+def check_quiet(layout: Layout, release: Path) -> None:
+    """See that no lot is under way.
+
+    Args:
+        layout: with the records.
+        release: the one in use, which reads them.
+
+    Raises:
+        Refused: a lot has begun and not ended, or a fruit was inspected within the last minutes.
+    """
+    if not (layout.home / "records" / "records.sqlite3").exists():
+        return
+    try:
+        lots = station(layout, release, "records", "lot", "list").splitlines()
+        since = (datetime.now(UTC) - QUIET).isoformat(timespec="seconds")
+        lately = station(layout, release, "records", "list", "--last", "1", "--from", since).splitlines()
+    except Failed as error:
+        raise Refused(
+            f"the records cannot be asked whether a lot is under way; --during-lot goes on without: {error}"
+        ) from error
+    if running := [line.split(":")[0] for line in lots if line.endswith(", runs")]:
+        raise Refused(
+            f"the lot {running[0]} is under way: end it first (station records lot end {running[0]}), "
+            "or upgrade all the same with --during-lot"
+        )
+    if len(lately) > 1:  # below the table's head
+        raise Refused(
+            f"fruit was inspected within the last {QUIET.total_seconds() / 60:.0f} minutes: stop the line and wait, "
+            "or upgrade all the same with --during-lot"
+        )
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.rglob("*") if path.is_file() and "aside" not in path.parts)

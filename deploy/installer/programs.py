@@ -1,0 +1,89 @@
+"""Other programs, run for the installer."""
+
+import os
+import pwd
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+from installer.layout import NAME, Layout
+from installer.words import Failed
+
+LONG_S = 4 * 3600.0
+_LINES = 12
+
+
+def run(
+    *command: str | Path,
+    environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
+    limit_s: float = 300.0,
+) -> str:
+    """Run a program to its end.
+
+    Args:
+        command: the program and its arguments.
+        environment: its environment; the installer's own by default.
+        folder: where it runs.
+        limit_s: after which it is ended.
+
+    Returns:
+        Its output.
+
+    Raises:
+        Failed: it could not be started, did not end in time, or its exit code was not 0; with its last words.
+    """
+    words = [str(part) for part in command]
+    try:
+        done = subprocess.run(  # noqa: S603 (the installer's own words, never a shell's)
+            words, env=environment, cwd=folder, capture_output=True, text=True, timeout=limit_s, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise Failed(f"{words[0]} did not end within {limit_s:g} s: {' '.join(words)}") from error
+    except OSError as error:
+        raise Failed(f"{words[0]} cannot be run: {error.strerror}") from error
+    if done.returncode:
+        last = "\n".join((done.stderr.strip() or done.stdout.strip()).splitlines()[-_LINES:])
+        raise Failed(f"{' '.join(words)} ended with exit code {done.returncode}:\n{last}")
+    return done.stdout
+
+
+def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: float = 120.0) -> str:
+    """Run a command of an installed station, as its own user where that is possible.
+
+    Args:
+        layout: whose configuration and state it takes.
+        release: which program.
+        arguments: as after `station`.
+        limit_s: as for `run`.
+
+    Raises:
+        Failed: as for `run`.
+    """
+    command = (release / "venv" / "bin" / "station", *arguments)
+    if layout.is_system and os.geteuid() == 0 and known_user():
+        command = ("runuser", "-u", NAME, "--", *command)
+    return run(*command, environment=layout.environment(), folder=layout.program, limit_s=limit_s)
+
+
+def known_user() -> bool:
+    """Whether this system has the station's user."""
+    try:
+        pwd.getpwnam(NAME)
+    except KeyError:
+        return False
+    return True
+
+
+def own(layout: Layout, path: Path, user: str, group: str) -> None:
+    """Give a path to a user and a group; nothing is done in a scratch root, by another user than root, or without them.
+
+    Args:
+        layout: whose path it is.
+        path: a file or folder.
+        user: a name.
+        group: likewise.
+    """
+    if layout.is_system and os.geteuid() == 0 and known_user():
+        shutil.chown(path, user, group)

@@ -1,0 +1,70 @@
+"""Back to the release before the last upgrade, with what that release can read."""
+
+import shutil
+
+from installer import copies, site_files
+from installer.health import LIMIT_S, wait_until_well
+from installer.layout import Layout, point, read_note, target
+from installer.programs import own, station
+from installer.release import STAMP, complete
+from installer.services import Services
+from installer.words import Refused, say
+
+
+def check(layout: Layout) -> None:
+    """See that there is something to go back to.
+
+    Args:
+        layout: where.
+
+    Raises:
+        Refused: there is not.
+    """
+    old, note = target(layout.previous), read_note(layout.upgrade)
+    if old is None or not complete(old) or not note:
+        raise Refused("there is no upgrade to take back: only the last one can be, and only once")
+
+
+def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> None:
+    """Take the last upgrade back. Ended in between, it is done again by another call.
+
+    The configuration is put back where the upgrade had changed it; the records only where the old release cannot read
+    them, and what was inspected since is then in their folder `aside`.
+
+    Args:
+        layout: where.
+        services: of the system there.
+        limit_s: how long the station may take to be well.
+
+    Raises:
+        Refused: there is no upgrade to take back.
+        Failed: a step did not come to its end.
+    """
+    check(layout)
+    old, note = target(layout.previous), read_note(layout.upgrade)
+    assert old is not None  # noqa: S101 (checked)
+    say(f"back to {old.name}")
+    services.stop()
+    copy = layout.backups / str(note["copy"])
+    if note["changes"]:
+        saved = copy / copies.SETTINGS / layout.configuration.name
+        shutil.copyfile(
+            layout.configuration, layout.configuration.with_name(f"{layout.configuration.name}.rolled-back")
+        )
+        shutil.copyfile(saved, layout.configuration)
+        own(layout, layout.configuration, "root", "fruit-station")
+        say(f"{layout.configuration} is as before the upgrade")
+    if (copy / copies.RECORDS).is_dir() and copies.form(layout.home / copies.RECORDS) != copies.form(
+        copy / copies.RECORDS
+    ):
+        station(layout, old, "records", "restore", copy / copies.RECORDS, limit_s=4 * 3600.0)
+        say(f"the records are as before the upgrade; what came since is in {layout.home / copies.RECORDS / 'aside'}")
+    site_files.put(layout, old)
+    point(layout.current, old)
+    services.reload()
+    services.enable()
+    if services.start():
+        wait_until_well(layout, old, str(read_note(old / STAMP)["version"]), was_ready=False, limit_s=limit_s)
+    layout.upgrade.unlink()
+    layout.previous.unlink()
+    say(f"{old.name} is in use again")

@@ -1,0 +1,163 @@
+"""The system's services: systemd, or the files that tell it what to do in a scratch root."""
+
+# ruff: noqa: D102 (the protocol tells what each method does)
+
+import os
+import shutil
+from pathlib import Path
+from typing import Protocol
+
+from installer.layout import NAME, TIMER, UNIT, Layout
+from installer.programs import run
+from installer.words import Failed, say
+
+START_LIMIT_S = 200.0
+STOP_LIMIT_S = 200.0
+
+
+class Services(Protocol):
+    """What an installation asks of the system."""
+
+    def make_user(self) -> None:
+        """Make the station's user, unless there is one."""
+        ...
+
+    def remove_user(self) -> None:
+        """Remove it, if it is there."""
+        ...
+
+    def enable(self) -> None:
+        """Have the station and its backups started at each boot."""
+        ...
+
+    def disable(self) -> None:
+        """Take that back; they are stopped already."""
+        ...
+
+    def reload(self) -> None:
+        """Take in units and device rules that were changed."""
+        ...
+
+    def running(self) -> bool:
+        """Whether the station runs, or is about to."""
+        ...
+
+    def stop(self) -> None:
+        """End the station in order. Idempotent."""
+        ...
+
+    def start(self) -> bool:
+        """Start it; returns whether it can be: False in a scratch root.
+
+        Raises:
+            Failed: it did not become ready.
+        """
+        ...
+
+
+class Systemd:
+    """The running system's.
+
+    Args:
+        layout: of `/`.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        # In a container or a chroot systemd is not there to be asked; its files are still put in place.
+        self._booted = Path("/run/systemd/system").is_dir()
+
+    def make_user(self) -> None:
+        run("systemd-sysusers", f"{NAME}.conf")
+
+    def remove_user(self) -> None:
+        _remove_user(self._layout)
+
+    def enable(self) -> None:
+        run("systemctl", "enable", UNIT, TIMER)
+        if self._booted:
+            run("systemctl", "start", TIMER)
+
+    def disable(self) -> None:
+        if self._booted:
+            run("systemctl", "stop", TIMER)
+        run("systemctl", "disable", UNIT, TIMER)
+
+    def reload(self) -> None:
+        if not self._booted:
+            return
+        run("systemctl", "daemon-reload")
+        if Path("/run/udev/control").exists():
+            run("udevadm", "control", "--reload")
+            run("udevadm", "trigger", "--subsystem-match=video4linux", "--subsystem-match=tty")
+
+    def running(self) -> bool:
+        if not self._booted:
+            return False
+        try:
+            run("systemctl", "is-active", "--quiet", UNIT)
+        except Failed:
+            return False
+        return True
+
+    def stop(self) -> None:
+        if self._booted:
+            run("systemctl", "stop", UNIT, limit_s=STOP_LIMIT_S)
+
+    def start(self) -> bool:
+        if not self._booted:
+            say("systemd does not run here: the station starts when it does")
+            return False
+        run("systemctl", "reset-failed", UNIT)
+        run("systemctl", "start", UNIT, limit_s=START_LIMIT_S)
+        return True
+
+
+class ScratchRoot:
+    """A folder that stands for a system which does not run: links and users are made in it, nothing is started.
+
+    Args:
+        layout: of the folder.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self._users = layout.place("/etc/passwd")
+
+    def make_user(self) -> None:
+        if self._users.exists() and os.geteuid() == 0:
+            run("systemd-sysusers", f"--root={self._layout.root}", f"{NAME}.conf")
+
+    def remove_user(self) -> None:
+        _remove_user(self._layout, "--prefix", str(self._layout.root))
+
+    def enable(self) -> None:
+        self._systemctl("enable")
+
+    def disable(self) -> None:
+        self._systemctl("disable")
+
+    def reload(self) -> None:
+        return
+
+    def running(self) -> bool:
+        return False
+
+    def stop(self) -> None:
+        return
+
+    def start(self) -> bool:
+        say(f"nothing is started in {self._layout.root}")
+        return False
+
+    def _systemctl(self, verb: str) -> None:
+        if shutil.which("systemctl"):
+            run("systemctl", f"--root={self._layout.root}", verb, UNIT, TIMER)
+
+
+def _remove_user(layout: Layout, *options: str) -> None:
+    """Remove the user and the group of that name; the group goes with the user only where login.defs says so."""
+    for file, program in (("/etc/passwd", "userdel"), ("/etc/group", "groupdel")):
+        listed = layout.place(file)
+        if listed.exists() and any(line.startswith(f"{NAME}:") for line in listed.read_text("utf-8").splitlines()):
+            run(program, *options, NAME)

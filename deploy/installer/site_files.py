@@ -1,0 +1,142 @@
+"""What lies outside the releases and is the installer's: units, rules, users, folders, the command."""
+
+import hashlib
+import shutil
+from pathlib import Path
+
+from installer.layout import NAME, Layout, read_note, write_note
+from installer.programs import own
+from installer.words import say
+
+PLACES = {
+    "systemd": "/etc/systemd/system",
+    "sysusers.d": "/etc/sysusers.d",
+    "tmpfiles.d": "/etc/tmpfiles.d",
+    "udev": "/etc/udev/rules.d",
+    "command": "/usr/local/bin",
+    "settings": f"/etc/{NAME}",
+}
+"""Folders of a release's `deploy`, and where their files go."""
+FROM_DEPLOY = {
+    "station.schema.json": f"/etc/{NAME}/station.schema.json",
+    "station.yaml": f"/etc/{NAME}/station.example.yaml",
+}
+SAVED = ".saved"
+
+
+def wanted(release: Path) -> dict[str, Path]:
+    """The files of a release by the paths that the system knows them under.
+
+    Args:
+        release: its folder.
+    """
+    deploy = release / "deploy"
+    found = {
+        f"{place}/{file.name}": file
+        for folder, place in PLACES.items()
+        for file in sorted((deploy / folder).glob("*"))
+        if file.is_file()
+    }
+    return found | {path: deploy / name for name, path in FROM_DEPLOY.items()}
+
+
+def put(layout: Layout, release: Path) -> None:
+    """Put a release's files where they belong, and take away those of another release. Doing so again changes nothing.
+
+    A file that a person has changed since is kept beside, as `NAME.saved`; drop-ins are for that.
+
+    Args:
+        layout: where.
+        release: whose.
+    """
+    known = dict(read_note(layout.manifest).get("files", {}))
+    files = wanted(release)
+    for path in known.keys() - files.keys():
+        _take_away(layout, path, known.pop(path))
+    for path, source in files.items():
+        file, content = layout.place(path), source.read_bytes()
+        _keep_changed(file, known.get(path), content)
+        make_folder(layout, file.parent)
+        # Noted first: what is put and not noted would outlive an undoing.
+        known[path] = hashlib.sha256(content).hexdigest()
+        write_note(layout.manifest, {**read_note(layout.manifest), "files": known})
+        new = file.with_name(f".{file.name}.new")
+        shutil.copyfile(source, new)
+        new.chmod(0o755 if source.stat().st_mode & 0o100 else 0o644)
+        new.replace(file)
+
+
+def make_folders(layout: Layout) -> None:
+    """Make the folders of configuration, state and copies, and the configuration's file where there is none.
+
+    Args:
+        layout: where.
+    """
+    for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
+        make_folder(layout, path)
+        path.chmod(0o750)
+        own(layout, path, user, NAME)
+    if not layout.configuration.exists():
+        shutil.copyfile(layout.settings / "station.example.yaml", layout.configuration)
+        say(f"{layout.configuration}: the site's own from now on; all of it is commented out")
+    layout.configuration.chmod(0o640)
+    own(layout, layout.configuration, "root", NAME)
+
+
+def make_folder(layout: Layout, folder: Path) -> None:
+    """Make a folder with those around it, and note which were not there.
+
+    Args:
+        layout: with the note.
+        folder: below its root.
+    """
+    missing = [path for path in (folder, *folder.parents) if path.is_relative_to(layout.root) and not path.exists()]
+    if not missing:
+        return
+    layout.program.mkdir(parents=True, exist_ok=True)
+    note = read_note(layout.manifest)
+    known = note.get("folders", [])
+    known += [name for path in missing if (name := f"/{path.relative_to(layout.root)}") not in known]
+    write_note(layout.manifest, {**note, "folders": known})
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def take_away(layout: Layout) -> None:
+    """Take away every file that was put.
+
+    Args:
+        layout: where.
+    """
+    note = read_note(layout.manifest)
+    for path, digest in note.get("files", {}).items():
+        _take_away(layout, path, digest)
+
+
+def take_away_folders(layout: Layout, folders: list[str]) -> None:
+    """Take away folders that were made and hold nothing.
+
+    Args:
+        layout: where.
+        folders: as the manifest had them.
+    """
+    for path in sorted(set(folders), key=len, reverse=True):
+        folder = layout.place(path)
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _keep_changed(file: Path, digest: str | None, content: bytes) -> None:
+    """Put aside what a person has changed; also what was there before the first installation."""
+    if not file.is_file():
+        return
+    there = file.read_bytes()
+    if there != content and hashlib.sha256(there).hexdigest() != digest:
+        saved = file.with_name(file.name + SAVED)
+        file.replace(saved)
+        say(f"{file} was changed by hand: kept as {saved}; put your changes into a drop-in (systemctl edit)")
+
+
+def _take_away(layout: Layout, path: str, digest: str) -> None:
+    file = layout.place(path)
+    _keep_changed(file, digest, b"")
+    file.unlink(missing_ok=True)

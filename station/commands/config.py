@@ -1,0 +1,120 @@
+"""`station config`: look at the configuration, check it, and bring an earlier program's up to date."""
+
+import ipaddress
+import os
+from pathlib import Path
+
+import click
+
+from station.settings.conduits import Zone
+from station.settings.configuration import load_configuration
+from station.settings.firewall import rules
+from station.settings.migration import migrated
+from station.settings.problems import Problem, SettingsError
+from station.settings.yaml_loader import LARGEST_FILE_BYTES
+
+_config = click.option(
+    "--config",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The configuration. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
+)
+
+
+def _networks(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
+    try:
+        return tuple(str(ipaddress.ip_network(each.strip())) for text in given for each in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{error}; write 10.10.30.5 or 10.10.30.0/24") from error
+
+
+def _zones(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[Zone, tuple[str, ...]]:
+    known = {zone.value: zone for zone in Zone if zone is not Zone.STATION}
+    found: dict[Zone, tuple[str, ...]] = {}
+    for text in given:
+        name, _, networks = text.partition("=")
+        if name not in known:
+            raise click.BadParameter(f"{name!r} is no zone: {', '.join(known)}")
+        found[known[name]] = _networks(context, option, (networks,))
+    return found
+
+
+@click.group()
+def config() -> None:
+    """Look at the configuration, check it, and bring an earlier program's up to date."""
+
+
+@config.command()
+@_config
+def check(config: Path | None) -> None:
+    """Check the configuration with its environment variables, and say all that is wrong."""
+    site = load_configuration(config)
+    click.echo(f"OK: home {site.home}, camera {site.camera.driver}, arm {site.arm.host}, gripper {site.gripper.driver}")
+
+
+@config.command()
+@_config
+def show(config: Path | None) -> None:
+    """Show what is in force, as JSON: defaults, overridden by the file, overridden by the environment."""
+    click.echo(load_configuration(config).model_dump_json(indent=2))
+
+
+@config.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--write", is_flag=True, help="Change FILE; without it, only what would be changed is said.")
+def migrate(file: Path, *, write: bool) -> None:
+    """Bring FILE, a station.yaml of an earlier program, into this program's words. Doing so again changes nothing.
+
+    Comments stay. The file is replaced whole or not at all, and keeps its owner and rights.
+    """
+    changed = migrated(_text(file), str(file))
+    for change in changed.changes:
+        click.echo(f"{file}: {change}")
+    if not changed.changes:
+        click.echo(f"{file}: nothing to change")
+    elif write:
+        _replace(file, changed.text)
+
+
+@config.command()
+@_config
+@click.option(
+    "--zone", "zones", metavar="NAME=ADDRESS,…", multiple=True, callback=_zones,
+    help="Addresses or networks of a zone: cell, line, operators, monitoring, archive. May be repeated.",
+)  # fmt: skip
+@click.option(
+    "--maintenance", metavar="ADDRESS", multiple=True, callback=_networks, help="From where SSH, time and names come."
+)
+def firewall(config: Path | None, zones: dict[Zone, tuple[str, ...]], maintenance: tuple[str, ...]) -> None:
+    """Write rules of nftables that open what this configuration uses, for the zones named, and nothing else."""
+    click.echo(rules(load_configuration(config), zones, maintenance), nl=False)
+
+
+def _text(file: Path) -> str:
+    """A file's text, at most as long as the station reads."""
+    try:
+        with file.open("rb") as source:
+            content = source.read(LARGEST_FILE_BYTES + 1)
+        if len(content) > LARGEST_FILE_BYTES:
+            raise SettingsError([Problem(str(file), "file", f"expected at most {LARGEST_FILE_BYTES} bytes")])
+        return content.decode("utf-8-sig")
+    except OSError as error:
+        raise SettingsError([Problem(str(file), "file", f"cannot be read: {error.strerror}")]) from error
+    except UnicodeDecodeError as error:
+        raise SettingsError([Problem(str(file), "file", "expected UTF-8")]) from error
+
+
+def _replace(file: Path, text: str) -> None:
+    unfinished = file.with_name(f".{file.name}.new")
+    try:
+        was = file.stat()
+        with unfinished.open("w", encoding="utf-8") as target:
+            os.fchmod(target.fileno(), was.st_mode & 0o7777)
+            if os.geteuid() == 0:
+                os.fchown(target.fileno(), was.st_uid, was.st_gid)
+            target.write(text)
+            target.flush()
+            os.fsync(target.fileno())
+        unfinished.replace(file)
+    except OSError as error:
+        raise SettingsError([Problem(str(file), "file", f"cannot be written: {error.strerror}")]) from error

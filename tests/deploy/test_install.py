@@ -1,0 +1,159 @@
+"""The installer in a scratch root: run twice, interrupted, undone; what it refuses."""
+
+import fcntl
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.timeout(400)  # on a busy machine pip takes its time
+
+
+def test_interrupted_then_installed_twice_then_undone_leaves_nothing(system, root, install, environment, tree_of):
+    before = tree_of(system)
+    command = [root / "deploy/install", "--root", system, "--environment", environment]
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as half:
+        deadline_s = time.monotonic() + 60
+        while not list(system.glob("opt/fruit-station/releases/*/venv/bin/python")):
+            assert half.poll() is None, "it ended before it could be interrupted"
+            assert time.monotonic() < deadline_s
+            time.sleep(0.01)
+        os.killpg(half.pid, signal.SIGKILL)
+    assert not list(system.glob("opt/fruit-station/releases/*/release.json"))
+    assert not (system / "opt/fruit-station/current").exists()
+
+    first = install("--root", system, "--environment", environment)
+    assert first.returncode == 0, first.stdout + first.stderr
+    installed = tree_of(system)
+    program = system / "opt/fruit-station/current/venv/bin/station"
+    checked = subprocess.run([program, "config", "check"], capture_output=True, text=True, check=False)
+    assert checked.stdout.startswith("OK"), checked.stderr
+    assert (system / "etc/systemd/system/fruit-station.service").is_file()
+    assert (system / "etc/systemd/system/multi-user.target.wants/fruit-station.service").is_symlink()
+    assert (system / "etc/systemd/system/timers.target.wants/fruit-station-backup.timer").is_symlink()
+    if os.geteuid() == 0:
+        assert "fruit-station:" in (system / "etc/passwd").read_text()
+        assert "dialout:x:20:fruit-station" in (system / "etc/group").read_text()
+
+    again = install("--root", system, "--environment", environment)
+    assert again.returncode == 0, again.stdout
+    assert tree_of(system) == installed
+    assert "made " not in again.stdout, "the release was made again"
+
+    (system / "var/lib/fruit-station/active_recipe.json").write_text("{}")
+    unit = system / "etc/systemd/system/fruit-station.service"
+    unit.write_text(unit.read_text() + "# mine\n")
+    for _ in range(2):
+        kept = install("--root", system, "--undo")
+        assert kept.returncode == 0, kept.stdout
+    assert (system / "var/lib/fruit-station/active_recipe.json").exists()
+    assert (system / "etc/fruit-station/station.yaml").exists()
+    assert not (system / "opt").exists()
+    saved = unit.with_name("fruit-station.service.saved")
+    assert saved.read_text().endswith("# mine\n")
+    saved.unlink()
+
+    assert install("--root", system, "--undo", "--purge").returncode == 0
+    left = {name for name in tree_of(system).keys() - before.keys() if not (system / name).is_dir()}
+    assert not left
+    assert {name: content for name, content in tree_of(system).items() if name in before} == before
+
+
+def test_a_dry_run_says_the_steps_and_does_none(system, install, tree_of):
+    before = tree_of(system)
+    for arguments in ((), ("--undo", "--purge")):
+        said = install("--root", system, "--dry-run", *arguments)
+        assert said.returncode == 0, said.stdout
+        assert "would " in said.stdout
+    assert tree_of(system) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--rollback"], "there is no upgrade to take back"),
+        (["--purge"], "--purge goes with --undo"),
+        (["--root", "/nowhere/at/all"], "is no folder"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_words(tmp_path, install, arguments, words):
+    refused = install("--root", tmp_path, *arguments)
+    assert refused.returncode == 2
+    assert words in refused.stdout
+    assert "Traceback" not in refused.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, monkeypatch):
+    refused = installer("words").Refused
+    checks, layout = installer("precautions"), installer("layout").Layout
+    with monkeypatch.context() as patch:
+        patch.setattr(checks.os, "geteuid", lambda: 1000)
+        with pytest.raises(refused, match="sudo deploy/install"):
+            checks.check_machine(layout(Path("/")))
+    with monkeypatch.context() as patch:
+        patch.setattr(checks.importlib.util, "find_spec", lambda _name: None)
+        with pytest.raises(refused, match="apt-get install python3-venv"):
+            checks.check_machine(layout(tmp_path))
+    with monkeypatch.context() as patch:
+        patch.setattr(checks.os, "geteuid", lambda: 0)
+        patch.setattr(checks.shutil, "which", lambda _name: None)
+        with pytest.raises(refused, match="apt-get install passwd systemd util-linux"):
+            checks.check_machine(layout(Path("/")))
+    with monkeypatch.context() as patch:
+        patch.setattr(checks.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**9, 9 * 10**8, 10**8))
+        with pytest.raises(refused, match="has 100 MB of free space, 1500 MB are needed"):
+            checks.check_room(layout(tmp_path))
+
+
+def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monkeypatch):
+    checks, layout = installer("precautions"), installer("layout").Layout(tmp_path)
+    checks.check_quiet(layout, tmp_path)  # nothing was ever recorded
+    (layout.home / "records").mkdir(parents=True)
+    (layout.home / "records/records.sqlite3").touch()
+    rows = ["number  begun (UTC)"]
+    monkeypatch.setattr(checks, "station", lambda *words: "\n".join(rows) if "--from" in words else "A-16: M, ended")
+    checks.check_quiet(layout, tmp_path)
+    rows.append("4711    2026-06-30")
+    with pytest.raises(installer("words").Refused, match="inspected within the last 10 minutes: stop the line"):
+        checks.check_quiet(layout, tmp_path)
+
+
+def test_no_python_is_said_by_the_shell(tmp_path, root):
+    done = subprocess.run(
+        [root / "deploy/install", "--help"], env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    for tool in ("dirname", "readlink", "sh"):
+        (tmp_path / tool).symlink_to(shutil.which(tool) or "")
+    done = subprocess.run(
+        [root / "deploy/install", "--help"], env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "apt-get install python3 python3-venv" in done.stderr
+
+
+def test_a_part_of_the_project_is_no_source(tmp_path, root, install):
+    shutil.copytree(root / "deploy", tmp_path / "deploy")
+    (tmp_path / "root").mkdir()
+    refused = install("--root", tmp_path / "root", program=tmp_path)
+    assert refused.returncode == 2
+    assert "has no pyproject.toml" in refused.stdout
+
+
+def test_two_installers_do_not_work_at_once(tmp_path, install):
+    (tmp_path / "opt/fruit-station").mkdir(parents=True)
+    folder = os.open(tmp_path / "opt/fruit-station", os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        refused = install("--root", tmp_path, "--undo")
+    finally:
+        os.close(folder)
+    assert refused.returncode == 2
+    assert "another installer is at work" in refused.stdout

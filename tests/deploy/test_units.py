@@ -1,0 +1,186 @@
+"""Units, users, folders and device rules, as systemd and udev read them."""
+
+import configparser
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from station.supervision.programs import station_programs
+
+MOST_EXPOSED = 2.5
+UNITS = ("fruit-station.service", "fruit-station-backup.service", "fruit-station-backup.timer")
+TERM = re.compile(r'(?P<key>[A-Z]+(?P<sub>\{[A-Za-z_/]+\})?)(?P<operator>==|!=|\+=|=)"(?P<value>[^"]*)"')
+MATCHES = {"SUBSYSTEM", "SUBSYSTEMS", "ACTION", "DRIVER", "KERNEL", "ATTR", "ATTRS", "ENV", "TEST"}
+ASSIGNS = {"SYMLINK", "GROUP", "MODE", "ATTR", "ENV", "TAG", "OWNER"}
+
+
+@pytest.fixture
+def tool():
+    """A program of systemd, or no test."""
+
+    def find(name: str) -> str:
+        path = shutil.which(name)
+        if path is None:
+            pytest.skip(f"{name} is missing on this machine")
+        return path
+
+    return find
+
+
+@pytest.fixture
+def booted(tmp_path, root) -> Path:
+    """A root in which the units are, and what they start."""
+    units = tmp_path / "etc/systemd/system"
+    units.mkdir(parents=True)
+    for name in UNITS:
+        shutil.copy(root / "deploy/systemd" / name, units)
+    programs = tmp_path / "opt/fruit-station/current/venv/bin"
+    programs.mkdir(parents=True)
+    for name in ("station", "python"):
+        (programs / name).write_text("#!/bin/sh\n")
+        (programs / name).chmod(0o755)
+    for target in Path("/usr/lib/systemd/system").glob("*.target"):
+        (units / target.name).symlink_to(target)
+    return tmp_path
+
+
+def unit(root: Path, name: str) -> dict[str, dict[str, list[str]]]:
+    """A unit's settings, each with all its values."""
+    found: dict[str, dict[str, list[str]]] = {}
+    section = ""
+    for line in (root / "deploy/systemd" / name).read_text().splitlines():
+        if line.startswith("["):
+            section = line.strip("[]")
+        elif line and not line.startswith("#"):
+            key, _, value = line.partition("=")
+            found.setdefault(section, {}).setdefault(key, []).append(value)
+    return found
+
+
+def seconds(text: str) -> float:
+    return sum(
+        float(number) * {"": 1, "s": 1, "min": 60, "h": 3600}[what]
+        for number, what in re.findall(r"(\d+)\s*(\w*)", text)
+    )
+
+
+def test_systemd_finds_nothing_wrong_with_the_units(booted, tool):
+    units = [booted / "etc/systemd/system" / name for name in UNITS]
+    paths = [f"/{path.relative_to(booted)}" for path in units]
+    command = [tool("systemd-analyze"), "verify", f"--root={booted}", "--man=no", "--recursive-errors=no", *paths]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", [name for name in UNITS if name.endswith(".service")])
+def test_what_a_unit_may_is_little(root, tool, name):
+    options = ("security", "--offline=true", "--no-pager", f"--threshold={10 * MOST_EXPOSED:g}")
+    command = [tool("systemd-analyze"), *options, root / "deploy/systemd" / name]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    found = re.search(r"Overall exposure level for \S+: ([0-9.]+)", done.stdout)
+    assert found, done.stdout + done.stderr
+    assert float(found[1]) <= MOST_EXPOSED
+    assert done.returncode == 0
+
+
+def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
+    service = unit(root, "fruit-station.service")["Service"]
+    programs = station_programs(None, outbox=True)
+    slowest_start_s = max(each.start_limit_s for each in programs)
+    assert service["Type"] == ["notify"]
+    assert seconds(service["WatchdogSec"][0]) > max(each.watchdog_s for each in programs) + 2 * slowest_start_s
+    assert seconds(service["TimeoutStartSec"][0]) > sum(each.start_limit_s for each in programs)
+    assert seconds(service["TimeoutStopSec"][0]) > sum(each.stop_limit_s for each in programs)
+
+
+def test_the_station_keeps_what_it_needs(root):
+    service = unit(root, "fruit-station.service")["Service"]
+    assert {"char-video4linux rw", "char-ttyUSB rw", "char-ttyACM rw"} == set(service["DeviceAllow"])
+    assert set(service["SupplementaryGroups"][0].split()) == {"dialout", "video"}
+    assert service["LimitRTPRIO"] == ["1"]
+    assert service["RestrictRealtime"] == ["no"]
+    assert "sched_setscheduler" in service["SystemCallFilter"][-1]
+    assert {"AF_UNIX", "AF_INET", "AF_INET6", "AF_CAN"} <= set(service["RestrictAddressFamilies"][0].split())
+    assert service["User"] == ["fruit-station"]
+
+
+def test_the_backup_finds_what_the_station_has(root):
+    backup, service = (unit(root, name)["Service"] for name in UNITS[1::-1])
+    for what in ("User", "Environment", "StateDirectory"):
+        assert set(backup[what]) <= set(service[what])
+    assert (root / "deploy/backup").stat().st_mode & 0o100
+    timer = configparser.ConfigParser(interpolation=None)
+    timer.read(root / "deploy/systemd" / UNITS[2])
+    assert timer["Timer"]["Persistent"] == "yes"
+
+
+def test_the_calendar_is_one(root, tool):
+    when = unit(root, UNITS[2])["Timer"]["OnCalendar"][0]
+    subprocess.run([tool("systemd-analyze"), "calendar", when], check=True, capture_output=True)
+
+
+def test_users_and_folders_are_made(tmp_path, root, tool):
+    if os.geteuid() != 0:
+        pytest.skip("only root makes users")
+    for kind in ("sysusers.d", "tmpfiles.d"):
+        shutil.copytree(root / "deploy" / kind, tmp_path / "etc" / kind)
+    for name, content in {"passwd": "", "group": "dialout:x:20:\nvideo:x:44:\n", "shadow": "", "gshadow": ""}.items():
+        (tmp_path / "etc" / name).write_text(content)
+    for _ in range(2):
+        for program in ("systemd-sysusers", "systemd-tmpfiles"):
+            options = ["--create"] if program == "systemd-tmpfiles" else []
+            done = subprocess.run(
+                [tool(program), f"--root={tmp_path}", *options, "fruit-station.conf"],
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, done.stderr
+    uid = int(
+        next(line for line in (tmp_path / "etc/passwd").read_text().splitlines() if "fruit" in line).split(":")[2]
+    )
+    folders = {
+        name: (tmp_path / name).stat()
+        for name in ("etc/fruit-station", "var/lib/fruit-station", "var/backups/fruit-station")
+    }
+    assert {name: oct(found.st_mode & 0o777) for name, found in folders.items()} == dict.fromkeys(folders, "0o750")
+    assert [found.st_uid for found in folders.values()] == [0, uid, uid]
+
+
+def rule_lines(root: Path) -> list[str]:
+    text = (root / "deploy/udev/70-fruit-station.rules").read_text()
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
+def test_udev_reads_every_rule(root):
+    lines = rule_lines(root)
+    assert len(lines) == 4
+    for line in lines:
+        terms = [TERM.fullmatch(term) for term in re.split(r",\s*", line)]
+        assert all(terms), f"no rule: {line}"
+        for term in terms:
+            assert term
+            key = term["key"].partition("{")[0]
+            assert key in (MATCHES if term["operator"] in {"==", "!="} else ASSIGNS), term[0]
+            assert term["operator"] != "==" or term["value"], term[0]
+    verifier = shutil.which("udevadm")
+    if (
+        verifier
+        and "verify" in subprocess.run([verifier, "--help"], capture_output=True, text=True, check=False).stdout
+    ):
+        subprocess.run([verifier, "verify", root / "deploy/udev/70-fruit-station.rules"], check=True)
+
+
+def test_devices_have_names_by_their_serial_numbers(root):
+    sensor, awake, adapter, latency = rule_lines(root)
+    assert 'ATTRS{idVendor}=="2833", ATTRS{idProduct}=="0209"' in sensor
+    assert 'SYMLINK+="digit/$env{ID_SERIAL_SHORT}"' in sensor
+    assert 'ATTR{power/control}="on"' in awake
+    assert 'SYMLINK+="rs485/$env{ID_SERIAL_SHORT}"' in adapter
+    assert 'ATTR{latency_timer}="1"' in latency
+    groups = unit(root, UNITS[0])["Service"]["SupplementaryGroups"][0].split()
+    assert set(re.findall(r'GROUP="(\w+)"', "\n".join(rule_lines(root)))) == set(groups)
