@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
@@ -29,6 +30,9 @@ from station.vision.step import measure_step
 ROOT = Path(__file__).resolve().parents[2]
 MARKDOWN = MarkdownIt("commonmark").enable("table")
 HTML_LINK = re.compile(r"<(?:img|a)\s[^>]*?(?:src|href)=\"([^\"]+)\"")
+TOUCHED_MM = 0.3
+"""Closing at which the gripper, which moves in counts, sees the first contact."""
+MOST_STEPS = 9
 ASSIGNMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*$")
 
 
@@ -136,6 +140,8 @@ def _words(line: str, info: str) -> list[tuple[str, ...]]:
         if not line.startswith("$ "):
             return []
         line = line[2:]
+    if "─" in line:  # a drawing
+        return []
     try:
         lexer = shlex.shlex(line.replace("$(", " ; "), posix=True, punctuation_chars=True)
         lexer.wordchars += ",=[]{}:@%^+…"
@@ -174,7 +180,7 @@ def packhouse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The home folder of a station that has inspected strawberries of lot A-17; every fourth is bruised."""
     home = tmp_path_factory.mktemp("packhouse") / "home"
     home.mkdir()
-    asyncio.run(_inspect(home / "records", fruit=16))
+    asyncio.run(_inspect(home / "records", fruit=12))
     return home
 
 
@@ -193,7 +199,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
     try:
         for number in range(fruit):
             drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
-            closings_mm = [float(step) * recipe.steps.step_mm for step in range(6)]
+            closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
             shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3))
             press = _pressed(shown, recipe)
             verdict = judge(press, recipe)
@@ -235,11 +241,11 @@ def _pressed(shown: PressSequence, recipe) -> Press:
     """Measure its frames one after the other until the recipe stops the press."""
     method = make_method(shown.references, recipe.segmentation)
     press = Press(shown.widths_mm[0], 0.1, ())
-    for closing_mm, frame in zip(shown.closings_mm, shown.frames, strict=True):
+    for closing_mm, frame in zip(np.subtract(shown.closings_mm, TOUCHED_MM), shown.frames, strict=True):
         contact = measure_step(method, [frame], recipe.segmentation.robust.least_confidence)
         area_mm2 = contact.area_px * MM_PER_PX**2
         point = Measured(
-            closing_mm,
+            float(closing_mm),
             area_mm2,
             contact.area_px,
             usual_uncertainty_mm2(area_mm2),

@@ -45,6 +45,8 @@ def station_problem(command, words, *, whole):
                 for each in [value] if isinstance(value, str) else value or ():
                     if isinstance(each, str) and not PLACEHOLDER.match(each):
                         parameter.type.convert(each, parameter, context)
+    except click.BadOptionUsage as error:
+        return error.format_message() if whole else None
     except click.UsageError as error:
         return error.format_message()
     if isinstance(command, click.Group):
@@ -66,11 +68,11 @@ def problem(words, root, *, whole):
     """What is wrong with a command of the project; None for nothing."""
     words = [word for word in words if word not in {"...", "…"}]
     if words[0] == "./run":
-        if len(words) < 2 or words[1] not in run_commands(root):
+        if words[1:2] and words[1] not in run_commands(root):
             return f"./run has no {' '.join(words[1:2])}"
-        if words[1] == "bench" and len(words) > 2 and not PLACEHOLDER.match(words[2]):
+        if words[1:2] == ["bench"] and len(words) > 2 and not PLACEHOLDER.match(words[2]):
             return None if (root / "benchmarks" / f"bench_{words[2]}.py").exists() else f"no benchmark {words[2]}"
-        if words[1] not in {"station", "demo"} or words[2:3] == ["ARGS"]:
+        if words[1:2] not in (["station"], ["demo"]) or words[2:3] == ["ARGS"]:
             return None
         words = words[1:] if words[1] == "demo" else words[2:]
     else:
