@@ -1,0 +1,258 @@
+"""The documents as their readers have them: pages with links and commands, and a station's home to try commands on."""
+
+import asyncio
+import re
+import shlex
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+from station.inspection.judge import early_stop, judge
+from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
+from station.records.records import Records
+from station.settings.recipe import find_recipe
+from station.settings.records import RecordsSettings
+from station.twin.digit.press import PressOptions, PressSequence, render_press
+from station.twin.fruit import draw_fruit
+from station.twin.gel import MM_PER_PX
+from station.vision.methods import make_method
+from station.vision.step import measure_step
+
+ROOT = Path(__file__).resolve().parents[2]
+MARKDOWN = MarkdownIt("commonmark").enable("table")
+HTML_LINK = re.compile(r"<(?:img|a)\s[^>]*?(?:src|href)=\"([^\"]+)\"")
+TOUCHED_MM = 0.3
+"""Closing at which the gripper, which moves in counts, sees the first contact."""
+MOST_STEPS = 9
+ASSIGNMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*$")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that a document tells its reader to give."""
+
+    page: "Page"
+    line: int
+    words: tuple[str, ...]
+    whole: bool
+    """Whether it can be given as it stands; in a sentence its arguments may be left out."""
+
+    def __str__(self) -> str:
+        return f"{self.page.name}:{self.line}: {shlex.join(self.words)}"
+
+
+@dataclass
+class Said:
+    """One `$` line of a console block, with what has to come back."""
+
+    line: int
+    command: str
+    expected: list[str]
+    code: int
+
+
+@dataclass(frozen=True)
+class Page:
+    """A Markdown document."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.relative_to(ROOT).as_posix()
+
+    @cached_property
+    def tokens(self) -> list[Token]:
+        return MARKDOWN.parse(self.path.read_text(encoding="utf-8"))
+
+    def _inline(self) -> Iterator[tuple[int, Token]]:
+        for token in self.tokens:
+            for child in token.children or ():
+                yield (token.map or [0])[0] + 1, child
+
+    @cached_property
+    def links(self) -> list[tuple[int, str]]:
+        """Line and target of every link and image."""
+        found = [
+            (line, str(child.attrGet("href" if child.type == "link_open" else "src")))
+            for line, child in self._inline()
+            if child.type in {"link_open", "image"}
+        ]
+        raw = [(token.map[0] + 1, token.content) for token in self.tokens if token.type == "html_block" and token.map]
+        raw += [(line, child.content) for line, child in self._inline() if child.type == "html_inline"]
+        return found + [(line, target) for line, text in raw for target in HTML_LINK.findall(text)]
+
+    @cached_property
+    def anchors(self) -> set[str]:
+        """The fragments by which its headings are reached, as GitHub makes them."""
+        anchors: set[str] = set()
+        for heading, inline in zip(self.tokens, self.tokens[1:], strict=False):
+            if heading.type == "heading_open":
+                text = "".join(child.content for child in inline.children or ())
+                slug = re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
+                number = 0
+                while (anchor := f"{slug}-{number}" if number else slug) in anchors:
+                    number += 1
+                anchors.add(anchor)
+        return anchors
+
+    @cached_property
+    def commands(self) -> list[Command]:
+        """Every command of the project, in blocks and in sentences."""
+        found = []
+        for token in self.tokens:
+            if token.type == "fence" and token.info.split(" ")[0] in {"", "sh", "console"} and token.map:
+                text = re.sub(r"\\\n", "  ", token.content)
+                for number, line in enumerate(text.splitlines(), token.map[0] + 2):
+                    found += [Command(self, number, words, whole=True) for words in _words(line, token.info)]
+        for line, child in self._inline():
+            if child.type == "code_inline":
+                found += [Command(self, line, words, whole=False) for words in _words(child.content, "")]
+        return found
+
+    @cached_property
+    def said(self) -> list[Said]:
+        """What its console blocks say, in order."""
+        said: list[Said] = []
+        for token in self.tokens:
+            if token.type == "fence" and token.info.startswith("console") and token.map:
+                code = int(token.info.partition("exit=")[2] or 0)
+                for number, line in enumerate(token.content.splitlines(), token.map[0] + 2):
+                    if line.startswith("$ "):
+                        said.append(Said(number, line[2:], [], code))
+                    else:
+                        said[-1].expected.append(line)
+        return said
+
+
+def _words(line: str, info: str) -> list[tuple[str, ...]]:
+    """The project's commands on a line of shell; none where it is output, a table or a sentence."""
+    if info.startswith("console"):
+        if not line.startswith("$ "):
+            return []
+        line = line[2:]
+    if "─" in line:  # a drawing
+        return []
+    try:
+        lexer = shlex.shlex(line.replace("$(", " ; "), posix=True, punctuation_chars=True)
+        lexer.wordchars += ",=[]{}:@%^+…"
+        words = list(lexer)
+    except ValueError:
+        return []
+    parts: list[list[str]] = [[]]
+    for word in words:
+        if set(word) <= set("&|;()<>"):
+            parts.append([])
+        elif parts[-1] or not ASSIGNMENT.match(word):
+            parts[-1].append(word)
+    return [tuple(part) for part in parts if part and (part[0] == "./run" or (part[0] == "station" and len(part) > 1))]
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def pages() -> dict[str, Page]:
+    """Every document that a reader may meet, by its path in the repository."""
+    found = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    return {page.name: page for page in map(Page, found)}
+
+
+@pytest.fixture(scope="session")
+def page() -> Callable[[Path], Page]:
+    """Makes a page of a file anywhere."""
+    return lambda path: Page(ROOT / path)
+
+
+@pytest.fixture(scope="session")
+def packhouse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The home folder of a station that has inspected strawberries of lot A-17; every fourth is bruised."""
+    home = tmp_path_factory.mktemp("packhouse") / "home"
+    home.mkdir()
+    asyncio.run(_inspect(home / "records", fruit=12))
+    return home
+
+
+@pytest.fixture
+def home(packhouse: Path, tmp_path: Path) -> Path:
+    """A copy of it for one document."""
+    return shutil.copytree(packhouse, tmp_path / "home")
+
+
+async def _inspect(folder: Path, fruit: int) -> None:
+    """Press simulated fruit, measure and judge them by the shipped recipe, and store them as the service does."""
+    cv2.setNumThreads(1)
+    recipe = find_recipe("strawberry")
+    snapshot = RecipeSnapshot.of(recipe.model_dump(mode="json"), "1")
+    records = await Records.open(folder, RecordsSettings(deadline_s=30.0, free_reserve_mb=1), "boot")
+    try:
+        for number in range(fruit):
+            drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
+            closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
+            shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3))
+            press = _pressed(shown, recipe)
+            verdict = judge(press, recipe)
+            decided = verdict.areas[0]
+            began_ms = 1_782_828_000_000 + number * 9000
+            sequence = await records.begin(Trigger(number + 1, 0, "A-17", began_ms, snapshot, simulated=True))
+            steps = [Image("step", step, shown.frames[step]) for step in range(len(press.points))]
+            outcome = await records.conclude(
+                sequence,
+                InspectionRecord(
+                    outcome=verdict.outcome,
+                    reasons=() if verdict.outcome == "PASS" else tuple(map(str, verdict.reasons)),
+                    explanation=tuple(finding.sentence for finding in verdict.findings),
+                    late=False,
+                    partial=verdict.partial,
+                    area_mm2=decided.area_mm2,
+                    area_px=None if decided.area_mm2 is None else round(decided.area_mm2 / MM_PER_PX**2),
+                    closing_mm=decided.closing_mm,
+                    confidence=0.9,
+                    ended_utc_ms=began_ms + 6000,
+                    duration_ms=6000,
+                    curve=tuple(
+                        CurvePoint(step, shown.widths_mm[step], p.closing_mm, p.area_mm2, p.area_px, p.confidence)
+                        for step, p in enumerate(press.points)
+                    ),
+                    measures={"onset_mm": press.onset_mm, "onset_uncertainty_mm": press.onset_uncertainty_mm},
+                    images=(Image("reference", None, shown.references[0]), *steps),
+                ),
+            )
+            await records.published(outcome)
+            await records.acknowledged(sequence)
+        while records.status().images_waiting:
+            await asyncio.sleep(0.02)
+    finally:
+        await records.close()
+
+
+def _pressed(shown: PressSequence, recipe) -> Press:
+    """Measure its frames one after the other until the recipe stops the press."""
+    method = make_method(shown.references, recipe.segmentation)
+    press = Press(shown.widths_mm[0], 0.1, ())
+    for closing_mm, frame in zip(np.subtract(shown.closings_mm, TOUCHED_MM), shown.frames, strict=True):
+        contact = measure_step(method, [frame], recipe.segmentation.robust.least_confidence)
+        area_mm2 = contact.area_px * MM_PER_PX**2
+        point = Measured(
+            float(closing_mm),
+            area_mm2,
+            contact.area_px,
+            usual_uncertainty_mm2(area_mm2),
+            contact.confidence,
+            frozenset(Flag(flag.value) for flag in contact.flags),
+        )
+        press = replace(press, points=(*press.points, point))
+        if early_stop(press, recipe) is not None:
+            break
+    return press

@@ -1,0 +1,177 @@
+"""The commands that the documents name exist as they stand there, and those in console blocks answer what is written."""
+
+import contextlib
+import functools
+import io
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from markdown_it import MarkdownIt
+
+from station.cli import cli, main
+
+PLACEHOLDER = re.compile(r"[A-Z][A-Z0-9_]*$|.*…")
+BY_HAND = {"docs/plc/quick-start.md"}
+"""Documents whose console blocks another test runs, against a PLC interface."""
+DEADLINE_S = 120
+
+
+def documents_with_console():
+    root = Path(__file__).resolve().parents[2]
+    files = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    tokens = ((file, MarkdownIt().parse(file.read_text("utf-8"))) for file in files)
+    names = {f.relative_to(root).as_posix() for f, all_ in tokens for t in all_ if t.info.startswith("console")}
+    return sorted(names - BY_HAND)
+
+
+def station_problem(command, words, *, whole):
+    """What is wrong with a command line, without carrying it out; None for nothing."""
+    context = click.Context(command, info_name=command.name)
+    try:
+        values, rest, _ = command.make_parser(context).parse_args(list(words))
+        given = {name: value for name, value in values.items() if isinstance(value, str | list | tuple) and value}
+        for parameter in command.params:
+            value = given.get(str(parameter.name))
+            if value is None and parameter.required and whole and not values.get("help"):
+                return f"{parameter.human_readable_name} is missing"
+            if isinstance(parameter.type, click.Choice | click.types.IntParamType | click.types.FloatParamType):
+                for each in [value] if isinstance(value, str) else value or ():
+                    if isinstance(each, str) and not PLACEHOLDER.match(each):
+                        parameter.type.convert(each, parameter, context)
+    except click.BadOptionUsage as error:
+        return error.format_message() if whole else None
+    except click.UsageError as error:
+        return error.format_message()
+    if isinstance(command, click.Group):
+        if rest:
+            inner = command.get_command(context, rest[0])
+            return f"no command {rest[0]}" if inner is None else station_problem(inner, rest[1:], whole=whole)
+        if whole and not command.invoke_without_command and not values.get("help"):
+            return "a subcommand is missing"
+        return None
+    return f"too many words: {rest}" if rest else None
+
+
+@functools.cache
+def run_commands(root):
+    return frozenset(runpy.run_path(str(root / "run"))["COMMANDS"])
+
+
+def problem(words, root, *, whole):
+    """What is wrong with a command of the project; None for nothing."""
+    words = [word for word in words if word not in {"...", "…"}]
+    if words[0] == "./run":
+        if words[1:2] and words[1] not in run_commands(root):
+            return f"./run has no {' '.join(words[1:2])}"
+        if words[1:2] == ["bench"] and len(words) > 2 and not PLACEHOLDER.match(words[2]):
+            return None if (root / "benchmarks" / f"bench_{words[2]}.py").exists() else f"no benchmark {words[2]}"
+        if words[1:2] not in (["station"], ["demo"]) or words[2:3] == ["ARGS"]:
+            return None
+        words = words[1:] if words[1] == "demo" else words[2:]
+    else:
+        words = words[1:]
+    return station_problem(cli, words, whole=whole and bool(words))
+
+
+def test_every_command_that_a_document_names_exists_as_it_stands_there(pages, root):
+    commands = [command for page in pages.values() for command in page.commands]
+    wrong = [f"{each}: {why}" for each in commands if (why := problem(each.words, root, whole=each.whole))]
+    assert wrong == []
+    assert len(commands) > 250
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("station brew", "no command"),
+        ("station records shew 7", "no command"),
+        ("station records list --colour red", "No such option"),
+        ("station records list --last many", "not a valid integer"),
+        ("station records list --outcome maybe", "is not one of"),
+        ("station records show", "is missing"),
+        ("station records hold 4711", "is missing"),
+        ("station records show 7 8", "too many words"),
+        ("./run brew", "has no brew"),
+        ("./run bench coffee", "no benchmark"),
+        ("./run demo --speed fast", "not a valid float"),
+        ("station recipes", "a subcommand is missing"),
+        ("station twin fault arm off --amount strong", "not a valid float"),
+    ],
+)
+def test_a_command_that_does_not_exist_is_found(line, told, root):
+    assert told in str(problem(shlex.split(line), root, whole=True))
+
+
+def carried_out(command, folder, monkeypatch):
+    """Exit code and output of a line of shell; a plain command of the station's runs in this process, which is faster."""
+    words = shlex.split(command, comments=True)
+    if words[:2] == ["./run", "station"]:
+        words = words[1:]
+    if words[0] == "station" and not set(command) & set("|&;<>$`"):
+        output = io.StringIO()
+        monkeypatch.setattr(sys, "argv", words)
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output), pytest.raises(SystemExit) as end:
+            main()
+        return end.value.code, output.getvalue()
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["sh", "-c", command.replace("./run station", "station")],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    return done.returncode, done.stdout
+
+
+def missing_lines(expected, output):
+    """Lines of a document that do not come in the output, in their order; `…` stands for anything."""
+    lines = iter(" ".join(line.split()) for line in output.splitlines())
+    missing = []
+    for line in filter(None, (" ".join(line.split()) for line in expected)):
+        pattern = re.compile(".*".join(map(re.escape, line.split("…"))))
+        if line != "…" and not any(pattern.fullmatch(said) for said in lines):
+            missing.append(line)
+            break
+    return missing
+
+
+@pytest.mark.parametrize("name", documents_with_console())
+def test_what_a_document_says_a_command_answers_it_answers(name, pages, home, tmp_path, monkeypatch, root):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    (folder / "recipes").symlink_to(root / "recipes")
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("STATION_HOME", str(home))
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    for said in pages[name].said:
+        code, output = carried_out(said.command, folder, monkeypatch)
+        place = f"{name}:{said.line}: {said.command}"
+        assert code == said.code, f"{place}\n{output}"
+        assert missing_lines(said.expected, output) == [], f"{place}\n{output}"
+
+
+@pytest.mark.parametrize(
+    ("expected", "whole"),
+    [
+        (["one 1", "three"], True),
+        (["one …", "…ee"], True),
+        (["…"], True),
+        (["three", "one 1"], False),
+        (["one"], False),
+        (["one … 3"], False),
+    ],
+)
+def test_an_answer_that_differs_from_the_document_is_found(expected, whole):
+    assert (missing_lines(expected, "one   1\ntwo\nthree\n") == []) is whole
