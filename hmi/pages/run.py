@@ -18,6 +18,7 @@ from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.words import Wording
+from station.channel.messages import RefusedError
 from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
 
 router = APIRouter()
@@ -108,8 +109,11 @@ async def run(request: Request) -> Response:
 
 @router.get("/fruit/{sequence}")
 async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Sequence) -> Response:
-    """One of the last fruit."""
-    found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+    """One of the last fruit; an older one is in the history."""
+    try:
+        found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+    except RefusedError:
+        return go_to(f"/history/{sequence}")
     return show(request, "fruit.html.j2", **fruit_values(found, wording))
 
 
