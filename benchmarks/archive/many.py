@@ -132,6 +132,6 @@ def _rows(numbers: range) -> Iterator[tuple[object, ...]]:
             "ended_utc_ms": _began(number) + 2900, "duration_ms": 3000, "encoder": 0, "lot": lot,
         })  # fmt: skip
         yield (
-            number, number % 65_535 + 1, lot, _RECIPES[fruit_of(number)], _began(number), _began(number) + 2900, outcome,
-            json.dumps(reasons), area, outcome, told, _began(number) + 2950, _began(number) + 3000,
+            number, number % 65_535 + 1, lot, _RECIPES[fruit_of(number)], _began(number), _began(number) + 2900,
+            outcome, json.dumps(reasons), area, outcome, told, _began(number) + 2950, _began(number) + 3000,
         )  # fmt: skip

@@ -41,7 +41,16 @@ def _doing(gateway: Gateway) -> object:
 def _doing_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
     state = gateway.state
     order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
-    return {"state": state, "order": order, "OrderName": OrderName}
+    return {"state": state, "order": order}
+
+
+def _buttons(gateway: Gateway) -> object:
+    state = gateway.state
+    return None if state is None else (state.may, state.recoveries, state.needs_person)
+
+
+def _buttons_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    return {"state": gateway.state, "OrderName": OrderName}
 
 
 def _fruit(gateway: Gateway) -> object:
@@ -85,6 +94,7 @@ def _recent_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
 
 PARTS = {
     "run.doing": Part("run_doing.html.j2", _doing, _doing_values),
+    "run.buttons": Part("run_buttons.html.j2", _buttons, _buttons_values),
     "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
     "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
     "run.recent": Part("run_recent.html.j2", _recent, _recent_values),

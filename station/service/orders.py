@@ -220,9 +220,7 @@ class Orders:
         reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
         if reached not in WAITING:
             return "the station was started again meanwhile"
-        return (
-            "" if kept else "the station stands, but forgets that at its next start: the home folder cannot be written"
-        )
+        return "" if kept else "the station stands, but its next start forgets that: the home folder cannot be written"
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
