@@ -172,6 +172,11 @@ def questions(rows: int) -> dict[str, Query]:
         "a reason": Query(reason=Reason.LOW_CONFIDENCE),
         "a reason and its outcome": Query(reason=Reason.EARLY_STOP, outcome="FAIL"),
         "a rare reason": Query(reason=Reason.CAMERA_FAULT),
+        "one fruit": Query(fruit="strawberry"),
+        "a rare fruit": Query(fruit="raspberry"),
+        "a rare fruit, FAIL": Query(fruit="raspberry", outcome="FAIL"),
+        "one fruit, a rare reason": Query(fruit="strawberry", reason=Reason.CAMERA_FAULT),
+        "a fruit that never was": Query(fruit="cherry", outcome="FAIL"),
     }
 
 
@@ -184,6 +189,7 @@ def plain_sql(query: Query) -> tuple[str, list[object]]:
         "i.began_utc_ms < ?": query.to_utc_ms,
         "i.outcome = ?": query.outcome,
         "i.sequence IN (SELECT sequence FROM reasons WHERE reason = ?)": query.reason,
+        "i.recipe_sha256 IN (SELECT sha256 FROM recipe_snapshots WHERE name = ?)": query.fruit,
     }
     given = {text: value for text, value in conditions.items() if value is not None}
     where = f"WHERE {' AND '.join(given)}" if given else ""

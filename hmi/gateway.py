@@ -8,7 +8,7 @@ from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
-from station.channel.messages import ChannelError, DeadlineError, Message
+from station.channel.messages import ChannelError, DeadlineError, Message, RefusedError
 from station.channel.panel_live import AskFruit, AskPanel, AskRecent, Fruit, PanelState, Person, PersonNoted, Recent
 from station.errors import StationError
 
@@ -34,6 +34,8 @@ class Gateway:
         self._client: ChannelClient | None = None
         self._looking: asyncio.Task[None] | None = None
         self._looked = asyncio.Event()
+        self._known: tuple[str, int | None] | None = None
+        """The station's start and last fruit that `last` and `recent` tell of."""
         self.state: PanelState | None = None
         """As it was last heard; None before the first answer."""
         self.heard_s: float | None = None
@@ -102,26 +104,21 @@ class Gateway:
             began_s = time.monotonic()
             with contextlib.suppress(ChannelError):
                 state = await self.ask(AskPanel(), PanelState, deadline_s=_LOOK_DEADLINE_S)
-                if state.last_sequence is not None and self._is_news(state):
-                    recent = await self.ask(AskRecent(most=200), Recent)
-                    self.last = await self.ask(AskFruit(sequence=state.last_sequence), Fruit)
-                    self.recent = recent
+                if (newest := (state.boot, state.last_sequence)) != self._known:
+                    self.recent = await self.ask(AskRecent(most=200), Recent)
+                    self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()
             looked, self._looked = self._looked, asyncio.Event()
             looked.set()
             await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
 
-    def _is_news(self, state: PanelState) -> bool:
-        known = self.last
-        return (
-            known is None
-            or self.state is None
-            or (self.state.boot, known.short.sequence)
-            != (
-                state.boot,
-                state.last_sequence,
-            )
-        )
+    async def _fruit(self, sequence: int | None) -> Fruit | None:
+        """A fruit in full; None where the station knows no more of it than that it was."""
+        if sequence is None:
+            return None
+        with contextlib.suppress(RefusedError):
+            return await self.ask(AskFruit(sequence=sequence), Fruit)
+        return None
 
 
 def person(name: str, role: str) -> Person:

@@ -1,17 +1,22 @@
 """What the pages say, in each language: catalogues of the folder `words`, one file for each page."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
 from pathlib import Path
+from string import Formatter
+
+from markupsafe import Markup
 
 from station.settings.hmi import Language
 
 FOLDER = Path(__file__).with_name("words")
 SOURCE: Language = "en"
 _DECIMAL = {"en": ".", "de": ",", "es": ","}
+_NUMBER = re.compile(r"(?<![\w.])([0-9]+)\.([0-9]+)(?![\w.])")
 _DAY = {"en": "%Y-%m-%d", "de": "%d.%m.%Y", "es": "%d/%m/%Y"}
 NO_VALUE = "–"  # noqa: RUF001 (what is shown where nothing was measured)
 
@@ -33,6 +38,19 @@ def catalogue(language: Language) -> Mapping[str, str]:
                 raise ValueError(f"{file}: the key {key} belongs into {key.partition('.')[0]}.json")
             texts[key] = text
     return texts
+
+
+@cache
+def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
+    """The station's own sentences, `said.what` of the English catalogue, as patterns; the most particular first."""
+    texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("said.")}
+    parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
+    patterns = {
+        key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in told)
+        for key, told in parts.items()
+    }
+    order = sorted(parts, key=lambda key: -sum(len(literal) for literal, *_ in parts[key]))
+    return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +81,30 @@ class Wording:
             english: as it came.
         """
         return catalogue(self.language).get(key, english)
+
+    def said(self, english: str) -> str:
+        """A sentence of the station's in this language; where no catalogue has it, as it is and marked as English.
+
+        Args:
+            english: as it came.
+        """
+        if self.language == SOURCE:
+            return english
+        told = self._told(english)
+        return Markup('<span lang="en">{}</span>').format(english) if told is None and english else told or ""
+
+    def _told(self, english: str) -> str | None:
+        for key, pattern in sayings():
+            if (found := pattern.fullmatch(english)) is not None:
+                return self.text(key, **{name: self._value(value) for name, value in found.groupdict().items()})
+        return None
+
+    def _value(self, text: str) -> str:
+        """What stands within a sentence: a number, a sentence again, or a name."""
+        lead = text.removesuffix(" ")
+        if (told := self._told(lead)) is not None:
+            return told + text[len(lead) :]
+        return _NUMBER.sub(rf"\1{_DECIMAL[self.language]}\2", text)
 
     def number(self, value: float | None, digits: int = 0) -> str:
         """A number with the language's decimal sign; thousands stand apart by a thin space.

@@ -13,7 +13,9 @@ FIRST_UTC_MS = 1_767_225_600_000
 PERIOD_MS = 3_000
 LOT_SIZE = 2_000
 GROWERS = 40
-_RECIPE = "0" * 64
+_RECIPES = {"strawberry": "5" * 64, "raspberry": "7" * 64}
+RARE_FRUIT_LOT = 200
+"""Every so-manieth lot is of the rarer fruit."""
 _BATCH = 20_000
 _UNMEASURED = (Reason.NO_CONTACT, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.IMAGE_STALE)
 
@@ -45,6 +47,15 @@ def made(number: int) -> tuple[str, str, tuple[str, ...]]:
     return lot, "NO_RESULT", (_UNMEASURED[int(chance * 1e6) % len(_UNMEASURED)],)
 
 
+def fruit_of(number: int) -> str:
+    """What was inspected.
+
+    Args:
+        number: its sequence.
+    """
+    return "strawberry" if number // LOT_SIZE % RARE_FRUIT_LOT else "raspberry"
+
+
 def grower_of(lot: str) -> str:
     """Whose lot it is."""
     return f"grower {int(lot[1:]) * 7 % GROWERS}"
@@ -69,8 +80,9 @@ def fill(folder: Path, first: int, last: int, steps: int) -> None:
             for start in range(first, last + 1, _BATCH):
                 numbers = range(start, min(start + _BATCH, last + 1))
                 database.execute("BEGIN IMMEDIATE")
-                database.execute(
-                    "INSERT OR IGNORE INTO recipe_snapshots VALUES (?, 'strawberry', 3, '1', 1, '{}')", (_RECIPE,)
+                database.executemany(
+                    "INSERT OR IGNORE INTO recipe_snapshots VALUES (?, ?, 3, '1', 1, '{}')",
+                    [(sha256, name) for name, sha256 in _RECIPES.items()],
                 )
                 for lot in sorted({made(number)[0] for number in (numbers[0], numbers[-1])} | set(_lots(numbers))):
                     database.execute(
@@ -120,6 +132,6 @@ def _rows(numbers: range) -> Iterator[tuple[object, ...]]:
             "ended_utc_ms": _began(number) + 2900, "duration_ms": 3000, "encoder": 0, "lot": lot,
         })  # fmt: skip
         yield (
-            number, number % 65_535 + 1, lot, _RECIPE, _began(number), _began(number) + 2900, outcome,
-            json.dumps(reasons), area, outcome, told, _began(number) + 2950, _began(number) + 3000,
+            number, number % 65_535 + 1, lot, _RECIPES[fruit_of(number)], _began(number), _began(number) + 2900,
+            outcome, json.dumps(reasons), area, outcome, told, _began(number) + 2950, _began(number) + 3000,
         )  # fmt: skip

@@ -119,13 +119,14 @@ async def export(
     form: Annotated[Literal["csv", "parquet"], Form()],
     lot: Annotated[str, Form(max_length=64)] = "",
     grower: Annotated[str, Form(max_length=64)] = "",
+    fruit: Annotated[str, Form(max_length=64)] = "",
     outcome: Annotated[str, Form(max_length=64)] = "",
     reason: Annotated[str, Form(max_length=64)] = "",
     begun_from: Annotated[str, Form(alias="from", max_length=32)] = "",
     begun_to: Annotated[str, Form(alias="to", max_length=32)] = "",
 ) -> Response:
     """Write what the search finds as a table."""
-    wanted = search_of(lot, grower, "", outcome, reason, begun_from, begun_to)
+    wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     if wanted is None:
         raise Problem(400, "problem.bad_form")
     asked = StartExport(search=wanted, form=form, actor=_actor(caller))

@@ -111,7 +111,7 @@ async def save(
         changes = changed(told.values, typed)
     except BadFieldError as error:
         why = wording.text("recipes.bad_field", field=_title(wording, error.field.key, error.field.title),
-                           expected=error.field.expected)  # fmt: skip
+                           expected=wording.said(error.field.expected))  # fmt: skip
         return await _form(request, hmi, wording, told, typed, why, reason)
     if not changes:
         return await _form(request, hmi, wording, told, typed, wording.text("recipes.nothing_changed"), reason)

@@ -18,6 +18,7 @@ from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.words import Wording
+from station.channel.messages import RefusedError
 from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
 
 router = APIRouter()
@@ -40,7 +41,16 @@ def _doing(gateway: Gateway) -> object:
 def _doing_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
     state = gateway.state
     order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
-    return {"state": state, "order": order, "OrderName": OrderName}
+    return {"state": state, "order": order}
+
+
+def _buttons(gateway: Gateway) -> object:
+    state = gateway.state
+    return None if state is None else (state.may, state.recoveries, state.needs_person)
+
+
+def _buttons_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+    return {"state": gateway.state, "OrderName": OrderName}
 
 
 def _fruit(gateway: Gateway) -> object:
@@ -84,6 +94,7 @@ def _recent_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
 
 PARTS = {
     "run.doing": Part("run_doing.html.j2", _doing, _doing_values),
+    "run.buttons": Part("run_buttons.html.j2", _buttons, _buttons_values),
     "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
     "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
     "run.recent": Part("run_recent.html.j2", _recent, _recent_values),
@@ -108,8 +119,11 @@ async def run(request: Request) -> Response:
 
 @router.get("/fruit/{sequence}")
 async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Sequence) -> Response:
-    """One of the last fruit."""
-    found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+    """One of the last fruit; an older one is in the history."""
+    try:
+        found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+    except RefusedError:
+        return go_to(f"/history/{sequence}")
     return show(request, "fruit.html.j2", **fruit_values(found, wording))
 
 

@@ -11,6 +11,8 @@
   let heardAt = performance.now();
   let ageThen = Number(body.dataset.ageMs);
   let clockOffset = null;
+  const coming = new Map();
+  let pressed = null;
 
   const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
 
@@ -24,8 +26,21 @@
     if (told.utc_ms) {
       clockOffset = told.utc_ms + Math.max(0, ageThen) - Date.now();
     }
-    for (const [name, [digest, html]] of Object.entries(told.parts)) {
+    for (const [name, part] of Object.entries(told.parts)) {
+      coming.set(name, part);
+    }
+    renew();
+    look();
+  }
+
+  // A part with a finger on it stays as it is until that is lifted: what is touched must not be another thing by then.
+  function renew() {
+    for (const [name, [digest, html]] of coming) {
       const part = parts.get(name);
+      if (part && part === pressed) {
+        continue;
+      }
+      coming.delete(name);
       if (part && part.dataset.digest !== digest) {
         const focused = part.contains(document.activeElement) ? document.activeElement.id : "";
         part.innerHTML = html;
@@ -36,8 +51,23 @@
         part.dispatchEvent(new CustomEvent("renewed", { bubbles: true }));
       }
     }
-    look();
   }
+
+  const press = (event) => {
+    pressed = event.target instanceof Element ? event.target.closest("[data-live]") : null;
+  };
+  const lift = () =>
+    setTimeout(() => {
+      pressed = null;
+      renew();
+    });
+  for (const name of ["pointerdown", "keydown"]) {
+    document.addEventListener(name, press);
+  }
+  for (const name of ["pointerup", "pointercancel", "keyup"]) {
+    document.addEventListener(name, lift);
+  }
+  window.addEventListener("blur", lift);
 
   function open() {
     if (source || document.hidden) {

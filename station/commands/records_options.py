@@ -57,10 +57,11 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
         begun_to: int | None,
         outcome: Any,
         reason: str | None,
+        fruit: str | None,
         **others: Any,
     ) -> Any:
         why = None if reason is None else Reason(reason)
-        return command(query=Query(lot, grower, begun_from, begun_to, outcome, why), **others)
+        return command(query=Query(lot, grower, begun_from, begun_to, outcome, why, fruit), **others)
 
     gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
     gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
@@ -77,6 +78,7 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
             type=click.Choice([str(reason) for reason in Reason]),
             help="With this reason among its reasons.",
         ),
+        click.option("--fruit", metavar="NAME", help="Inspected by this recipe, whatever its revision."),
     )
     decorated: Callable[..., Any] = gathered
     for option in reversed(options):

@@ -128,6 +128,7 @@ def _conditions(query: Query) -> tuple[str, list[Any]]:
         ("i.began_utc_ms < ?", query.to_utc_ms),
         ("i.outcome = ?", query.outcome),
         (reason, query.reason),
+        ("r.name = ?", query.fruit),
     )
     chosen = [(text, value) for text, value in given if value is not None]
     return "".join(f" AND {text}" for text, _ in chosen), [value for _, value in chosen]

@@ -82,6 +82,7 @@ Index("ix_inspections_unacknowledged", inspections.c.sequence, sqlite_where=insp
 Index("ix_inspections_lot", inspections.c.lot)
 Index("ix_inspections_lot_outcome", inspections.c.lot, inspections.c.outcome)
 Index("ix_inspections_outcome", inspections.c.outcome)
+Index("ix_inspections_recipe_sha256", inspections.c.recipe_sha256)
 
 reasons = Table(
     "reasons",

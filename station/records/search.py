@@ -1,4 +1,4 @@
-"""Inspections found by lot, grower, time, outcome and reason, newest first, a page at a time.
+"""Inspections found by lot, grower, fruit, time, outcome and reason, newest first, a page at a time.
 
 Each condition is a list of numbers in an index, which answers "the highest one not above this" with one look. A page is
 the intersection of such lists, by leaps ("leapfrog join", Veldhuizen, ICDT 2014, section 3): a condition that holds
@@ -9,7 +9,7 @@ and read all that it names.
 import heapq
 import sqlite3
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -44,6 +44,8 @@ class Query:
     """What stands."""
     reason: Reason | None = None
     """One of what stands, not only the first."""
+    fruit: str | None = None
+    """The name of the recipe that it was inspected by, whatever its revision."""
 
 
 class Page(NamedTuple):
@@ -107,17 +109,15 @@ def _common(lists: list[Seek], highest: int) -> int | None:
 
 
 def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
-    """The lists, those that are likely to be short first."""
+    """The lists, those that are likely to be short first; one at least names what is there."""
     lists: list[Seek] = []
-    if query.from_utc_ms is not None or query.to_utc_ms is not None:
-        lists.append(_in_time(database, query.from_utc_ms or 0, query.to_utc_ms))
     if query.reason is not None:
         lists.append(_with_reason(database, query.reason, query.outcome))
     if query.grower is not None:
         lists.append(_of_grower(database, query.grower, query.outcome))
     if query.lot is not None:
         lists.append(_of_lot(database, query.lot, query.outcome))
-    elif query.outcome is not None and query.reason is None and query.grower is None:
+    elif query.outcome is not None and not lists:
         lists.append(
             _seek(
                 database,
@@ -126,11 +126,14 @@ def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
                 query.outcome,
             )
         )
-    if query.lot is None and query.outcome is None and query.reason is None and query.grower is None:
+    if query.fruit is not None:
+        lists.append(_of_fruit(database, query.fruit))
+    if not lists:
         lists.append(
             _seek(database, "SELECT sequence FROM inspections WHERE sequence <= ? ORDER BY sequence DESC LIMIT 1")
         )
-    return lists
+    timed = query.from_utc_ms is not None or query.to_utc_ms is not None
+    return [_in_time(database, query.from_utc_ms or 0, query.to_utc_ms), *lists] if timed else lists
 
 
 def _seek(database: sqlite3.Connection, statement: str, *values: str) -> Seek:
@@ -169,25 +172,45 @@ def _lot_statement(lot: str, outcome: OutcomeName | None) -> str:
 
 
 def _of_grower(database: sqlite3.Connection, grower: str, outcome: OutcomeName | None) -> Seek:
-    """The lots' lists merged: a heap of each one's highest number not above the last that was asked for."""
+    """The lots' lists merged."""
     chosen = (outcome,) if outcome else ()
     head = _lot_statement("lots.name", outcome)
     heads = database.execute(
         f"SELECT name, ({head}) AS head FROM lots WHERE grower = ? AND head NOT NULL",  # noqa: S608 (of constants)
         (*chosen, LARGEST, grower),
     )
-    heap = [(-head, lot) for lot, head in heads]
-    heapq.heapify(heap)
     statement, cursor = _lot_statement("?", outcome), database.cursor()
+    return _merged(heads, lambda lot, highest: cursor.execute(statement, (lot, *chosen, highest)).fetchone())
+
+
+def _of_fruit(database: sqlite3.Connection, fruit: str) -> Seek:
+    """The lists of the recipe's revisions merged."""
+    head = (
+        "SELECT sequence FROM inspections INDEXED BY ix_inspections_recipe_sha256 WHERE recipe_sha256 = {} "
+        "AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
+    )
+    heads = database.execute(
+        f"SELECT sha256, ({head.format('sha256')}) AS head FROM recipe_snapshots "  # noqa: S608 (of constants)
+        "WHERE name = ? AND head NOT NULL",
+        (LARGEST, fruit),
+    )
+    statement, cursor = head.format("?"), database.cursor()
+    return _merged(heads, lambda sha256, highest: cursor.execute(statement, (sha256, highest)).fetchone())
+
+
+def _merged(heads: Iterable[tuple[str, int]], find: Callable[[str, int], tuple[int] | None]) -> Seek:
+    """Lists as one: a heap of each one's highest number not above the last that was asked for."""
+    heap = [(-head, name) for name, head in heads]
+    heapq.heapify(heap)
 
     def seek(highest: int) -> int | None:
         while heap and -heap[0][0] > highest:
-            lot = heap[0][1]
-            found = cursor.execute(statement, (lot, *chosen, highest)).fetchone()
+            name = heap[0][1]
+            found = find(name, highest)
             if found is None:
                 heapq.heappop(heap)
             else:
-                heapq.heapreplace(heap, (-found[0], lot))
+                heapq.heapreplace(heap, (-found[0], name))
         return -heap[0][0] if heap else None
 
     return seek

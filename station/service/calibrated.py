@@ -87,15 +87,16 @@ class Calibrated:
         if limit_h is None:
             return ""
         calibration, verified, age_s = self.calibration, self._verification, self.figures.verification_age_s
-        do = "stop the station, run `station verify` with the ball, and start it again."
+        how = "on the page Maintenance in manual mode, or by `station verify` with the station stopped."
         if calibration is None:
-            return "The sensor is not calibrated: stop the station, run `station calibrate` with the ball, then verify."
+            return f"The sensor is not calibrated: calibrate it with the ball, then verify; {how}"
         if verified is None or age_s is None:
-            return f"The calibration was never verified, and it is demanded: {do}"
+            return f"The calibration was never verified, and it is demanded: verify it with the ball; {how}"
         if not verified.passed:
-            return f"The last verification failed: mend what its page names, {do}"
+            return f"The last verification failed: mend what its page names, then verify again; {how}"
         if age_s > limit_h * _HOUR_S:
-            return f"The last verification is {age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed: {do}"
+            old = f"{age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed"
+            return f"The last verification is {old}: verify with the ball; {how}"
         return ""
 
     def trouble(self) -> str:

@@ -13,6 +13,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
 from station.service.crew import Crew
+from station.service.keeping import Kept
 from station.service.lot import LotKeeper
 from station.service.metrics import Metrics
 from station.service.recipe_book import RecipeBook
@@ -26,6 +27,7 @@ DEADLINE_S = 25.0
 """Less than the PLC interface's own patience with a command."""
 LINE_SILENT_S = 2.0
 MODES = (1, 2, 3)
+_STOPPED = "stopped_by_a_person"
 _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
@@ -39,13 +41,21 @@ class Orders:
         lots: told of a recipe that is chosen.
         trail: told of every command.
         metrics: notes the line's signs of life.
+        kept: a person's stop outlives a restart there.
     """
 
     def __init__(
-        self, service: Service, crew: Crew, book: RecipeBook, lots: LotKeeper, trail: Trail, metrics: Metrics
+        self,
+        service: Service,
+        crew: Crew,
+        book: RecipeBook,
+        lots: LotKeeper,
+        trail: Trail,
+        metrics: Metrics,
+        kept: Kept,
     ) -> None:
         self._service, self._crew, self._book, self._metrics = service, crew, book, metrics
-        self._lots, self._trail = lots, trail
+        self._lots, self._trail, self._kept = lots, trail, kept
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
@@ -67,6 +77,10 @@ class Orders:
     def told(self) -> Line | None:
         """What the PLC interface said last; None where it never did."""
         return self._line
+
+    def recall(self) -> None:
+        """A station that a person has stopped stays so over a restart, until somebody starts it."""
+        self._service.stop_wanted = self._kept.read(_STOPPED) == b"yes"
 
     def line(self, line: Line) -> None:
         """Note what the PLC interface says with its beat.
@@ -193,17 +207,20 @@ class Orders:
         return ""
 
     async def stop(self) -> str:
-        """Take no more triggers until the next reset; the fruit under way is inspected to its end.
+        """Take no more triggers until the next reset, also over a restart; the fruit under way is inspected to its end.
 
         Returns:
             Why it does not stand as told, empty where it does.
         """
         service = self._service
         service.stop_wanted = True
+        kept = await asyncio.to_thread(self._kept.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.conductor.post(Event.STOP, "a person stops the station at the panel")
         reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
-        return "" if reached in WAITING else "the station was started again meanwhile"
+        if reached not in WAITING:
+            return "the station was started again meanwhile"
+        return "" if kept else "the station stands, but its next start forgets that: the home folder cannot be written"
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
@@ -247,6 +264,7 @@ class Orders:
         if why_not := self.no_reset():
             return why_not
         service.stop_wanted = False
+        await asyncio.to_thread(self._kept.write, _STOPPED, b"no")
         if state is State.IDLE:
             return ""
         service.reset_wanted = True

@@ -1,5 +1,7 @@
 """What the HMI's process asks of the running station, answered from memory; nothing here waits for a device."""
 
+import asyncio
+import logging
 import time
 
 from station.channel.line import Noted
@@ -27,6 +29,7 @@ from station.channel.panel_live import (
 from station.channel.server import Handlers
 from station.inspection.states import STATES
 from station.records.audit import AuditEntry
+from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_orders import AlarmOrders
 from station.service.crew import Crew
@@ -35,11 +38,14 @@ from station.service.lot import LotKeeper
 from station.service.orders import Orders
 from station.service.panel_memory import PanelMemory
 from station.service.panel_orders import PanelOrders
+from station.service.panel_recall import recalled
 from station.service.readiness import Gate
 from station.service.recipe_book import Active, RecipeBook
 from station.service.service import Service
 from station.service.trail import Trail
 from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
 
 SILENT_S = 3.0
 """A process that was killed and started again is back by then, on a machine that has nothing else to do."""
@@ -90,6 +96,18 @@ class Panel:
             **alarms.handlers,
         }
         """For a channel's server."""
+
+    async def recall(self) -> None:
+        """Show the last fruit of the start before, and count on with their lots."""
+        pacing = self._service.pacing
+        try:
+            found = await asyncio.to_thread(
+                recalled, self._records.folder, lambda recipe: pacing.limits(recipe).inspection_s
+            )
+        except RecordsError as error:
+            log.warning("the last fruit are not shown: %s", error)
+            return
+        self._memory.recall(*found)
 
     async def close(self) -> None:
         """Give up the orders that are under way."""

@@ -1,13 +1,9 @@
 """What the pages ask of the past, answered from the records."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
-
-from sqlalchemy import Connection
 
 from station.channel.messages import Message
 from station.channel.panel_queries import (
@@ -40,19 +36,15 @@ from station.errors import StationError
 from station.records.audit import AuditEntry
 from station.records.audit_report import read_audit
 from station.records.database import reading
-from station.records.errors import RecordsError
 from station.records.lots import Lot, end_lot, read_lots, start_lot
 from station.records.model import FullRecord
-from station.records.reading import Summary, read_inspection, read_summaries
+from station.records.reading import Summary, read_inspection
 from station.records.records import Records
-from station.records.search import LARGEST, Query, find
+from station.records.search import Query, find_page
 from station.records.wording import sentence
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_worker import PanelWorker
 
-LOOKED_THROUGH = 5000
-"""Inspections looked at for one page where a search names the fruit, which no index knows."""
-_PORTION = 250
 _LONGEST_AUDIT_VALUE = 2000
 
 
@@ -145,8 +137,6 @@ class PanelHistory:
 
     async def start_export(self, request: StartExport) -> JobTold:
         """Write a table of inspections."""
-        if request.search.fruit is not None:
-            raise RecordsError("a table cannot be narrowed to one fruit", "name its lot or its time instead")
         folder = self._jobs.folder()
         target = folder / f"inspections.{request.form}"
         await self._note(request, "records.exported", request.search.model_dump(mode="json", exclude_none=True))
@@ -176,33 +166,19 @@ class PanelHistory:
         await self._records.audit(AuditEntry(request.actor.who, request.actor.role, action, subject, new=new))
 
     def _find(self, request: FindInspections) -> InspectionPage:
-        search, limit = request.search, request.limit
-        query = Query(search.lot, search.grower, search.from_utc_ms, search.to_utc_ms, search.outcome, search.reason)
-        highest = LARGEST if request.below is None else request.below - 1
+        search = request.search
+        query = Query(
+            search.lot,
+            search.grower,
+            search.from_utc_ms,
+            search.to_utc_ms,
+            search.outcome,
+            search.reason,
+            search.fruit,
+        )
         with reading(self._folder) as connection:
-            found = find(connection, query, highest)
-            if search.fruit is None:
-                numbers = list(islice(found, limit + 1))
-                rows = read_summaries(connection, numbers[:limit])
-                below = numbers[limit - 1] if len(numbers) > limit else None
-            else:
-                rows, below = _of_fruit(connection, found, search.fruit, limit)
-        return InspectionPage(rows=tuple(map(_row, rows)), below=below)
-
-
-def _of_fruit(connection: Connection, found: Iterator[int], fruit: str, limit: int) -> tuple[list[Summary], int | None]:
-    """Those of one fruit, and what to go on below; so many are looked at that a page comes in a moment."""
-    rows: list[Summary] = []
-    below = None
-    for _ in range(LOOKED_THROUGH // _PORTION):
-        numbers = list(islice(found, _PORTION))
-        rows += [row for row in read_summaries(connection, numbers) if row.fruit == fruit]
-        if len(rows) > limit:
-            return rows[:limit], rows[limit - 1].sequence
-        if len(numbers) < _PORTION:
-            return rows, None
-        below = numbers[-1]
-    return rows, below
+            page = find_page(connection, query, request.limit, request.below)
+        return InspectionPage(rows=tuple(map(_row, page.rows)), below=page.below)
 
 
 def _row(row: Summary) -> InspectionRow:
@@ -256,6 +232,7 @@ def _options(search: Search) -> list[str]:
         "grower": search.grower,
         "outcome": search.outcome,
         "reason": search.reason,
+        "fruit": search.fruit,
         "from": None if search.from_utc_ms is None else _iso(search.from_utc_ms),
         "to": None if search.to_utc_ms is None else _iso(search.to_utc_ms),
     }

@@ -3,7 +3,9 @@
 import asyncio
 import base64
 from collections import Counter, OrderedDict, deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -12,8 +14,10 @@ from station.channel.line import Outcome
 from station.channel.panel_live import Counts, CurveShown, Fruit, FruitShort, LimitShown, Picture
 from station.devices.camera.interface import Image
 from station.errors import StationError
+from station.records.model import InspectionRecord
 from station.service.eye import Seen
 from station.service.inspection import Inspection
+from station.settings.recipe import Recipe
 from station.vision.contact import Mask
 
 MOST_IN_FULL = 24
@@ -27,16 +31,27 @@ class ForgottenError(StationError):
     """The fruit is not among the last any more."""
 
 
+Look = Callable[[], tuple[Image, Mask]]
+"""Gives a step's image and the contact in it; blocks where they lie on the disk."""
+
+
+class Remembered(NamedTuple):
+    """A fruit of an earlier start of the station."""
+
+    fruit: Fruit
+    look: Look | None
+    """None where no image was kept."""
+
+
 @dataclass(slots=True)
 class _Kept:
     fruit: Fruit
-    image: Image | None
-    mask: Mask | None
+    look: Look | None
     picture: Picture | None = None
 
 
 class PanelMemory:
-    """The fruit since this start of the station; all that was ever inspected is in the records."""
+    """The last fruit; all that was ever inspected is in the records."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[int, _Kept] = OrderedDict()
@@ -49,6 +64,20 @@ class PanelMemory:
         """Of the last fruit with an outcome."""
         return self._short[-1].sequence if self._short else None
 
+    def recall(
+        self, short: Iterable[FruitShort], full: Iterable[Remembered], lots: Mapping[str, Mapping[str, int]]
+    ) -> None:
+        """Go on where the start before has ended.
+
+        Args:
+            short: the last fruit, oldest first.
+            full: those of them that are known in full, oldest first.
+            lots: how each lot's fruit ended.
+        """
+        self._short.extend(short)
+        self._kept.update((each.fruit.short.sequence, _Kept(each.fruit, each.look)) for each in full)
+        self._lots.update((name, Counter(counts)) for name, counts in lots.items())
+
     def ended(self, now: Inspection) -> None:
         """An inspection has its durable outcome.
 
@@ -57,8 +86,8 @@ class PanelMemory:
         """
         if now.standing is None:
             return
-        fruit, shown = _fruit(now, now.standing), _shown(now)
-        self._kept[fruit.short.sequence] = _Kept(fruit, shown and shown.image, shown and shown.contact.mask)
+        fruit, look = _told(now, now.standing)
+        self._kept[fruit.short.sequence] = _Kept(fruit, look)
         while len(self._kept) > MOST_IN_FULL:
             self._kept.popitem(last=False)
         self._short.append(fruit.short)
@@ -79,11 +108,12 @@ class PanelMemory:
         now = before.model_copy(update={"outcome": outcome.outcome, "reasons": tuple(map(str, outcome.reasons))})
         kept.fruit = kept.fruit.model_copy(update={"short": now})
         self._short = deque((now if each.sequence == now.sequence else each for each in self._short), MOST_IN_SHORT)
-        self._lots[before.lot].subtract([before.outcome])
-        self._lots[before.lot].update([now.outcome])
+        if (counted := self._lots.get(before.lot)) is not None:
+            counted.subtract([before.outcome])
+            counted.update([now.outcome])
 
     def counts(self, lot: str | None) -> Counts:
-        """How a lot's fruit ended, since this start of the station.
+        """How a lot's fruit ended; of fruit without a lot's name, since this start of the station.
 
         Args:
             lot: its name; None for none.
@@ -121,9 +151,8 @@ class PanelMemory:
         """
         kept = self._find(sequence)
         async with self._turn:
-            if kept.picture is None and kept.image is not None and kept.mask is not None:
-                kept.picture = await asyncio.to_thread(_picture, kept.image, kept.mask)
-                kept.image = kept.mask = None
+            if kept.picture is None and kept.look is not None:
+                kept.picture, kept.look = await asyncio.to_thread(_picture, kept.look), None
         if kept.picture is None:
             raise ForgottenError(f"no picture was taken of inspection {sequence}")
         return kept.picture
@@ -135,37 +164,27 @@ class PanelMemory:
         return kept
 
 
-def _shown(now: Inspection) -> Seen | None:
-    """The step whose picture says most: the one that decided, else the last."""
-    deciding = now.verdict.deciding if now.verdict is not None else None
-    onset_mm = now.onset_mm
-    if deciding is not None and onset_mm is not None:
-        for seen in now.seen:
-            if abs(onset_mm - seen.step.move.width_mm - deciding.closing_mm) < 1e-6:
-                return seen
-    return now.seen[-1] if now.seen else None
+def fruit_of(
+    standing: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
+) -> Fruit:
+    """A fruit as the panel shows it.
 
-
-def _fruit(now: Inspection, standing: Outcome) -> Fruit:
-    recipe, record, shown = now.active.recipe, now.record(), _shown(now)
+    Args:
+        standing: what the PLC was told.
+        record: the station's own view.
+        recipe: it was inspected by.
+        revision: of the recipe.
+        deadline_s: the longest that the inspection might take.
+        picture: of which step there is one.
+    """
+    onset_mm = record.measures.get("onset_mm")
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
     return Fruit(
-        short=FruitShort(
-            sequence=standing.sequence,
-            outcome=standing.outcome,
-            reasons=tuple(map(str, standing.reasons)),
-            ended_utc_ms=standing.ended_utc_ms,
-            duration_ms=standing.duration_ms,
-            recipe=recipe.name,
-            lot=standing.lot,
-            area_mm2=standing.area_mm2,
-            closing_mm=standing.closing_mm,
-            areas_mm2=tuple(round(point.area_mm2 or 0.0, 2) for point in points),
-        ),
+        short=short_of(standing, recipe.name, [point.area_mm2 for point in points]),
         explanation=record.explanation,
         recipe_title=recipe.title,
-        revision=now.active.snapshot.revision,
-        onset_mm=now.onset_mm,
+        revision=revision,
+        onset_mm=onset_mm if isinstance(onset_mm, float) else None,
         curve=tuple(
             CurveShown(
                 closing_mm=round(point.closing_mm or 0.0, 3),
@@ -180,13 +199,62 @@ def _fruit(now: Inspection, standing: Outcome) -> Fruit:
         ),
         early_stop_mm2=recipe.early_stop.area_mm2,
         growth_mm2_per_mm=recipe.damage.growth_mm2_per_mm,
-        deadline_s=now.limits.inspection_s,
-        phases_s=dict(now.phases_s),
-        picture_step=None if shown is None else now.seen.index(shown),
+        deadline_s=deadline_s,
+        phases_s=dict(record.phases_s),
+        picture_step=picture,
     )
 
 
-def _picture(image: Image, mask: Mask) -> Picture:
+def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
+    """A fruit in a list.
+
+    Args:
+        standing: what the PLC was told.
+        recipe: the recipe's name.
+        areas_mm2: of the steps since the onset.
+    """
+    return FruitShort(
+        sequence=standing.sequence,
+        outcome=standing.outcome,
+        reasons=tuple(map(str, standing.reasons)),
+        ended_utc_ms=standing.ended_utc_ms,
+        duration_ms=standing.duration_ms,
+        recipe=recipe,
+        lot=standing.lot,
+        area_mm2=standing.area_mm2,
+        closing_mm=standing.closing_mm,
+        areas_mm2=tuple(round(area_mm2 or 0.0, 2) for area_mm2 in areas_mm2),
+    )
+
+
+def _told(now: Inspection, standing: Outcome) -> tuple[Fruit, Look | None]:
+    """A fruit that was just inspected, with the picture that says most: of the step that decided, else the last."""
+    record, revision = now.record(), now.active.snapshot.revision
+    step = deciding_step(record)
+    look = None if step is None else _look(now.seen[step])
+    return fruit_of(standing, record, now.active.recipe, revision, now.limits.inspection_s, step), look
+
+
+def deciding_step(record: InspectionRecord) -> int | None:
+    """The step whose picture says most: the one that decided, else the last; None where there is none.
+
+    Args:
+        record: with its curve.
+    """
+    decided_mm = record.closing_mm
+    for point in record.curve:
+        if decided_mm is not None and point.closing_mm is not None and abs(point.closing_mm - decided_mm) < 1e-6:
+            return point.step
+    return record.curve[-1].step if record.curve else None
+
+
+def _look(seen: Seen) -> Look:
+    image, mask = seen.image, seen.contact.mask
+    return lambda: (image, mask)
+
+
+def _picture(look: Look) -> Picture:
+    image, mask = look()
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not done:
         raise ForgottenError("the picture could not be encoded")

@@ -123,7 +123,8 @@ class Station:
         lots = LotKeeper(service, book, trail)
         await asyncio.to_thread(lots.recall)
         trail.note(*started(self.boot, configuration, kept, versions, self._broken))
-        orders = Orders(service, crew, book, lots, trail, metrics)
+        orders = Orders(service, crew, book, lots, trail, metrics, kept)
+        orders.recall()
         gate = Gate(self.boot, service, crew, orders, book, lots, liveness, calibrated)
         alarm_orders = AlarmOrders(alarms, trail)
         panel = Panel(gate, service, crew, lots, book, orders, records, alarm_orders, trail)
@@ -153,7 +154,7 @@ class Station:
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
         rooms = PanelRooms(configuration, records, service, crew, orders, gate, liveness, calibrated, trail, versions)
-        self._serve(stack, panel, rooms)
+        await self._serve(stack, panel, rooms)
         health = HealthServer(
             configuration.metrics.host, configuration.metrics.port, metrics, liveness, gate.readiness, versions
         )
@@ -173,7 +174,8 @@ class Station:
         await stack.enter_async_context(rooms)
         await crew.open()
 
-    def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel, rooms: PanelRooms) -> None:
+    async def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel, rooms: PanelRooms) -> None:
+        await panel.recall()
         stack.push_async_callback(panel.close)
         endpoint = _made_room_for(panel_endpoint(self._configuration.hmi, self._configuration.home))
         self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **rooms.handlers}).serve(), "panel server")

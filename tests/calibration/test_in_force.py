@@ -112,7 +112,7 @@ def test_nothing_is_ready_without_the_verification_that_is_demanded(stored, draf
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8)), {})
     assert demanded.not_verified() == ""
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8.5), FAILED), {})
-    assert "run `station verify`" in demanded.not_verified()
+    assert "by `station verify`" in demanded.not_verified()
 
 
 @pytest.mark.timeout(600)

@@ -299,7 +299,7 @@ class Panel:
             try:
                 self.page.goto(self.address + path)
             except BrowserError as error:
-                if "ERR_CONNECTION_REFUSED" not in str(error):
+                if not any(why in str(error) for why in ("ERR_CONNECTION_REFUSED", "chrome-error:")):
                     raise
                 return False
             return True
@@ -490,6 +490,7 @@ def free_hmi(unused_port: int, tmp_path: Path) -> Iterator[Callable[..., str]]:
             environment = {**cell.environment, "STATION_HMI_PORT": str(unused_port), **variables}
             process = stack.enter_context(begun(command, log, environment))
             eventually(lambda: said(log, "the pages are served", process))
-            return f"http://127.0.0.1:{unused_port}"
+            scheme = "https" if "STATION_HMI_TLS_ENABLED" in variables else "http"
+            return f"{scheme}://127.0.0.1:{unused_port}"
 
         yield begin

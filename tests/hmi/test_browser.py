@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -139,6 +140,41 @@ def test_the_station_is_killed_under_an_open_page(ready, panel):
     assert viewer.page.evaluate("document.body.dataset.made") == page_made, "it recovers without being loaded anew"
     ready.choose("blueberry")
     viewer.until(".station-state", "Blueberry")
+
+
+@pytest.mark.timeout(240)
+def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, operator, eventually):
+    ready.twin(do="fruit", kind="blueberry", seed=1, bruised=True)
+    soft = ready.end(ready.begin())
+    assert soft.outcome != "PASS", "only of others every image is kept"
+    lost = ready.begin()
+    operator.open("/")
+    operator.hold("[data-hold]:has-text('Stop')")
+    before = ready.until(lambda state: state.stopping)
+    ready.process("service").kill()
+
+    def stands(state):
+        return state.boot != before.boot and state.state == "stopped"
+
+    after = ready.until(stands)
+    assert after.stopping
+    counted = before.lot_counts.model_copy(update={"unjudged": before.lot_counts.unjudged + 1})
+    assert after.lot_counts == counted, "the fruit under way is counted with what became of it"
+    operator.until(".run-doing", "Stopped")
+    time.sleep(1.0)
+    assert stands(ready.state()), "it does not begin by itself"
+    operator.page.locator(f".tile[href='/fruit/{soft.sequence}']").click()
+    operator.until("h1", f"Fruit {soft.sequence}")
+    eventually(lambda: operator.page.locator(".fruit-picture").evaluate("picture => picture.naturalWidth") == 480)
+    assert operator.page.locator(".fruit-curve circle").count() > 1
+    operator.open("/")
+    operator.page.locator(f".tile[href='/fruit/{lost}']").click()
+    operator.page.wait_for_url(f"**/history/{lost}")
+    operator.until("main", "No result")
+    operator.open("/")
+    operator.page.get_by_role("button", name="Start").click()
+    ready.until(lambda state: state.ready)
+    operator.until(".run-doing", "Ready")
 
 
 @pytest.mark.timeout(240)

@@ -1,5 +1,6 @@
 """The catalogues: nothing is missing in a language, and numbers are written as it writes them."""
 
+import ast
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -11,17 +12,39 @@ from hypothesis import strategies as st
 
 from hmi import charts
 from hmi.navigation import entries, parts
+from hmi.recipe_form import field_keys, groups
 from hmi.words import FOLDER, NO_VALUE, Wording, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
+from station.settings.recipe import load_recipes
 from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
 LANGUAGES = ("en", "de", "es")
-STATIONS_OWN = "station"
-"""The catalogue of what the station says in English itself."""
+STATION = HMI.parent / "station"
+NOT_FOR_OPERATORS = {
+    "alarm {}: expected an id of docs/alarms.md, as {}",
+    "the PLC interface has not asked yet",
+    "see the detail, and `station devices check`",
+    "start it: station plc run",
+    "none: see `station recipes check`",
+}
+"""Of addresses that a page never asks for, and of health for supervisors."""
+COMPOSED = {
+    "said.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
+    "said.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
+    "said.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
+    "said.changed_since": ("recipe {}: it was changed since {} was looked at, to {}", "; look at it as it is now and"),
+    "said.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
+    "said.stopped_growth": ("No further step was made at {} mm of closing", ": the area grows by {} mm² a millimetre,"),
+    "said.verification_old": (" h old, at most {} h are allowed", "The last verification is {}: verify with the ball"),
+    "said.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
+}
+"""What the station puts together of several."""
+STATIONS_OWN = ("station.", "recipe_what.")
+"""The catalogues of what the station says in English itself."""
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
 IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |PeopleError\()["']([a-z_]+\.[a-z_]+)["']""")
 
@@ -33,7 +56,7 @@ def fields(text):
 def test_every_language_says_everything():
     english = catalogue("en")
     for language in ("de", "es"):
-        other = {key: text for key, text in catalogue(language).items() if not key.startswith(f"{STATIONS_OWN}.")}
+        other = {key: text for key, text in catalogue(language).items() if not key.startswith(STATIONS_OWN)}
         assert sorted(other) == sorted(english), language
         for key, text in other.items():
             assert text.strip(), key
@@ -43,14 +66,83 @@ def test_every_language_says_everything():
 def test_every_file_is_there_in_every_language():
     names = {path.name for path in (FOLDER / "de").iterdir()}
     assert names == {path.name for path in (FOLDER / "es").iterdir()}
-    assert names - {f"{STATIONS_OWN}.json"} == {path.name for path in (FOLDER / "en").iterdir()}
+    assert names - {f"{name}json" for name in STATIONS_OWN} == {path.name for path in (FOLDER / "en").iterdir()}
 
 
 @pytest.mark.parametrize("language", ["de", "es"])
 def test_what_the_station_says_in_english_is_said_in_every_language(language):
-    own = {key for key in catalogue(language) if key.startswith(f"{STATIONS_OWN}.")}
+    own = {key for key in catalogue(language) if key.startswith("station.")}
     wanted = {f"station.{what}.{alarm}" for what in ("cause", "consequence", "action") for alarm in ALARMS}
     assert own == wanted | {f"station.state.{state}" for state in STATES}
+
+
+def sentences(path):
+    """The sentences of a module that somebody is told, with {} for what they are filled with."""
+    tree, skipped = ast.parse(path.read_text(encoding="utf-8")), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):  # a docstring
+            skipped.add(node.value)
+        if isinstance(node, ast.JoinedStr):
+            skipped |= {each for part in node.values for each in ast.walk(part)}
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith((".post", "log.info", "log.warning")):
+            skipped |= {each for value in node.args for each in ast.walk(value)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in skipped:
+            yield node.value
+        elif isinstance(node, ast.JoinedStr) and node not in skipped:
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+
+
+def anonymous(text):
+    return "".join(literal + ("{}" if name else "") for literal, name, _, _ in Formatter().parse(text))
+
+
+def test_what_operators_are_refused_with_is_said_in_every_language():
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    for module in ("readiness", "orders", "panel_orders", "alarm_orders"):
+        told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
+        assert told - NOT_FOR_OPERATORS <= known, module
+
+
+def test_every_sentence_to_translate_is_one_that_the_station_says():
+    """A sentence that was changed there would go on in English, unnoticed."""
+    told = {text for path in STATION.rglob("*.py") for text in sentences(path)}
+    for key, text in catalogue("en").items():
+        pieces = COMPOSED.get(key, (anonymous(text),))
+        if key.startswith("said.") and not key.startswith("said.expect_"):
+            assert all(any(piece in each for each in told) for piece in pieces), key
+
+
+@pytest.mark.parametrize(
+    ("language", "english", "said"),
+    [
+        ("en", "an inspection is under way", "an inspection is under way"),
+        ("de", "an inspection is under way", "eine Prüfung läuft"),
+        ("es", "a calibration is under way: let it end, or call it off.",
+         "una calibración está en curso: espere a que termine o cancélela."),
+        ("de", ("Lot B-7 cannot begin: the PLC's number 9 is plum now, and no longer cherry; choose a recipe again. "
+         "No recipe is active: choose one by its number (1, 2)."),
+         ("Los B-7 kann nicht beginnen: die SPS-Nummer 9 ist jetzt plum und nicht mehr cherry; wählen Sie neu. "
+         "Kein Rezept ist aktiv: Wählen Sie eines (1, 2).")),
+        ("de", "No recipe is active: choose one by its number (1).", "Kein Rezept ist aktiv: Wählen Sie eines (1)."),
+        ("es", "The area at 3.0 mm of closing is at least 61.2 mm², over the limit of 45 mm².",
+         "El área a 3,0 mm de cierre es de al menos 61,2 mm², por encima del límite de 45 mm²."),
+        ("de", "the <arm> is away", '<span lang="en">the &lt;arm&gt; is away</span>'),
+        ("de", "", ""),
+    ],
+)  # fmt: skip
+def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
+    assert Wording(language).said(english) == said
+
+
+@pytest.mark.parametrize("language", ["de", "es"])
+def test_every_value_of_a_recipe_is_explained_in_every_language(language):
+    assert {key for key in catalogue(language) if key.startswith("recipe_field.")} == set(field_keys())
+    explained = {key for key in catalogue(language) if key.startswith("recipe_what.")}
+    assert explained == {key.replace("recipe_field", "recipe_what") for key in field_keys()} - {"recipe_what.general"}
+    made = groups(load_recipes()["strawberry"].model_dump(mode="json"))
+    for field in (field for group in made for field in group.fields):
+        assert "lang=" not in Wording(language).said(field.expected), field.path
 
 
 def test_no_text_that_a_page_uses_is_missing():

@@ -14,9 +14,11 @@ from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
 from station.records.finding import HOUR_MS
 from station.records.lots import end_lot, read_lots, start_lot
+from station.records.model import RecipeSnapshot
 from station.records.search import Query, find, find_page
 from station.records.writing import conclude, insert_trigger, publish
 
+FRUIT = st.sampled_from(["strawberry", "strawberry, revised", "raspberry", None])
 GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}
 LOTS = st.sampled_from(["A", "B", "C", "D", ""])
 HOURS = st.integers(0, 4)
@@ -35,13 +37,19 @@ QUERIES = st.builds(
     to_utc_ms=st.none() | st.integers(1, 5 * HOUR_MS),
     outcome=st.none() | st.sampled_from(["PASS", "FAIL", "NO_RESULT"]),
     reason=st.none() | st.sampled_from([Reason.EARLY_STOP, Reason.NO_CONTACT, Reason.ARM_FAULT]),
+    fruit=st.none() | st.sampled_from(["strawberry", "raspberry", "cherry"]),
 )
+
+
+def snapshot(fruit):
+    name, _, revised = (fruit or "").partition(",")
+    return RecipeSnapshot.of({"name": name, "plc_number": 1, "revised": revised}) if fruit else None
 
 
 def wanted(inspected, query):
     """By looking at every one."""
     found = []
-    for sequence, (lot, hour, end) in enumerate(inspected, start=1):
+    for sequence, (lot, hour, end, fruit) in enumerate(inspected, start=1):
         began_utc_ms, (outcome, reasons) = hour * HOUR_MS + sequence, end or (None, ())
         holds = (
             (query.lot is None or lot == query.lot)
@@ -50,12 +58,16 @@ def wanted(inspected, query):
             and (query.to_utc_ms is None or began_utc_ms < query.to_utc_ms)
             and (query.outcome is None or outcome == query.outcome)
             and (query.reason is None or query.reason in reasons)
+            and (query.fruit is None or (fruit or "").startswith(query.fruit))
         )
         found += [sequence] if holds else []
     return found[::-1]
 
 
-@given(inspected=st.lists(st.tuples(LOTS, HOURS, ENDS), max_size=40), queries=st.lists(QUERIES, min_size=1, max_size=8))
+@given(
+    inspected=st.lists(st.tuples(LOTS, HOURS, ENDS, FRUIT), max_size=40),
+    queries=st.lists(QUERIES, min_size=1, max_size=8),
+)
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, queries, trigger, passed):
     with tempfile.TemporaryDirectory() as place:
@@ -65,8 +77,8 @@ def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, 
         with engine.begin() as connection:
             for lot, grower in GROWERS.items():
                 start_lot(connection, lot, grower)
-            for sequence, (lot, hour, end) in enumerate(inspected, start=1):
-                began = replace(trigger, lot=lot, began_utc_ms=hour * HOUR_MS + sequence)
+            for sequence, (lot, hour, end, fruit) in enumerate(inspected, start=1):
+                began = replace(trigger, lot=lot, recipe=snapshot(fruit), began_utc_ms=hour * HOUR_MS + sequence)
                 insert_trigger(connection, sequence, began, "boot")
                 if end is not None:
                     record = replace(passed, outcome=end[0], reasons=end[1], curve=())

@@ -1,0 +1,77 @@
+"""The pages over TLS, with a certificate of their own."""
+
+import http.client
+import os
+import ssl
+import subprocess
+import sys
+import urllib.request
+from datetime import UTC, datetime, timedelta
+from ipaddress import IPv4Address
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+
+
+@pytest.fixture
+def certificate(tmp_path):
+    """Signed by itself, for 127.0.0.1; gives the settings that name it."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name, now = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "station")]), datetime.now(UTC)
+    made = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=1))
+        .not_valid_after(now + timedelta(days=1))
+        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(IPv4Address("127.0.0.1"))]), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    pem, plain = serialization.Encoding.PEM, serialization.NoEncryption()
+    (tmp_path / "station.crt").write_bytes(made.public_bytes(pem))
+    (tmp_path / "station.key").write_bytes(key.private_bytes(pem, serialization.PrivateFormat.PKCS8, plain))
+    return {
+        "STATION_HMI_TLS_ENABLED": "true",
+        "STATION_HMI_TLS_CERTIFICATE": str(tmp_path / "station.crt"),
+        "STATION_HMI_TLS_KEY": str(tmp_path / "station.key"),
+    }
+
+
+@pytest.mark.timeout(240)
+def test_a_person_is_logged_in_over_tls_with_a_cookie_for_nothing_else(people, panel, free_hmi, certificate):
+    address = free_hmi(people, **certificate)
+    trusting = ssl.create_default_context(cafile=certificate["STATION_HMI_TLS_CERTIFICATE"])
+    with urllib.request.urlopen(address, context=trusting, timeout=60) as answer:
+        assert answer.status == 200
+        assert int(answer.headers["strict-transport-security"].partition("=")[2]) >= 86_400
+    browser = panel(address, ignore_https_errors=True)
+    browser.log_in("Ana", "7391")
+    browser.until(".who", "Ana")
+    browser.page.locator("body:not(.stale)").wait_for()
+    browser.open("/people")
+    with browser.page.expect_navigation():
+        browser.page.locator("button[name=language][value=es]").click()
+    cookies = {each["name"]: each for each in browser.context.cookies()}
+    assert {"station_session", "station_language"} <= set(cookies)
+    for cookie in cookies.values():
+        assert (cookie["secure"], cookie["httpOnly"], cookie["sameSite"]) == (True, True, "Strict")
+    plain = http.client.HTTPConnection("127.0.0.1", int(address.rpartition(":")[2]), timeout=60)
+    plain.request("GET", "/")
+    with pytest.raises((http.client.HTTPException, ConnectionError)):
+        plain.getresponse()
+    plain.close()
+
+
+def test_a_certificate_that_is_none_is_said_in_one_sentence(tmp_path, certificate):
+    (tmp_path / "station.crt").write_text("no certificate")
+    variables = {**os.environ, **certificate, "STATION_HOME": str(tmp_path / "home")}
+    command = [sys.executable, "-m", "station", "hmi"]
+    ended = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert "hmi.tls" in ended.stderr
+    assert "name a certificate and its key in PEM" in ended.stderr
+    assert "Traceback" not in ended.stderr
