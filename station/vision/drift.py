@@ -30,6 +30,7 @@ _ITERATIONS = 5
 _LEAST_BACKGROUND = 0.05
 _WELL_KNOWN, _LEAST_KNOWN = 0.2, 0.05
 """The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""
+_KP = 3
 _LATER_SHARE = 0.02
 """What a place counts that the first guess took for contact, once the fit has reached it."""
 _TUKEY_WIDTH = 3.0
@@ -106,7 +107,7 @@ class DriftModel:
         weight = resized(background, self._grid).ravel()
         trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
         known = float(np.clip(weight.mean() / _WELL_KNOWN, _LEAST_KNOWN, 1))
-        ridge = self._ridge / known**2
+        ridge = self._ridge / known**_KP
         spread = 0.0
         coefficients = np.zeros((3, self._coarse.shape[2], 1), np.float32)
         fitted = np.zeros_like(samples)
