@@ -30,7 +30,7 @@ _SHARES = (0.2, 0.76)
 _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
 _SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
-_FINE_PX, _FINE_ON_SKIN = (3.0, 12.0), 0.07
+_FINE_PX, _FINE_ON_SKIN = (3.0, 12.0), 0.075
 _SPAN = 1.9
 _INNER_SHARE = 0.6
 _STEPS = 80
@@ -137,14 +137,14 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
 def _is_textured(moved: Movement, region: Mask) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
 
-    Without background the fit of the drift has bent the body's own slopes: what is finer than those is asked instead.
+    Without background the fit of the drift has bent the body's own slopes: what is finer than those is asked as well.
     """
-    if not _is_seen(moved.background):
-        return _fine_share(moved.change, region) > _FINE_ON_SKIN
-    smooth_from = _SMOOTH_SMALL
+    skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
     if float(moved.background.mean()) >= _WELL_KNOWN:
-        smooth_from = min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
-    return _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT) < smooth_from
+        return skin < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
+    if skin < _SMOOTH_SMALL or _is_seen(moved.background):
+        return skin < _SMOOTH_SMALL
+    return _fine_share(moved.change, region) > _FINE_ON_SKIN
 
 
 def _fine_share(change: FloatImage, region: Mask) -> float:
