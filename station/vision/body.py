@@ -30,6 +30,7 @@ _SHARES = (0.2, 0.76)
 _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
 _SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
+_FINE_PX, _FINE_ON_SKIN = (3.0, 12.0), 0.075
 _SPAN = 1.9
 _INNER_SHARE = 0.6
 _STEPS = 80
@@ -130,15 +131,28 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         region = _drawn(middle, radii, every, (region.shape[0], region.shape[1]))
         if not region.any():
             return None
+    return Body(region, middle, radii, level, spread, coherence, _is_textured(moved, region))
+
+
+def _is_textured(moved: Movement, region: Mask) -> bool:
+    """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
+
+    Without background the fit of the drift has bent the body's own slopes: what is finer than those is asked as well.
+    """
     skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
-    return Body(region, middle, radii, level, spread, coherence, skin < _smooth_from(moved, region))
+    if float(moved.background.mean()) >= _WELL_KNOWN:
+        return skin < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
+    if skin < _SMOOTH_SMALL or _is_seen(moved.background):
+        return skin < _SMOOTH_SMALL
+    return _fine_share(moved.change, region) > _FINE_ON_SKIN
 
 
-def _smooth_from(moved: Movement, region: Mask) -> float:
-    """The coherence from which on a body is smooth: the larger it is, the more places there are to disagree."""
-    if float(moved.background.mean()) < _WELL_KNOWN:
-        return _SMOOTH_SMALL
-    return min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
+def _fine_share(change: FloatImage, region: Mask) -> float:
+    """How much of a region's squared change is as fine as seeds are: the medians' ratio."""
+    elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in _FINE_PX)
+    inside = region > 0
+    fine, whole = (np.median(length_squared(one)[inside]) for one in (elements - slopes, elements))
+    return float(fine / max(whole, _LEAST_LEVEL))
 
 
 def evening(light: FloatImage) -> FloatImage:

@@ -28,7 +28,7 @@ _CELL_NOISE_LEVELS = 2.0
 _LEAST_SPREAD_LEVELS = 0.5
 _ITERATIONS = 5
 _LEAST_BACKGROUND = 0.05
-_WELL_KNOWN, _LEAST_KNOWN = 0.2, 0.05
+_WELL_KNOWN, _LEAST_KNOWN, _KNOWN_POWER = 0.2, 0.05, 3
 """The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""
 _LATER_SHARE = 0.02
 """What a place counts that the first guess took for contact, once the fit has reached it."""
@@ -106,7 +106,7 @@ class DriftModel:
         weight = resized(background, self._grid).ravel()
         trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
         known = float(np.clip(weight.mean() / _WELL_KNOWN, _LEAST_KNOWN, 1))
-        ridge = self._ridge / known**2
+        ridge = self._ridge / known**_KNOWN_POWER
         spread = 0.0
         coefficients = np.zeros((3, self._coarse.shape[2], 1), np.float32)
         fitted = np.zeros_like(samples)
