@@ -9,7 +9,7 @@ import math
 import random
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -269,7 +269,7 @@ def series_name(name: str, labels: Sequence[tuple[str, str]]) -> str:
     return name + "{" + ",".join(f'{key}="{value}"' for key, value in labels) + "}"
 
 
-def _sample(samples: Samples, at_s: float, families: Iterator[Metric]) -> None:
+def _sample(samples: Samples, at_s: float, families: Iterable[Metric]) -> None:
     ours = (("job", "station"), ("instance", STATION), ("station", STATION))
     for family in families:
         if family.name.startswith("process_"):

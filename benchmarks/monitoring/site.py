@@ -17,7 +17,6 @@ from typing import Any
 
 from station.calibration.model import Calibration, FieldMap, Noise, Verification, stamp
 from station.calibration.store import CalibrationStore
-from station.records.database import FILE_NAME
 
 from .prometheus import Prometheus, running, write_configuration
 
@@ -89,8 +88,7 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
     with ExitStack() as stack:
         prometheus = stack.enter_context(running(folder, configuration))
         began_s = time.time()
-        database = home / "records" / FILE_NAME
-        demo = _started(stack, [*station, "demo", *options], folder / "demo.log", environment, database)
+        demo = _started(stack, [*station, "demo", *options], folder / "demo.log", environment, f"127.0.0.1:{metrics}")
         at_home = {**environment, "STATION_HOME": str(home)}
         stack.enter_context(_process([*station, "outbox", "run"], folder / "outbox.log", at_home))
         until_s = time.monotonic() + _LIMIT_S
@@ -107,13 +105,13 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
 
 
 def _started(
-    stack: ExitStack, command: list[str], log: Path, environment: dict[str, str], database: Path
+    stack: ExitStack, command: list[str], log: Path, environment: dict[str, str], address: str
 ) -> subprocess.Popen[bytes]:
-    """The demonstration, once it has begun its records; a busy machine may need more than the time it has to start."""
+    """The demonstration, once it tells its addresses; a busy machine may take longer than the time it has to start."""
     for _ in range(_STARTS):
         demo = stack.enter_context(_process(command, log, environment))
         while demo.poll() is None:
-            if database.exists():
+            if address in log.read_text():
                 return demo
             time.sleep(0.2)
     raise RuntimeError(f"the demonstration does not start: {log.read_text()[-2000:]}")
