@@ -6,6 +6,7 @@ This is not Grafana: it shows that a panel has the right data, unit and legend, 
 import re
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ from .prometheus import Series
 _CELL_IN, _ROW_IN = 0.62, 0.36
 _COLORS = ("#1f4e79", "#c55a11", "#2e7d32", "#7b1fa2", "#00838f", "#8d6e63", "#b3261e", "#5d6d00", "#455a64", "#ad1457")
 _OUTCOMES = {"PASS": "#2e7d32", "FAIL": "#b3261e", "NO_RESULT": "#757575"}
+_STYLES = ("-", "--", ":")
 _LONGEST = 34
 _ROWS = 7
 _BEHIND = {"percentunit": " %", "s": " s", "lengthmm": " mm", "cps": " /s"}
@@ -107,46 +109,59 @@ def _lines(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]
     custom = panel.data["fieldConfig"]["defaults"].get("custom", {})
     stacked = custom.get("stacking", {}).get("mode") == "normal"
     found = [(_name(target, each), each) for target, answer in answers for each in _series(answer)]
-    if stacked and custom.get("drawStyle") != "bars":
-        grid = sorted({at for _, each in found for at in _times(each)})
-        heights = []
-        for _, each in found:
-            known = dict(zip(_times(each), (value for _, value in each.points), strict=True))
-            heights.append([known.get(at, 0.0) for at in grid])
-        axes.stackplot(
-            grid,
-            heights,
-            labels=[name for name, _ in found],
-            colors=[_color(n, i) for i, (n, _) in enumerate(found)],
-            alpha=0.7,
-        )
+    if stacked:
+        _stack(axes, found, bars=custom.get("drawStyle") == "bars")
     else:
-        low: dict[float, float] = {}
-        for number, (name, each) in enumerate(found):
-            times, values = _times(each), [value for _, value in each.points]
-            if stacked:
-                under = [low.get(at, 0.0) for at in times]
-                axes.bar(times, values, 0.02, bottom=under, label=name, color=_color(name, number))
-                low |= {at: a + b for at, a, b in zip(times, under, values, strict=True)}
-            else:
-                axes.plot(
-                    times,
-                    values,
-                    label=name,
-                    color=_color(name, number),
-                    linewidth=1.0,
-                    marker="." if len(times) < 3 else "",
-                )
+        kinds = list(dict.fromkeys(name.partition(", ")[0] for name, _ in found))
+        variants = list(dict.fromkeys(name.partition(", ")[2] for name, _ in found))
+        for name, each in found:
+            kind, _, variant = name.partition(", ")
+            color, style = _color(kind, kinds.index(kind)), _STYLES[variants.index(variant) % len(_STYLES)]
+            marker = "." if len(each.points) < 3 else ""
+            axes.plot(*_with_gaps(each), label=name, color=color, linestyle=style, linewidth=1.0, marker=marker)
     axes.set_ylim(bottom=0)
-    locator = AutoDateLocator(maxticks=6)
-    axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    _over_time(axes)
     unit = panel.data["fieldConfig"]["defaults"]["unit"]
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: value_of(unit, value)))
     axes.grid(color="#dddddd", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
     if found:
         axes.legend(loc="upper left", fontsize=5.5, ncols=2 if len(found) > 6 else 1, framealpha=0.7)
+
+
+def _stack(axes: Axes, found: list[tuple[str, Series]], *, bars: bool) -> None:
+    """Each series on top of those before; what is missing is nothing."""
+    grid = sorted({at for _, each in found for at in _times(each)})
+    under = [0.0] * len(grid)
+    width = min((b - a for a, b in pairwise(grid)), default=0.02)
+    for number, (name, each) in enumerate(found):
+        known = dict(zip(_times(each), (value for _, value in each.points), strict=True))
+        over = [low + known.get(at, 0.0) for at, low in zip(grid, under, strict=True)]
+        if bars:
+            heights = [high - low for high, low in zip(over, under, strict=True)]
+            axes.bar(grid, heights, 0.8 * width, under, label=name, color=_color(name, number))
+        else:
+            axes.fill_between(grid, under, over, label=name, color=_color(name, number), alpha=0.7, linewidth=0)
+        under = over
+
+
+def _with_gaps(series: Series) -> tuple[list[float], list[float]]:
+    """Times and values; a gap in them stays a gap, as in Grafana."""
+    times, values = _times(series), [value for _, value in series.points]
+    if len(times) < 3:
+        return times, values
+    step = min(b - a for a, b in pairwise(times))
+    places = [place for place, (a, b) in enumerate(pairwise(times), 1) if b - a > 1.5 * step]
+    for place in reversed(places):
+        times.insert(place, times[place])
+        values.insert(place, float("nan"))
+    return times, values
+
+
+def _over_time(axes: Axes) -> None:
+    locator = AutoDateLocator(maxticks=6)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
 
 
 def _number(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
@@ -195,9 +210,7 @@ def _heat(axes: Axes, _panel: Panel, answers: list[tuple[dict[str, Any], Answer]
     drawn = axes.pcolormesh(times, range(len(found)), cells, cmap="YlOrRd", shading="nearest")
     axes.set_yticks(range(len(found)), [each.labels["le"] for each in found], fontsize=5.5)
     axes.set_ylabel("≤ mm²")
-    locator = AutoDateLocator(maxticks=6)
-    axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    _over_time(axes)
     axes.figure.colorbar(drawn, ax=axes, label="fruit", pad=0.01)
 
 

@@ -9,7 +9,7 @@ import math
 import random
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -35,7 +35,9 @@ _UNJUDGED = (Reason.LOW_CONFIDENCE, Reason.NO_CONTACT, Reason.CUT_BY_BORDER)
 _DEADLINE_S = 12.0
 _AREAS_MM2 = {"strawberry": 45.0, "raspberry": 28.0, "blueberry": 20.0}
 _FRAMES = 30
-_LINKS = ("arm", "camera", "gripper", "plc", "plc_interface")
+LINKS = ("arm", "camera", "gripper", "plc", "plc_interface")
+PHASES = {"approaching": 0.9, "closing_to_onset": 1.6, "moving_measuring": 1.2, "judging": 0.01}
+"""Of the cycle, s; some of them."""
 _MOST_DRIFT, _HALFWAY = 25.0, 12.5
 
 
@@ -128,7 +130,7 @@ class Line:
 
     def _tell(self) -> None:
         metrics, hour = self._metrics, self._now_s % DAY_S / HOUR_S
-        for link in _LINKS:
+        for link in LINKS:
             metrics.heard(link)
         refused_by, drift = self._sensor(hour)
         alarms = []
@@ -180,8 +182,7 @@ class Line:
             outcome=outcome, reasons=reasons, late=self._random.random() < 0.0005, duration_ms=round(1000 * seconds),
             area_mm2=_AREAS_MM2[kind] * spread if judged else None, closing_mm=4.0 * spread if judged else None,
         )  # fmt: skip
-        phases = {"approaching": 0.9, "closing_to_onset": 1.6, "moving_measuring": 1.2, "retreating": 0.9}
-        self._metrics.inspection(kind, told, phases, _DEADLINE_S)
+        self._metrics.inspection(kind, told, PHASES, _DEADLINE_S)
         self._metrics.frame("good", _FRAMES)
         if self._random.random() < 0.01:
             self._metrics.frame("repeated")
@@ -269,7 +270,7 @@ def series_name(name: str, labels: Sequence[tuple[str, str]]) -> str:
     return name + "{" + ",".join(f'{key}="{value}"' for key, value in labels) + "}"
 
 
-def _sample(samples: Samples, at_s: float, families: Iterator[Metric]) -> None:
+def _sample(samples: Samples, at_s: float, families: Iterable[Metric]) -> None:
     ours = (("job", "station"), ("instance", STATION), ("station", STATION))
     for family in families:
         if family.name.startswith("process_"):

@@ -88,6 +88,10 @@ def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench, un
                 cell.twin.boards["camera"].clear()
             await cell.line.inspect()
             assert not any(caused(cell, alarm) for _, _, alarm, _ in LOOKED_AT)
+            text = cell.station.service._metrics.exposition()[0].decode()
+            assert 'station_references_refused_total{id="camera_led_dead"} 1.0' in text
+            assert 'station_references_refused_total{id="reference_bad"} 2.0' in text
+            assert 'station_inspection_deadline_seconds{fruit="blueberry"}' in text
 
     asyncio.run(scenario())
 

@@ -49,9 +49,9 @@ CYCLE = (
          "alarms.md#deadline-missed", (f"station_fruit:cycle_share:p95_15m{{{HERE}}}", "{{fruit}}")),
     prom("stacked", "Where a cycle's time goes", "s", "Mean seconds in each phase, per inspection.", "cycle-time.md",
          (mean_of(".+"), "{{phase}}")),
-    prom("stacked", "Arm", "s", "Mean seconds of its moves, per inspection: slower with the speed slider down.",
+    prom("stacked", "Arm", "s", "Mean seconds of its way to the fruit: longer with the speed slider down.",
          "alarms.md#arm-link-lost",
-         (mean_of("approaching|homing|retreating|placing_.*|releasing"), "{{phase}}"), width=12),
+         (mean_of("approaching"), "{{phase}}"), width=12),
     prom("stacked", "Gripper", "s", "Mean seconds of closing and settling, per inspection: slower where it is stiff.",
          "alarms.md#gripper-jam", (mean_of("closing_to_onset|moving.*|settling.*"), "{{phase}}"), width=12),
 )  # fmt: skip
