@@ -30,7 +30,7 @@ from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 
-IDLE_S, POLL_S, SEED = 20.0, 0.01, 2026
+IDLE_S, POLL_S, SEED, HOURS = 20.0, 0.01, 2026, 16
 KINDS = ("strawberry", "raspberry", "blueberry")
 CONSOLE_PORT, HOST = 49_341, "127.0.0.87"
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "sizing.md"
@@ -40,7 +40,7 @@ modbus: {{port: 5941}}
 metrics: {{port: 9841}}
 hmi: {{port: 8841}}
 records: {{accepted_share: 1.0}}
-arm: {{host: {HOST}}}
+arm: {{host: {HOST}, stale_after_s: 1.0, link_lost_after_s: 5.0}}
 gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}, answer_timeout_s: 1.0}}
 camera: {{oldest_s: 1.0, twin: {{port: 5942}}}}
 """
@@ -174,9 +174,9 @@ def written(phases: dict[str, Phase], sizes: tuple[float, float, float], count: 
     rows = [(NAMES.get(name, "pages"), (name,)) for name in ("service", "plc", "hmi", "twin")]
     seconds = busy.wall_s / count
     parts = [
-        f"{count} fruits on the twin, one after the other ({seconds:.1f} s each), and as many again with the PLC interface",
-        f" alone on one core; {os.cpu_count()} cores, load {os.getloadavg()[1]:.1f}. A client reads four registers every",
-        " 10 ms meanwhile. Shares are of one core.\n\n",
+        f"{count} fruits on the twin, one after the other ({seconds:.1f} s each), and as many again with the PLC",
+        f" interface alone on one core; {os.cpu_count()} cores, load {os.getloadavg()[1]:.1f}. A client reads four",
+        " registers every 10 ms meanwhile. Shares are of one core.\n\n",
         _head("process", "idle", "inspecting", "CPU a fruit, s", "memory, MB"),
     ]
     for words, names in (*rows, ("the station", tuple(ours))):
@@ -193,6 +193,11 @@ def written(phases: dict[str, Phase], sizes: tuple[float, float, float], count: 
     parts.append(f"| a fruit's record | {sizes[0]:.1f} kB |\n")
     parts.append(f"| a fruit's images, where they are kept | {sizes[1] / 1e3:.1f} MB |\n")
     parts.append(f"| an empty database | {sizes[2]:.2f} MB |\n")
+    daily, quota_mb = 60 * HOURS * 60 / seconds, Configuration().records.images_quota_mb
+    parts.append(
+        f"| records of a year, {HOURS} h a day, 300 days, at this pace | {300 * daily * sizes[0] / 1e6:.1f} GB |\n"
+    )
+    parts.append(f"| fruits whose images the quota of {quota_mb} MB holds | {1e3 * quota_mb / sizes[1]:.0f} |\n")
     return "".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""Image and compose file, checked as far as that can be done without a container engine: their form and their promises."""
+"""Image and compose file, as far as they can be checked without a container engine: their form and promises."""
 
 import re
 import subprocess
