@@ -46,6 +46,17 @@ def shipped(bill: dict[str, Any], hashes: dict[str, list[str]]) -> dict[str, Any
     return {**bill, "metadata": {"component": root}, "components": components, "dependencies": needs}
 
 
+def written(bill: dict[str, Any]) -> str:
+    """A bill as JSON, a line for each component: what changes with a lock is then seen."""
+    parts = []
+    for key, value in sorted(bill.items()):
+        text = json.dumps(value, sort_keys=True)
+        if isinstance(value, list):
+            text = "[\n " + ",\n ".join(json.dumps(each, sort_keys=True) for each in value) + "]"
+        parts.append(f"{json.dumps(key)}: {text}")
+    return "{" + ",\n".join(parts) + "}\n"
+
+
 def main() -> int:
     """Ask cyclonedx-py, and write the file."""
     if len(sys.argv) != 2:
@@ -56,7 +67,7 @@ def main() -> int:
     command = [tool, "environment", *options, sys.argv[1]]
     done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 (the developer's own words)
     bill = shipped(json.loads(done.stdout), locked((ROOT / LOCK).read_text(encoding="utf-8")))
-    BILL.write_text(json.dumps(bill, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    BILL.write_text(written(bill), encoding="utf-8")
     return 0
 
 
