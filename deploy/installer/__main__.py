@@ -22,6 +22,7 @@ from installer.words import Failed, Refused, say
 def main(arguments: list[str] | None = None) -> int:
     """Do what the arguments ask: exit code 0 when done, 2 when refused, 1 when it failed."""
     chosen = _parser().parse_args(arguments)
+    os.umask(0o022)  # the station's user has to read what root makes
     layout = Layout(chosen.root.resolve())
     services: Services = Systemd(layout) if layout.is_system else ScratchRoot(layout)
     try:

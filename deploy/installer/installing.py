@@ -2,12 +2,11 @@
 
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 from installer import configuration, copies, precautions, site_files
 from installer.health import LIMIT_S, ready, wait_until_well
-from installer.layout import Layout, point, target, write_note
+from installer.layout import Layout, point, read_note, target, write_note
 from installer.release import STAMP, Packages, Source, complete, make
 from installer.rolling_back import roll_back
 from installer.services import Services
@@ -42,7 +41,6 @@ class Installation:
         self._limit_s = limit_s
         self.release = layout.releases / source.name
         self._old = target(layout.current)
-        self._copy: Path | None = None
         self._was_ready = False
         self._changes: tuple[str, ...] = ()
 
@@ -93,14 +91,15 @@ class Installation:
             Refused: the configuration is not good for the new release; the old one runs on.
             Failed: a step did not come to its end. Of an upgrade, the old release is in use again.
         """
-        switched = False
+        under_way = False
         for step in self.steps():
             say(step.sentence)
-            switched |= self.is_upgrade and step.do == self._stop
+            under_way |= self.is_upgrade and step.do == self._stop
             try:
                 step.do()
+                under_way &= step.do != self._start
             except (Failed, OSError) as error:
-                if not switched:
+                if not under_way:
                     raise
                 say(str(error))
                 roll_back(self._layout, self._services, self._limit_s)
@@ -121,10 +120,14 @@ class Installation:
     def _make_copy(self) -> None:
         assert self._old is not None  # noqa: S101 (an upgrade has one)
         self._was_ready = self._services.running() and ready(self._layout, self._old)
-        self._copy = copies.make_copy(self._layout, self._old, BEFORE)
+        copy = copies.make_copy(self._layout, self._old, BEFORE)
         copies.thin_out(self._layout, BEFORE, _COPIES_KEPT)
-        note = {"from": self._old.name, "to": self.release.name, "copy": self._copy.name, "changes": self._changes}
-        write_note(self._layout.upgrade, note)
+        note = {"from": self._old.name, "to": self.release.name}
+        before = read_note(self._layout.upgrade)
+        # An interrupted upgrade has perhaps changed the file already: what it was before is in the earlier note.
+        known = before.get("configuration") if note.items() <= before.items() else None
+        text = self._layout.configuration.read_text(encoding="utf-8") if self._changes else known
+        write_note(self._layout.upgrade, {**note, "copy": copy.name, "configuration": text})
         point(self._layout.previous, self._old)
 
     def _stop(self) -> None:

@@ -46,12 +46,11 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     say(f"back to {old.name}")
     services.stop()
     copy = layout.backups / str(note["copy"])
-    if note["changes"]:
-        saved = copy / copies.SETTINGS / layout.configuration.name
+    if note["configuration"] is not None:
         shutil.copyfile(
             layout.configuration, layout.configuration.with_name(f"{layout.configuration.name}.rolled-back")
         )
-        shutil.copyfile(saved, layout.configuration)
+        layout.configuration.write_text(note["configuration"], encoding="utf-8")
         own(layout, layout.configuration, "root", "fruit-station")
         say(f"{layout.configuration} is as before the upgrade")
     if (copy / copies.RECORDS).is_dir() and copies.form(layout.home / copies.RECORDS) != copies.form(

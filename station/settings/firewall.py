@@ -45,7 +45,7 @@ delete table inet fruit_station
 table inet fruit_station {{
     chain inward {{
         type filter hook input priority filter; policy drop;
-        iif lo accept
+        iifname "lo" accept
         ct state established,related accept
         ct state invalid drop
         icmp type echo-request limit rate 10/second accept
@@ -57,7 +57,7 @@ table inet fruit_station {{
     }}
     chain outward {{
         type filter hook output priority filter; policy drop;
-        oif lo accept
+        oifname "lo" accept
         ct state established,related accept
         icmpv6 type {{ nd-neighbor-solicit, nd-neighbor-advert, nd-router-solicit, echo-request }} accept
         icmp type echo-request accept

@@ -108,8 +108,14 @@ def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
     tmp_path, installer, installation, releases, tree_of, monkeypatch
 ):
     # Both ask programs, which takes long; the test above has them asked.
-    monkeypatch.setattr(installer("configuration"), "try_with", lambda _layout, _release: ())
-    monkeypatch.setattr(installer("configuration"), "migrate", lambda _layout, _release: None)
+    def changes(layout, _release):
+        return ("old is new now",) if "# old" in layout.configuration.read_text() else ()
+
+    def migrate(layout, _release):
+        layout.configuration.write_text(layout.configuration.read_text().replace("# old", "# new"))
+
+    monkeypatch.setattr(installer("configuration"), "try_with", changes)
+    monkeypatch.setattr(installer("configuration"), "migrate", migrate)
     layouts, services = installer("layout"), installer("services").ScratchRoot
     shutil.copytree(releases, tmp_path / "old", symlinks=True)
 
@@ -120,6 +126,8 @@ def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
     first = begun(tmp_path / "old", "0.1.0")
     for step in first.steps()[:-1]:  # the last removes the releases that are made for what follows
         step.do()
+    first_layout = layouts.Layout(tmp_path / "old")
+    first_layout.configuration.write_text("# old\n")
     count = len(begun(tmp_path / "old", "0.2.0").steps())
     assert count > 8
     wanted = None
@@ -135,3 +143,7 @@ def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
         tree = {name: what for name, what in tree_of(folder).items() if not name.startswith(("opt/", "var/backups/"))}
         wanted = wanted or tree
         assert tree == wanted, f"after {done} steps"
+        assert layout.configuration.read_text() == "# new\n"
+        installer("rolling_back").roll_back(layout, services(layout))
+        assert layout.configuration.read_text() == "# old\n", f"after {done} steps, and back"
+        assert layouts.target(layout.current).name.startswith("0.1.0+")

@@ -1,0 +1,67 @@
+"""Copies of records, state and configuration, as the timer has them made."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+
+@pytest.fixture
+def installed(installer, tmp_path):
+    """A scratch root with this environment as its release."""
+    layout = installer("layout").Layout(tmp_path)
+    release = layout.releases / "0.1.0+test"
+    (release / "venv/bin").mkdir(parents=True)
+    (release / "venv/bin/station").write_text(f'#!/bin/sh\nexec {sys.executable} -m station "$@"\n')
+    (release / "venv/bin/station").chmod(0o755)
+    installer("layout").write_note(release / "release.json", {"version": "0.1.0"})
+    installer("layout").point(layout.current, release)
+    for folder in (layout.settings, layout.home, layout.backups):
+        folder.mkdir(parents=True)
+    layout.configuration.write_text("hmi: {port: 8443}\n")
+    (layout.home / "active_recipe.json").write_text("{}")
+    (layout.home / "run").mkdir()
+    return layout
+
+
+def backup(root, layout, *arguments):
+    command = [sys.executable, root / "deploy/backup", "--root", layout.root, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_all_that_cannot_be_made_again_is_copied_and_the_oldest_goes(root, installed, installer):
+    subprocess.run(
+        [installed.current / "venv/bin/station", "records", "continue-after", "41"],
+        env=installed.environment(), check=True, capture_output=True,
+    )  # fmt: skip
+    begin = "import asyncio,sys\nfrom pathlib import Path\nfrom station.records.records import Records\n"
+    begin += "from station.settings.records import RecordsSettings\nasync def go():\n"
+    begin += " records = Records(Path(sys.argv[1]), RecordsSettings(), 'boot')\n await records.reopen()\n"
+    begin += " await records.close()\nasyncio.run(go())\n"
+    subprocess.run([sys.executable, "-c", begin, installed.home / "records"], check=True, capture_output=True)
+    for _ in range(3):
+        done = backup(root, installed, "--keep", "2")
+        assert done.returncode == 0, done.stdout
+    copies = sorted(installed.backups.iterdir())
+    assert len(copies) == 2
+    newest = copies[-1]
+    assert (newest / "settings/station.yaml").read_text() == "hmi: {port: 8443}\n"
+    assert (newest / "state/active_recipe.json").exists()
+    assert not (newest / "state/run").exists()
+    assert json.loads((newest / "records/backup.json").read_text())["sequence"] == 41
+    assert installer("copies").form(newest / "records") == installer("copies").form(installed.home / "records") != ""
+
+
+def test_a_copy_that_failed_leaves_nothing_that_looks_like_one(root, installed):
+    (installed.home / "records").mkdir()
+    (installed.home / "records/records.sqlite3").write_text("this is no database")
+    done = backup(root, installed)
+    assert done.returncode == 1
+    assert "records" in done.stdout
+    assert "Traceback" not in done.stderr
+    assert not [path for path in installed.backups.iterdir() if not path.name.startswith(".")]
+
+
+def test_without_a_station_there_is_nothing_to_copy(root, tmp_path, installer):
+    assert backup(root, installer("layout").Layout(tmp_path)).returncode == 2

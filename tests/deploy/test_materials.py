@@ -1,0 +1,102 @@
+"""What ships: the bill of materials is of the lock, and no licence in it forbids what a packhouse does."""
+
+import importlib.metadata
+import importlib.util
+import json
+import re
+
+import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+RUNTIME_EXCEPTION = "GPL-3.0-with-GCC-exception"
+"""Of GCC's own runtime library, which wheels of numpy and scipy bring: it does not reach what is linked to it."""
+FORBIDDEN = re.compile(
+    r"(?<!L)(?<!LESSER )GPL|GENERAL PUBLIC|NON.?COMMERCIAL|BY-NC|PROPRIETARY|SSPL|BUSL", re.IGNORECASE
+)
+
+
+@pytest.fixture
+def sbom(root):
+    spec = importlib.util.spec_from_file_location("sbom", root / "deploy/sbom.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def bill(sbom):
+    return json.loads(sbom.BILL.read_text())
+
+
+@pytest.fixture
+def hashes(sbom, root):
+    return sbom.locked((root / sbom.LOCK).read_text())
+
+
+def names_of(licence: str) -> str:
+    """A licence without what it says of the lesser one and of GCC's runtime."""
+    for allowed in (
+        RUNTIME_EXCEPTION,
+        "Lesser General Public",
+        "Library General Public",
+        "Library or Lesser General Public",
+    ):
+        licence = re.sub(re.escape(allowed), "", licence, flags=re.IGNORECASE)
+    return licence
+
+
+def test_the_bill_is_of_the_lock(sbom, bill, hashes, root):
+    pins = {sbom.normal(pin["name"]): pin["version"] for pin in sbom.PIN.finditer((root / sbom.LOCK).read_text())}
+    billed = {sbom.normal(each["name"]): each["version"] for each in bill["components"]}
+    only_elsewhere = {name for name in pins.keys() - billed.keys() if not installed(name)}
+    assert len(billed) > 50
+    assert billed == {name: version for name, version in pins.items() if name not in only_elsewhere}, (
+        "renew: deploy/sbom.py"
+    )
+    for each in bill["components"]:
+        found = {one["content"] for one in each["externalReferences"][0]["hashes"]}
+        assert found == set(hashes[sbom.normal(each["name"])])
+        assert found
+
+
+def test_the_bill_is_cyclonedx(sbom):
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(sbom.BILL.read_text()) is None
+
+
+def test_every_licence_is_known_and_lets_a_packhouse_use_it(bill):
+    for each in bill["components"]:
+        licences = json.dumps(each.get("licenses", []))
+        assert each.get("licenses"), f"{each['name']} does not say its licence"
+        assert not FORBIDDEN.search(names_of(licences)), f"{each['name']}: {licences}"
+
+
+def test_the_packages_here_say_the_same(hashes):
+    for name in hashes:
+        if not installed(name):
+            continue
+        about = importlib.metadata.metadata(name)
+        classifiers = [each for each in about.get_all("Classifier") or [] if each.startswith("License ::")]
+        said = about.get("License-Expression") or "; ".join(classifiers) or (about.get("License") or "").split("\n")[0]
+        assert said, f"{name} does not say its licence"
+        assert not FORBIDDEN.search(names_of(said)), f"{name}: {said}"
+
+
+@pytest.mark.parametrize("licence", ["GPL-3.0-only", "AGPL-3.0", "CC-BY-NC-4.0", "GNU General Public License v3"])
+def test_what_is_forbidden_is_found(licence):
+    assert FORBIDDEN.search(names_of(licence))
+
+
+@pytest.mark.parametrize("licence", ["LGPL-3.0-or-later", "BSD-3-Clause AND GPL-3.0-with-GCC-exception", "MIT"])
+def test_what_is_allowed_is_not(licence):
+    assert not FORBIDDEN.search(names_of(licence))
+
+
+def installed(name: str) -> bool:
+    try:
+        importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
