@@ -110,7 +110,8 @@ class Page:
         """Every command of the project, in blocks and in sentences."""
         found = []
         for token in self.tokens:
-            if token.type == "fence" and token.info.split(" ")[0] in {"", "sh", "console"} and token.map:
+            drawn = "──" in token.content
+            if token.type == "fence" and token.info.split(" ")[0] in {"", "sh", "console"} and token.map and not drawn:
                 text = re.sub(r"\\\n", "  ", token.content)
                 for number, line in enumerate(text.splitlines(), token.map[0] + 2):
                     found += [Command(self, number, words, whole=True) for words in _words(line, token.info)]
@@ -140,8 +141,6 @@ def _words(line: str, info: str) -> list[tuple[str, ...]]:
         if not line.startswith("$ "):
             return []
         line = line[2:]
-    if "─" in line:  # a drawing
-        return []
     try:
         lexer = shlex.shlex(line.replace("$(", " ; "), posix=True, punctuation_chars=True)
         lexer.wordchars += ",=[]{}:@%^+…"
