@@ -32,7 +32,7 @@ MARKDOWN = MarkdownIt("commonmark").enable("table")
 HTML_LINK = re.compile(r"<(?:img|a)\s[^>]*?(?:src|href)=\"([^\"]+)\"")
 TOUCHED_MM = 0.3
 """Closing at which the gripper, which moves in counts, sees the first contact."""
-MOST_STEPS = 9
+MOST_STEPS = 7
 ASSIGNMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*$")
 
 
@@ -199,7 +199,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
         for number in range(fruit):
             drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
             closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
-            shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3))
+            shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3, references=3))
             press = _pressed(shown, recipe)
             verdict = judge(press, recipe)
             decided = verdict.areas[0]
