@@ -32,7 +32,7 @@ MARKDOWN = MarkdownIt("commonmark").enable("table")
 HTML_LINK = re.compile(r"<(?:img|a)\s[^>]*?(?:src|href)=\"([^\"]+)\"")
 TOUCHED_MM = 0.3
 """Closing at which the gripper, which moves in counts, sees the first contact."""
-MOST_STEPS = 9
+MOST_STEPS = 7
 ASSIGNMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*$")
 
 
@@ -110,7 +110,8 @@ class Page:
         """Every command of the project, in blocks and in sentences."""
         found = []
         for token in self.tokens:
-            if token.type == "fence" and token.info.split(" ")[0] in {"", "sh", "console"} and token.map:
+            drawn = "──" in token.content
+            if token.type == "fence" and token.info.split(" ")[0] in {"", "sh", "console"} and token.map and not drawn:
                 text = re.sub(r"\\\n", "  ", token.content)
                 for number, line in enumerate(text.splitlines(), token.map[0] + 2):
                     found += [Command(self, number, words, whole=True) for words in _words(line, token.info)]
@@ -140,8 +141,6 @@ def _words(line: str, info: str) -> list[tuple[str, ...]]:
         if not line.startswith("$ "):
             return []
         line = line[2:]
-    if "─" in line:  # a drawing
-        return []
     try:
         lexer = shlex.shlex(line.replace("$(", " ; "), posix=True, punctuation_chars=True)
         lexer.wordchars += ",=[]{}:@%^+…"
@@ -200,7 +199,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
         for number in range(fruit):
             drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
             closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
-            shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3))
+            shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3, references=3))
             press = _pressed(shown, recipe)
             verdict = judge(press, recipe)
             decided = verdict.areas[0]

@@ -1,4 +1,4 @@
-"""The commands that the documents name exist as they stand there, and those in console blocks answer what is written."""
+"""The commands that the documents name exist as they stand there, and console blocks answer what is written."""
 
 import contextlib
 import functools
@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -31,32 +32,36 @@ def documents_with_console():
     return sorted(names - BY_HAND)
 
 
+def check_values(command, context, values, *, whole):
+    """Raise where a value is missing, or no choice or number of its parameter."""
+    given = {name: value for name, value in values.items() if isinstance(value, str | list | tuple) and value}
+    for parameter in command.params:
+        value = given.get(str(parameter.name), ())
+        if not value and parameter.required and whole and not values.get("help"):
+            raise click.UsageError(f"{parameter.human_readable_name} is missing")
+        convert: Any = parameter.type.convert
+        if isinstance(parameter.type, click.Choice | click.types.IntParamType | click.types.FloatParamType):
+            for each in [value] if isinstance(value, str) else value:
+                if isinstance(each, str) and not PLACEHOLDER.match(each):
+                    convert(each, parameter, context)
+
+
 def station_problem(command, words, *, whole):
     """What is wrong with a command line, without carrying it out; None for nothing."""
     context = click.Context(command, info_name=command.name)
     try:
         values, rest, _ = command.make_parser(context).parse_args(list(words))
-        given = {name: value for name, value in values.items() if isinstance(value, str | list | tuple) and value}
-        for parameter in command.params:
-            value = given.get(str(parameter.name))
-            if value is None and parameter.required and whole and not values.get("help"):
-                return f"{parameter.human_readable_name} is missing"
-            if isinstance(parameter.type, click.Choice | click.types.IntParamType | click.types.FloatParamType):
-                for each in [value] if isinstance(value, str) else value or ():
-                    if isinstance(each, str) and not PLACEHOLDER.match(each):
-                        parameter.type.convert(each, parameter, context)
-    except click.BadOptionUsage as error:
-        return error.format_message() if whole else None
+        check_values(command, context, values, whole=whole)
     except click.UsageError as error:
-        return error.format_message()
-    if isinstance(command, click.Group):
-        if rest:
-            inner = command.get_command(context, rest[0])
-            return f"no command {rest[0]}" if inner is None else station_problem(inner, rest[1:], whole=whole)
-        if whole and not command.invoke_without_command and not values.get("help"):
-            return "a subcommand is missing"
-        return None
-    return f"too many words: {rest}" if rest else None
+        cut_short = isinstance(error, click.BadOptionUsage) and not whole
+        return None if cut_short else error.format_message()
+    if not isinstance(command, click.Group):
+        return f"too many words: {rest}" if rest else None
+    if rest:
+        inner = command.get_command(context, rest[0])
+        return f"no command {rest[0]}" if inner is None else station_problem(inner, rest[1:], whole=whole)
+    wanting = whole and not command.invoke_without_command and not values.get("help")
+    return "a subcommand is missing" if wanting else None
 
 
 @functools.cache
@@ -110,7 +115,7 @@ def test_a_command_that_does_not_exist_is_found(line, told, root):
 
 
 def carried_out(command, folder, monkeypatch):
-    """Exit code and output of a line of shell; a plain command of the station's runs in this process, which is faster."""
+    """Exit code and output of a line of shell; a plain command of the station's runs in this process: it is faster."""
     words = shlex.split(command, comments=True)
     if words[:2] == ["./run", "station"]:
         words = words[1:]
@@ -146,6 +151,7 @@ def missing_lines(expected, output):
     return missing
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", documents_with_console())
 def test_what_a_document_says_a_command_answers_it_answers(name, pages, home, tmp_path, monkeypatch, root):
     folder = tmp_path / "work"

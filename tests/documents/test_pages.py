@@ -1,0 +1,55 @@
+"""The pages that are made to be printed come out as said, by a real browser."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+
+STYLE = Path(__file__).with_name("print.css")
+PAGE = re.compile(rb"/Type\s*/Page\b")
+
+
+@pytest.fixture
+def printed(chromium, pages, tmp_path):
+    """Prints a document on A4 and gives the number of its pages."""
+
+    def make(name):
+        page = pages[name]
+        body = MarkdownIt("commonmark", {"html": True}).enable("table").render(page.path.read_text("utf-8"))
+        html, pdf = tmp_path / "page.html", tmp_path / "page.pdf"
+        base = f'<base href="{page.path.parent.as_uri()}/">'
+        html.write_text(f"<!doctype html><meta charset=utf-8>{base}<style>{STYLE.read_text()}</style>{body}", "utf-8")
+        command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
+        command += [f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={pdf}", html.as_uri()]
+        subprocess.run(command, check=True, capture_output=True, timeout=120)
+        return len(PAGE.findall(pdf.read_bytes()))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [("operator.md", 2), ("operator.de.md", 2), ("operator.es.md", 2), ("acceptance-test.md", 3)]
+)
+def test_a_document_to_print_has_its_pages(printed, name, number):
+    assert 1 < printed(f"docs/{name}") <= number
+
+
+def test_the_operators_guide_shows_screens(pages):
+    shown = {target for _, target in pages["docs/operator.md"].links if target.endswith(".png")}
+    assert len(shown) >= 3
+
+
+@pytest.mark.parametrize(
+    ("name", "language"), [("operator.md", "en"), ("operator.de.md", "de"), ("operator.es.md", "es")]
+)
+def test_what_the_operators_guide_calls_a_button_is_written_on_the_panel(pages, root, name, language):
+    files = (root / "hmi" / "words" / language).glob("*.json")
+    words = {text for file in files for text in json.loads(file.read_text("utf-8")).values()}
+    beginnings = {text.partition("{")[0] for text in words if "{" in text}
+    named = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", pages[f"docs/{name}"].path.read_text("utf-8")))
+    assert len(named) > 25
+    unknown = {each for each in named if each.rstrip("…") not in beginnings and not {each, each + "."} & words}
+    assert unknown == set()
