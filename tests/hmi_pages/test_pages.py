@@ -171,6 +171,9 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
     page = person.go("/history?fruit=strawberry")
     page.get_by_text("Tables and reports").click()
     page.get_by_role("button", name="CSV").click()
+    expect(page.get_by_role("link", name="Save inspections.csv")).to_be_visible()
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate(OVERFLOW) == 0
     with page.expect_download() as download:
         page.get_by_role("link", name="Save inspections.csv").click()
     lines = download.value.path().read_text().splitlines()
