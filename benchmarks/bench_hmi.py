@@ -180,6 +180,8 @@ def compare(running: Demo, browser: Browser, seconds: float) -> list[tuple[dict[
 
 def written(load: Load, alone: tuple[dict[str, float], Figures], looked_at: tuple[dict[str, float], Figures]) -> str:
     """The document."""
+    cores = os.cpu_count() or 1
+    more = sum(looked_at[0][name] - alone[0][name] for name in alone[0]) / cores
     latencies = [
         f"| PLC's latency at a 10 ms scan, {name}, µs | {getattr(alone[1], key):,.0f} "
         f"| {getattr(looked_at[1], key):,.0f} |"
@@ -195,7 +197,7 @@ def written(load: Load, alone: tuple[dict[str, float], Figures], looked_at: tupl
     )
     under = (
         f"Medians of {ROUNDS} rounds, in turn; FastAPI {version('fastapi')}, uvicorn {version('uvicorn')}, Python "
-        f"{sys.version.split()[0]}, {os.cpu_count()} cores that twin, station, line, browsers and other work share."
+        f"{sys.version.split()[0]}, {cores} cores that twin, station, line, browsers and other work share."
     )
     lines = [
         "# What the operators' pages cost",
@@ -206,8 +208,7 @@ def written(load: Load, alone: tuple[dict[str, float], Figures], looked_at: tupl
         "|---|---|---|",
         f"| the pages' process, % of a core | {alone[0]['hmi']:.1f} | {looked_at[0]['hmi']:.1f} |",
         f"| the station's process, % of a core | {alone[0]['service']:.1f} | {looked_at[0]['service']:.1f} |",
-        f"| both, more than with nobody looking, % of {os.cpu_count()} cores | | "
-        f"{sum(looked_at[0][name] - alone[0][name] for name in alone[0]) / (os.cpu_count() or 1):.1f} |",
+        f"| what looking costs, of both, % of {cores} cores | | {more:.1f} |",
         *latencies,
         "",
         first,

@@ -24,9 +24,9 @@ from hmi.api_model import (
 )
 from hmi.roles import Right
 from station.channel.messages import RefusedError
+from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import GetHealth, Health
 from station.channel.panel_queries import (
-    Actor,
     EndLot,
     FindInspections,
     GetInspection,

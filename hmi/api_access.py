@@ -9,7 +9,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from hmi.access import caller_of, genuine, hmi_of
 from hmi.api_tokens import ApiTokens
 from hmi.roles import RIGHTS, Right, Role
-from station.channel.panel_queries import Actor
+from station.channel.panel import Actor
 
 LONGEST_TOKEN = 200
 _bearer = HTTPBearer(

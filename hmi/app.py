@@ -16,7 +16,7 @@ from starlette.routing import Route
 from hmi.access import wording_of
 from hmi.assets import Assets
 from hmi.context import Hmi
-from hmi.gateway import Gateway, person
+from hmi.gateway import Gateway, actor_of
 from hmi.guard import Guard
 from hmi.live import Live
 from hmi.navigation import modules, parts
@@ -104,7 +104,7 @@ async def _sweep(hmi: Hmi) -> None:
     while True:
         await asyncio.sleep(_SWEEP_S)
         for caller in hmi.sessions.sweep():
-            await hmi.gateway.note(PersonNoted(person=person(caller.name, caller.role), what="idle"))
+            await hmi.gateway.note(PersonNoted(person=actor_of(caller), what="idle"))
 
 
 async def _problem(request: Request, error: Exception) -> Response:

@@ -6,10 +6,12 @@ import logging
 import time
 from typing import Self, TypeVar
 
+from hmi.sessions import Caller
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
 from station.channel.messages import ChannelError, DeadlineError, Message, RefusedError
-from station.channel.panel_live import AskFruit, AskPanel, AskRecent, Fruit, PanelState, Person, PersonNoted, Recent
+from station.channel.panel import Actor
+from station.channel.panel_live import AskFruit, AskPanel, AskRecent, Fruit, PanelState, PersonNoted, Recent
 from station.errors import StationError
 
 ReplyT = TypeVar("ReplyT", bound=Message)
@@ -121,11 +123,10 @@ class Gateway:
         return None
 
 
-def person(name: str, role: str) -> Person:
-    """Who gives an order.
+def actor_of(caller: Caller) -> Actor:
+    """Who asks, for the audit trail.
 
     Args:
-        name: as logged in.
-        role: theirs.
+        caller: as logged in, or nobody.
     """
-    return Person(who=name or "panel", role=role)
+    return Actor(who=caller.name or "panel", role=caller.role)

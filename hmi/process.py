@@ -1,39 +1,23 @@
 """The HMI as a process: pages served until told to end."""
 
 import asyncio
-import contextlib
-import errno
 import logging
 import signal
-import socket
 import ssl
-from collections.abc import Iterator
 
 import uvicorn
 
 from hmi.app import make_app, make_context
-from station.errors import BadInputError, StationError
+from station.errors import BadInputError
 from station.settings.configuration import Configuration
 from station.settings.hmi import HmiSettings, address_of
 from station.supervision.notify import feed_watchdog, notify
+from station.supervision.serving import CLOSE_S, AddressError, Server, listen
 
 START_S = 30.0
-CLOSE_S = 1.0
 LOOPBACK = ("127.", "::1", "localhost")
 
 log = logging.getLogger(__name__)
-
-
-class AddressError(StationError):
-    """The pages' address cannot be listened on."""
-
-
-class _Server(uvicorn.Server):
-    """A server that leaves the process's signals to `serve`."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        yield
 
 
 async def serve(site: Configuration) -> None:
@@ -49,8 +33,8 @@ async def serve(site: Configuration) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     hmi = make_context(site)
-    listener = _listen(site.hmi)
-    server = _Server(_config(site.hmi, make_app(hmi)))
+    listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages")
+    server = Server(_config(site.hmi, make_app(hmi)))
     serving = asyncio.create_task(server.serve(sockets=[listener]), name="pages")
     feeding: asyncio.Task[None] | None = None
     try:
@@ -100,27 +84,3 @@ def _config(settings: HmiSettings, app: object) -> uvicorn.Config:
     if config.ssl is not None:
         config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
     return config
-
-
-def _listen(settings: HmiSettings) -> socket.socket:
-    """A listening socket, or one clear sentence."""
-    host, port = settings.host, settings.port
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listener = socket.socket(family, kind, protocol)
-    except OSError as error:
-        raise AddressError(f"hmi.host {host!r}: {error.strerror}; set an address of this machine") from error
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(64)
-        listener.settimeout(0)
-    except OSError as error:
-        listener.close()
-        why = {
-            errno.EADDRINUSE: "another program listens there; stop it, or set another hmi.port",
-            errno.EADDRNOTAVAIL: "that is no address of this machine; set another hmi.host",
-            errno.EACCES: "this user may not listen on so low a port; set hmi.port to 1024 or more",
-        }.get(error.errno or 0, f"{error.strerror}; set another hmi.host or hmi.port")
-        raise AddressError(f"the pages cannot be served on {host}:{port}: {why}") from error
-    return listener

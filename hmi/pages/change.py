@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from starlette.responses import Response
 
 from hmi.access import HmiNow, WordingNow, orders
-from hmi.gateway import Gateway, person
+from hmi.gateway import Gateway, actor_of
 from hmi.live import Part
 from hmi.navigation import Entry
 from hmi.page import go_to, show
@@ -36,7 +36,11 @@ class Change(NamedTuple):
 
 def _order(gateway: Gateway) -> object:
     state = gateway.state
-    return None if state is None else (state.orders, state.ready, state.why_not_ready, state.recipe, state.busy)
+    return (
+        None
+        if state is None
+        else (state.orders, state.ready, state.why_not_ready, state.check_due, state.recipe, state.busy)
+    )
 
 
 def _order_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
@@ -86,7 +90,7 @@ async def carry_out(
     number: Annotated[int, Form(ge=1, le=65_535)],
 ) -> Response:
     """Change the fruit, by the way that the PLC's command takes."""
-    request = PanelOrder(person=person(caller.name, caller.role), order=OrderName.CHOOSE_RECIPE, argument=str(number))
+    request = PanelOrder(person=actor_of(caller), order=OrderName.CHOOSE_RECIPE, argument=str(number))
     await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
     return go_to("/change/progress")
 

@@ -10,13 +10,14 @@ from starlette.responses import Response
 
 from hmi.access import GenuineCaller, HmiNow, caller_of
 from hmi.context import Hmi
+from hmi.gateway import actor_of
 from hmi.limit_chart import Curve, Limit, area_chart, spark
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.sessions import Caller
+from station.channel.panel import Actor
 from station.channel.panel_queries import (
-    Actor,
     AuditRows,
     FindInspections,
     GetImage,
@@ -106,6 +107,7 @@ async def search(
         found=found,
         below=below,
         recipes=recipes.rows,
+        titles={row.name: row.title for row in recipes.rows},
         reasons=tuple(Reason),
         spark=spark,
         may_export=bool(caller_of(request).name),
@@ -269,4 +271,4 @@ def _utc_ms(text: str) -> int | None:
 def _actor(caller: Caller) -> Actor:
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role="operator")
-    return Actor(who=caller.name, role=caller.role)
+    return actor_of(caller)

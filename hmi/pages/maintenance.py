@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from hmi.access import HmiNow, WordingNow, orders
 from hmi.context import Hmi
-from hmi.gateway import person
+from hmi.gateway import actor_of
 from hmi.limit_chart import histogram
 from hmi.navigation import Entry
 from hmi.page import go_to, show
@@ -43,7 +43,7 @@ from station.channel.panel_maintenance_queries import (
     Registers,
     SetLeds,
 )
-from station.channel.panel_queries import Actor, Picture
+from station.channel.panel_queries import Picture
 
 router = APIRouter(prefix="/maintenance")
 ENTRY = Entry("maintenance", "/maintenance")
@@ -88,7 +88,7 @@ async def hand(
 @router.post("/mode")
 async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
     """Set manual mode, in which no fruit is taken, or production again."""
-    asked = PanelOrder(person=person(caller.name, caller.role), order=OrderName.SET_MODE, argument=mode)
+    asked = PanelOrder(person=actor_of(caller), order=OrderName.SET_MODE, argument=mode)
     shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
     until_s = time.monotonic() + MODE_S
     while shown.state == "executing" and time.monotonic() < until_s:
@@ -110,7 +110,7 @@ async def jog(
     """Move the fingers, or stop them; the page says where they are then, or why they do not move."""
     try:
         width = float(width_mm.replace(",", ".")) if to == "width" else None
-        asked = JogGripper(to=to, width_mm=width, actor=_actor(caller))
+        asked = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
     except ValueError:
         raise Problem(400, "problem.bad_form") from None
     jogged = await hmi.gateway.ask(asked, Jogged, deadline_s=MOVE_DEADLINE_S)
@@ -120,7 +120,7 @@ async def jog(
 @router.post("/leds")
 async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
-    asked = SetLeds(red=red, green=green, blue=blue, actor=_actor(caller))
+    asked = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
     await hmi.gateway.ask(asked, Lit, deadline_s=DEADLINE_S)
     return go_to("/maintenance/hand?lit=yes")
 
@@ -184,7 +184,7 @@ async def begin(
     if len(parsed) > 6 or not all(parsed):
         raise Problem(400, "problem.bad_form")
     wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
-    asked = BeginBallRun(kind=kind, places=wanted, actor=_actor(caller))
+    asked = BeginBallRun(kind=kind, places=wanted, actor=actor_of(caller))
     await hmi.gateway.ask(asked, BallRunTold, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
@@ -192,14 +192,14 @@ async def begin(
 @router.post("/sensor/go-on")
 async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
     """The ball lies there."""
-    await hmi.gateway.ask(GoOnBallRun(actor=_actor(caller)), BallRunTold, deadline_s=DEADLINE_S)
+    await hmi.gateway.ask(GoOnBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/end")
 async def end(hmi: HmiNow, caller: Maintainer) -> Response:
     """Call the run off."""
-    await hmi.gateway.ask(EndBallRun(actor=_actor(caller)), BallRunTold, deadline_s=MOVE_DEADLINE_S)
+    await hmi.gateway.ask(EndBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=MOVE_DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
@@ -259,7 +259,3 @@ async def _part(
 
 def _mm(text: str) -> float:
     return float(text.replace(",", "."))
-
-
-def _actor(caller: Caller) -> Actor:
-    return Actor(who=caller.name, role=caller.role)

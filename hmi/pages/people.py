@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from hmi.access import GenuineCaller, HmiNow, orders
 from hmi.context import Hmi
-from hmi.gateway import person
+from hmi.gateway import actor_of
 from hmi.navigation import Entry
 from hmi.page import give_session, go_to, show
 from hmi.people_file import PeopleError, least_digits
@@ -171,4 +171,4 @@ def _address(request: Request) -> str:
 
 
 async def _note(hmi: Hmi, caller: Caller, what: str, subject: str = "") -> None:
-    await hmi.gateway.note(PersonNoted(person=person(caller.name, caller.role), what=what, subject=subject))  # type: ignore[arg-type]
+    await hmi.gateway.note(PersonNoted(person=actor_of(caller), what=what, subject=subject))  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from hmi.access import HmiNow, WordingNow, caller_of, orders
 from hmi.context import Hmi
+from hmi.gateway import actor_of
 from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.navigation import Entry
 from hmi.page import go_to, show
@@ -18,7 +19,7 @@ from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.words import Wording
 from station.channel.messages import RefusedError
-from station.channel.panel_queries import Actor, JobTold
+from station.channel.panel_queries import JobTold
 from station.channel.panel_recipe_queries import (
     LARGEST_TEXT,
     ApproveRecipe,
@@ -116,7 +117,7 @@ async def save(
     if not changes:
         return await _form(request, hmi, wording, told, typed, wording.text("recipes.nothing_changed"), reason)
     try:
-        asked = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=_actor(caller))
+        asked = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
         await hmi.gateway.ask(asked, RecipeRow, deadline_s=DEADLINE_S)
     except RefusedError as error:
         return await _form(request, hmi, wording, told, typed, str(error), reason)
@@ -126,7 +127,7 @@ async def save(
 @router.post("/{name}/submit")
 async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Response:
     """Record the file, as somebody edited it, as a draft."""
-    return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=_actor(caller)))
+    return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/approve")
@@ -134,7 +135,7 @@ async def approve(
     hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
 ) -> Response:
     """Put a draft in force."""
-    return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+    return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/reject")
@@ -142,7 +143,7 @@ async def reject(
     hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
 ) -> Response:
     """Reject a draft."""
-    return await _order(hmi, RejectRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+    return await _order(hmi, RejectRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/revert")
@@ -154,7 +155,7 @@ async def revert(
     revision: Annotated[int | None, Form(ge=1, le=2**31)] = None,
 ) -> Response:
     """Put a revision's text back into the file."""
-    return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=_actor(caller)))
+    return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.get("/{name}/history")
@@ -194,7 +195,7 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
         raise Problem(400, "problem.bad_form") from None
     if not text or len(text) > LARGEST_TEXT:
         raise Problem(400, "problem.bad_form")
-    actor = _actor(caller)
+    actor = actor_of(caller)
     row = await hmi.gateway.ask(ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
     if row.file_state == "draft":
         await hmi.gateway.ask(SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
@@ -206,7 +207,9 @@ async def whatif(
     hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
 ) -> Response:
     """Judge the last fruit again by the file as it is."""
-    job = await hmi.gateway.ask(StartWhatIf(name=name, last=last, actor=_actor(caller)), JobTold, deadline_s=DEADLINE_S)
+    job = await hmi.gateway.ask(
+        StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobTold, deadline_s=DEADLINE_S
+    )
     return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
 
 
@@ -227,7 +230,7 @@ async def _form(
     decimal = wording.number(0.5, 1)[1]
     made = groups(told.values)
     texts = {field.path: typed.get(field.path, shown(field, decimal)) for group in made for field in group.fields}
-    caller = caller_of(request)
+    caller, known = caller_of(request), await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,
         "recipe_edit.html.j2",
@@ -240,7 +243,8 @@ async def _form(
         reason=reason,
         drawn=await _drawn(hmi, told.row.name, told.values),
         title=lambda each: _title(wording, each.key, each.title),
-        editable=caller.may(Right.EDIT_RECIPES),
+        told=known,
+        editable=known.editable and caller.may(Right.EDIT_RECIPES),
         tab="edit",
     )
 
@@ -311,7 +315,3 @@ async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, An
 
 def _kind(curve: PastCurve) -> str:
     return {"PASS": "pass", "FAIL": "fail"}.get(curve.outcome, "none")
-
-
-def _actor(caller: Caller) -> Actor:
-    return Actor(who=caller.name, role=caller.role)

@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from hmi import charts
 from hmi.access import HmiNow, WordingNow, orders
-from hmi.gateway import Gateway, person
+from hmi.gateway import Gateway, actor_of
 from hmi.live import Part
 from hmi.navigation import Entry
 from hmi.page import go_to, show
@@ -158,7 +158,7 @@ async def order(
     """Start, stop, call off, recover, or begin and end a lot; the page shows what comes of it."""
     if order not in _ORDERS:
         raise Problem(400, "problem.bad_form")
-    request = PanelOrder(person=person(caller.name, caller.role), order=order, argument=argument, grower=grower)
+    request = PanelOrder(person=actor_of(caller), order=order, argument=argument, grower=grower)
     await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
     return go_to("/")
 

@@ -106,7 +106,7 @@
           ? line.dataset.never
           : line.dataset.text
               .replace("{age}", Math.floor(old / 1000))
-              .replace("{clock}", new Date(Date.now() - old).toLocaleTimeString(document.documentElement.lang));
+              .replace("{clock}", new Date(Date.now() - old).toLocaleTimeString(document.documentElement.lang, { hourCycle: "h23" }));
       if (line.textContent !== text) {
         line.textContent = text;
       }

@@ -9,6 +9,13 @@ from station.channel.messages import Message
 RecoveryName = Literal["protective-stop", "power", "program"]
 
 
+class Actor(Message):
+    """Who asks, as the pages have made sure of it; for the audit trail."""
+
+    who: str = Field(min_length=1, max_length=64)
+    role: str = Field(min_length=1, max_length=64)
+
+
 class Recover(Message):
     """Bring the arm back after a stop: a person has looked at the cell. Answered with `CommandDone`.
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from station.channel.messages import Message
-from station.channel.panel import ListedAlarm, RecoveryName
+from station.channel.panel import Actor, ListedAlarm, RecoveryName
 from station.vocabulary import OutcomeName, PackmlState
 
 LONGEST_LOT = 32
@@ -37,13 +37,6 @@ class OrderName(StrEnum):
     """What comes next belongs to another lot, and gets the recipe that is then in force."""
 
 
-class Person(Message):
-    """Who stands at the panel."""
-
-    who: str = Field(min_length=1, max_length=64)
-    role: str = Field(min_length=1, max_length=64)
-
-
 class PanelOrder(Message):
     """Carry out an order of a person's. Answered with `OrderShown`.
 
@@ -52,7 +45,7 @@ class PanelOrder(Message):
     """
 
     asked: ClassVar[str] = "to carry out an order"
-    person: Person
+    person: Actor
     order: OrderName
     argument: str = Field(default="", max_length=64)
     grower: str = Field(default="", max_length=64)
@@ -78,7 +71,7 @@ class PersonNoted(Message):
     """Something happened with a person's right to be here; the trail is to have it. Answered with `line.Noted`."""
 
     asked: ClassVar[str] = "to note who is at the panel"
-    person: Person
+    person: Actor
     what: Literal[
         "logged_in", "log_in_refused", "logged_out", "idle", "added", "changed", "removed", "cleaning", "unlocked"
     ]
@@ -173,6 +166,8 @@ class PanelState(Message):
     plc_connected: bool
     plc_alive: bool
     line_trouble: str
+    check_due: str
+    """Why the check with the ball comes before any fruit, where it is demanded; empty where it does not."""
     alarms: tuple[ListedAlarm, ...]
     """Those that are not normal, most urgent first; those that are shelved are among them."""
     devices: tuple[DeviceShown, ...]

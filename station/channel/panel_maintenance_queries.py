@@ -6,7 +6,8 @@ from pydantic import ConfigDict, Field
 
 from station.channel.line import RegisterTold
 from station.channel.messages import Message
-from station.channel.panel_queries import Actor, Picture
+from station.channel.panel import Actor
+from station.channel.panel_queries import Picture
 
 MOST_LINES = 500
 HISTOGRAM_BINS = 32

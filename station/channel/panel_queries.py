@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field
 
 from station.channel.line import Outcome
 from station.channel.messages import Message
+from station.channel.panel import Actor
 from station.vocabulary import OutcomeName, Reason
 
 LARGEST_PAGE = 100
@@ -21,13 +22,6 @@ Text = Annotated[str, Field(max_length=64)]
 Why = Annotated[str, Field(min_length=1, max_length=1000)]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
-
-
-class Actor(Message):
-    """Who asks, as the pages have made sure of it; for the audit trail."""
-
-    who: str = Field(min_length=1, max_length=64)
-    role: str = Field(min_length=1, max_length=64)
 
 
 class Search(Message):

@@ -5,7 +5,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from station.channel.messages import Message
-from station.channel.panel_queries import Actor, Text, Why
+from station.channel.panel import Actor
+from station.channel.panel_queries import Text, Why
 
 LARGEST_TEXT = 100_000
 """Letters of a recipe's file."""
@@ -51,6 +52,10 @@ class Recipes(Message):
     """What is wrong with files of the folder."""
     editable: bool
     """Whether they lie in a folder of the site's; those shipped are the software's own."""
+    folder: str
+    """Where they lie."""
+    own_folder: str
+    """Where a site's own may lie."""
 
 
 class GetRecipe(Message):

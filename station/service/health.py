@@ -1,11 +1,8 @@
 """Metrics and health over HTTP, in the station's own event loop: /metrics, /livez, /readyz, /version."""
 
 import asyncio
-import contextlib
-import errno
-import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -15,16 +12,10 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from station.errors import StationError
 from station.service.metrics import Metrics
+from station.supervision.serving import CLOSE_S, AddressError, Server, listen
 
-CLOSE_S = 1.0
-"""How long closing waits for answers under way."""
 START_S = 5.0
-
-
-class AddressError(StationError):
-    """The address cannot be served on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +108,7 @@ class HealthServer:
         self._liveness = liveness
         self._readiness = readiness
         self._version = dict(version)
-        self._server: _Server | None = None
+        self._server: Server | None = None
         self._task: asyncio.Task[None] | None = None
 
     async def start(self) -> int:
@@ -126,7 +117,7 @@ class HealthServer:
         Raises:
             AddressError: the port is in use, or the address is not this machine's.
         """
-        listener = _listen(self._host, self._port)
+        listener = listen(self._host, self._port, "metrics", "metrics and health")
         routes = [
             Route("/metrics", self._metrics_page),
             Route("/livez", self._livez),
@@ -144,7 +135,7 @@ class HealthServer:
             timeout_keep_alive=30,
             timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
         )
-        self._server = _Server(config)
+        self._server = Server(config)
         self._task = asyncio.create_task(self._server.serve(sockets=[listener]), name="health")
         async with asyncio.timeout(START_S):
             while not self._server.started:
@@ -183,34 +174,3 @@ class HealthServer:
 
     async def _version_page(self, _request: Request) -> Response:
         return JSONResponse(self._version)
-
-
-class _Server(uvicorn.Server):
-    """A server that leaves the process's signals to the station."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        yield
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    """A listening socket, or one clear sentence."""
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listener = socket.socket(family, kind, protocol)
-    except OSError as error:
-        raise AddressError(f"metrics.host {host!r}: {error.strerror}; set an address of this machine") from error
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(64)
-        listener.settimeout(0)
-    except OSError as error:
-        listener.close()
-        why = {
-            errno.EADDRINUSE: "another program listens there; stop it, or set another metrics.port",
-            errno.EADDRNOTAVAIL: "that is no address of this machine; set another metrics.host",
-            errno.EACCES: "this user may not listen on so low a port; set metrics.port to 1024 or more",
-        }.get(error.errno or 0, f"{error.strerror}; set another metrics.host or metrics.port")
-        raise AddressError(f"metrics and health cannot be served on {host}:{port}: {why}") from error
-    return listener

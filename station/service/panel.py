@@ -32,6 +32,7 @@ from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.alarm_orders import AlarmOrders
+from station.service.calibrated import Calibrated
 from station.service.crew import Crew
 from station.service.inspection import utc_ms
 from station.service.lot import LotKeeper
@@ -64,6 +65,7 @@ class Panel:
         records: told of lots, and asked about alarms.
         alarms: people's hands on alarms.
         trail: told of what people do.
+        calibrated: whether the check with the ball is due.
     """
 
     def __init__(
@@ -77,9 +79,11 @@ class Panel:
         records: Records,
         alarms: AlarmOrders,
         trail: Trail,
+        calibrated: Calibrated,
     ) -> None:
         self._gate, self._service, self._crew, self._lots = gate, service, crew, lots
         self._book, self._line, self._records, self._alarms, self._trail = book, line, records, alarms, trail
+        self._calibrated = calibrated
         self._orders = PanelOrders(line, service, crew, lots, records, trail)
         self._memory = PanelMemory()
         self._heard_s: float | None = None
@@ -143,6 +147,7 @@ class Panel:
             plc_connected=told is not None and told.plc_connected,
             plc_alive=told is not None and told.plc_alive,
             line_trouble=self._line.line_trouble(),
+            check_due=self._calibrated.not_verified(),
             alarms=self._alarms.standing(),
             devices=tuple(
                 DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)

@@ -15,6 +15,7 @@ from station.calibration.report import calibration_files, verification_files
 from station.calibration.store import CalibrationStore
 from station.calibration.verifying import Verifying
 from station.channel.messages import Message
+from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     BallRunTold,
     BeginBallRun,
@@ -27,7 +28,7 @@ from station.channel.panel_maintenance_queries import (
     GoOnBallRun,
     RunStep,
 )
-from station.channel.panel_queries import Actor, Picture
+from station.channel.panel_queries import Picture
 from station.channel.server import Handler
 from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit

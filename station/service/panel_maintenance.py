@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from station.channel.messages import Message
+from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     HISTOGRAM_BINS,
     GetHealth,
@@ -25,7 +26,7 @@ from station.channel.panel_maintenance_queries import (
     Registers,
     SetLeds,
 )
-from station.channel.panel_queries import Actor, Picture
+from station.channel.panel_queries import Picture
 from station.channel.server import Handler
 from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError

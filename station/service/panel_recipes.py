@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from station.channel.messages import Message
-from station.channel.panel_queries import Actor, JobTold
+from station.channel.panel import Actor
+from station.channel.panel_queries import JobTold
 from station.channel.panel_recipe_queries import (
     ApproveRecipe,
     Change,
@@ -75,7 +76,8 @@ class PanelRecipes:
 
     def __init__(self, home: Path, folder: Path | None, worker: PanelWorker, jobs: PanelJobs) -> None:
         self._store, self._editor = RecipeStore(home, folder), RecipeEditor(home, folder)
-        self._editable = folder is not None and folder.resolve() != shipped_folder().resolve()
+        self._folder, self._own_folder = folder or shipped_folder(), home / "recipes"
+        self._editable = self._folder.resolve() != shipped_folder().resolve()
         self._records, self._worker, self._jobs = records_folder(home), worker, jobs
 
     def handlers(self) -> dict[type[Message], Handler]:
@@ -102,7 +104,13 @@ class PanelRecipes:
         def read() -> Recipes:
             standings, problems = self._store.read()
             rows = tuple(_row(standing) for standing in standings)
-            return Recipes(rows=rows, problems=tuple(map(str, problems)), editable=self._editable)
+            return Recipes(
+                rows=rows,
+                problems=tuple(map(str, problems)),
+                editable=self._editable,
+                folder=str(self._folder),
+                own_folder=str(self._own_folder),
+            )
 
         return await self._worker.do(read)
 

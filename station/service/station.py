@@ -127,7 +127,7 @@ class Station:
         orders.recall()
         gate = Gate(self.boot, service, crew, orders, book, lots, liveness, calibrated)
         alarm_orders = AlarmOrders(alarms, trail)
-        panel = Panel(gate, service, crew, lots, book, orders, records, alarm_orders, trail)
+        panel = Panel(gate, service, crew, lots, book, orders, records, alarm_orders, trail, calibrated)
         upkeep = Upkeep(
             service,
             crew,

@@ -25,12 +25,14 @@ from station.channel.line import (
     Outcome,
     StationState,
 )
+from station.channel.panel_live import AskPanel, PanelState
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
 from station.service.calibrated import Calibrated
 from station.service.keeping import Kept
 from station.service.reference import Golden
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.settings.segmentation import Segmentation
 
@@ -157,6 +159,7 @@ async def inspected(site, store, calibration):
                 await client.ask(command, CommandDone, deadline_s=40)
             elif "never verified" in state.why_not_ready:
                 asked = True
+                assert "never verified" in (await glance(configuration)).check_due
                 store.add_verification(verification(calibration, datetime.now(UTC)), {})
             elif state.boot and not reset:
                 reset = (
@@ -168,6 +171,12 @@ async def inspected(site, store, calibration):
         begun = await client.ask(Begin(trigger_id=1, encoder=0, lot="A"), Begun, deadline_s=40)
         assert begun.sequence is not None, begun
         return await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
+
+
+async def glance(configuration):
+    """What the pages are told."""
+    async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as client:
+        return await client.ask(AskPanel(), PanelState, deadline_s=20)
 
 
 async def beat(client):

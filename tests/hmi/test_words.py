@@ -4,6 +4,7 @@ import ast
 import json
 import re
 import xml.etree.ElementTree as ET
+from pathlib import Path
 from string import Formatter
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmi import charts
-from hmi.navigation import entries, parts
+from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import field_keys, groups
 from hmi.words import FOLDER, NO_VALUE, Wording, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
@@ -43,6 +44,26 @@ COMPOSED = {
     "said.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
 }
 """What the station puts together of several."""
+NO_PAGES = {
+    "/live",
+    "/fruit/{sequence}/picture.svg",
+    "/history/image/{sha256}.png",
+    "/history/{sequence}/step/{step}/stage/{place}.jpg",
+    "/maintenance/health/part",
+    "/maintenance/image/part",
+    "/maintenance/image/{place}.jpg",
+    "/maintenance/registers/part",
+    "/maintenance/log/part",
+    "/maintenance/sensor/part",
+    "/maintenance/sensor/{kind}/{name}",
+    "/recipes/{name}/chart",
+    "/recipes/{name}/export",
+    "/jobs/{job}/part",
+    "/jobs/{job}/file/{name}",
+    "/jobs/{job}/show/{name}",
+}
+"""Parts of pages, pictures, streams and files."""
+IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}"}
 STATIONS_OWN = ("station.", "recipe_what.")
 """The catalogues of what the station says in English itself."""
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
@@ -161,6 +182,22 @@ def test_every_part_is_somewhere():
     templates = "".join(path.read_text(encoding="utf-8") for path in HMI.rglob("*.j2"))
     for name in parts():
         assert f'live("{name}")' in templates, name
+
+
+def test_every_page_is_looked_at_in_both_sizes():
+    """By the tests that open each page of their list `PAGES`, and those of `IN_THEIR_OWN_TESTS`."""
+    looked_at = []
+    for test in ("hmi/test_browser.py", "hmi_pages/test_pages.py"):
+        body = ast.parse((Path(__file__).parents[1] / test).read_text(encoding="utf-8")).body
+        lists = [
+            each.value for each in body if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "PAGES"
+        ]
+        looked_at += [str(path).replace("SOFT", "7").replace("LAST", "7") for path in ast.literal_eval(lists[0])]
+    for module in modules():
+        for route in module.router.routes:
+            page = "GET" in route.methods and not route.path.startswith("/api/")
+            if page and route.path not in NO_PAGES | IN_THEIR_OWN_TESTS:
+                assert any(route.path_regex.fullmatch(path) for path in looked_at), route.path
 
 
 def test_catalogues_are_sorted_by_page():

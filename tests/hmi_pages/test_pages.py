@@ -54,6 +54,14 @@ def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, pa
     assert page.evaluate(OVERFLOW) == 0
 
 
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
+def test_every_page_fits_where_nobody_is_logged_in(orchard: Any, panel: Any, size: tuple[int, int]) -> None:
+    person = panel("", *size)
+    for path in PAGES:
+        page = person.go(path.replace("SOFT", str(orchard.soft.sequence)))
+        assert page.evaluate(OVERFLOW) == 0, path
+
+
 @pytest.mark.parametrize("locale", ["de", "es"])
 def test_pages_speak_the_browsers_language(orchard: Any, panel: Any, locale: str) -> None:
     person = panel("", locale=locale)
@@ -142,6 +150,15 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     assert all(size == 480 for size in sizes)
 
 
+def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
+    page = panel().go("/history")
+    page.get_by_label("Recipe").select_option("strawberry")
+    page.get_by_role("button", name="Search").click()
+    shown = [int(text) for text in page.locator(".row-number").all_inner_texts()]
+    assert shown == [outcome.sequence for outcome in orchard.fruit][::-1][:20]
+    assert panel().go("/history?fruit=raspberry").locator(".row-number").count() == 0
+
+
 def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) -> None:
     soft = orchard.soft
     page = panel().go(f"/history?reason={soft.reasons[0]}")
@@ -151,9 +168,12 @@ def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) 
 
 def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: Any) -> None:
     person = panel("Quin")
-    page = person.go("/history")
+    page = person.go("/history?fruit=strawberry")
     page.get_by_text("Tables and reports").click()
     page.get_by_role("button", name="CSV").click()
+    expect(page.get_by_role("link", name="Save inspections.csv")).to_be_visible()
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate(OVERFLOW) == 0
     with page.expect_download() as download:
         page.get_by_role("link", name="Save inspections.csv").click()
     lines = download.value.path().read_text().splitlines()

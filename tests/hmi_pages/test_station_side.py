@@ -16,7 +16,9 @@ from hypothesis import strategies as st
 from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.recipe_form import BadFieldError, changed, groups, shown
 from station.channel.panel_queries import JobTold
+from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.service.panel_jobs import MOST_WAITING, JobError, PanelJobs
+from station.service.panel_recipes import PanelRecipes
 from station.service.panel_worker import MOST_WAITING as MOST_QUESTIONS
 from station.service.panel_worker import PanelBusyError, PanelWorker
 from station.settings.recipe import load_recipes
@@ -113,6 +115,23 @@ def test_the_worker_refuses_more_than_it_can_hold() -> None:
             worker.close()
 
     asyncio.run(run())
+
+
+def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: Path) -> None:
+    async def told(folder: Path | None) -> Recipes:
+        worker = PanelWorker()
+        try:
+            return await PanelRecipes(tmp_path, folder, worker, PanelJobs(tmp_path)).recipes(ListRecipes())
+        finally:
+            worker.close()
+
+    shipped = asyncio.run(told(None))
+    assert not shipped.editable
+    assert set(load_recipes(Path(shipped.folder))) == {row.name for row in shipped.rows} == set(load_recipes())
+    own = tmp_path / "recipes"
+    assert shipped.own_folder == str(own)
+    own.mkdir()
+    assert asyncio.run(told(own)).editable
 
 
 @pytest.mark.parametrize("decimal", [".", ","])

@@ -11,7 +11,8 @@ import urllib.request
 
 import pytest
 
-from station.service.health import AddressError, Dependency, HealthServer, Liveness, Readiness
+from station.service.health import Dependency, HealthServer, Liveness, Readiness
+from station.supervision.serving import AddressError
 
 NOT_READY = Readiness(
     ready=False,
