@@ -12,7 +12,6 @@ import statistics
 import time
 import tracemalloc
 from collections import defaultdict
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,26 +19,23 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from measurement.light_touch import detection_table
-from measurement.on_the_twin import FRAMES_PER_STEP, twin_table
+from measurement.on_the_twin import FRAMES_PER_STEP, peers_table, twin_table
+from measurement.peers import methods
 
-from station.settings.segmentation import PaperParameters, RobustParameters
+from station.settings.segmentation import RobustParameters
 from station.vision.contact import Image, Mask
-from station.vision.paper import PaperMethod
 from station.vision.robust import RobustMethod
 
 ROOT = Path(__file__).resolve().parents[1]
 SIGMA_PIXEL, SIGMA_COLUMN, SIGMA_ROW, SIGMA_OFFSET = (3.1, 1.8, 2.5), (1.8, 1.3, 2.6), 1.0, 1.5
 """Noise measured on real presses, grey levels, B, G, R."""
 DRIFT_LEVELS = 4.0
-DARKER_COUNTS = 0.7
-"""What PyTouch scales a difference below the reference by before it takes the size."""
 TRIED = [
     RobustParameters(gate_ratio=ratio, least_bend=bend, edge_stiffness=stiffness)
     for ratio, bend, stiffness in itertools.product((2.0, 3.0, 4.5), (0.08, 0.15, 0.25), (0.03, 0.1, 0.3))
 ]
 SPLITS = 4
 
-Measure = Callable[[Image], Mask]
 Floats = npt.NDArray[np.float64]
 
 
@@ -48,36 +44,6 @@ class Scores(NamedTuple):
 
     overlap: Floats
     ratio: Floats
-
-
-def contact_area_idea(reference: Image) -> Measure:
-    """The idea of PyTouch's ContactArea, written from its description: scaled difference, box, threshold, ellipse."""
-    base = reference.astype(np.float32)
-
-    def measure(image: Image) -> Mask:
-        signed = (image.astype(np.float32) - base) / 255
-        scaled = np.where(signed < 0, -DARKER_COUNTS * signed, signed).mean(axis=2)
-        inside = (cv2.boxFilter(scaled, -1, (64, 64)) > 0.04).astype(np.uint8)
-        inside = cv2.erode(inside, np.ones((16, 16), np.uint8))
-        mask = np.zeros(image.shape[:2], np.uint8)
-        outlines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        largest = max(outlines, key=cv2.contourArea, default=np.zeros((0, 1, 2), np.int32))
-        if len(largest) >= 5:
-            cv2.ellipse(mask, cv2.fitEllipse(largest), 255, cv2.FILLED)
-        return mask
-
-    return measure
-
-
-def methods(reference: Image) -> dict[str, Measure]:
-    """The methods compared, each prepared for a reference."""
-    paper = PaperMethod(reference, PaperParameters())
-    robust = RobustMethod([reference], RobustParameters())
-    return {
-        "`paper`, as printed": lambda image: paper.measure(image).mask,
-        "PyTouch's contact area": contact_area_idea(reference),
-        "`robust`": lambda image: robust.measure(image).mask,
-    }
 
 
 def score(masks: list[Mask], truths: list[npt.NDArray[np.bool_]]) -> Scores:
@@ -297,6 +263,10 @@ def main() -> None:
         "result. Half of the presses have seeds on which nothing was chosen.",
         "",
         *twin_table(),
+        "",
+        "## The three methods on the same images of the twin",
+        "",
+        *peers_table(),
         "",
         "## The lightest touch: each fruit at five places on two units",
         "",

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from measurement.on_the_twin import FRAMES_PER_S, FRAMES_PER_STEP, FRUITS, squeezed
+from measurement.peers import contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.press import PressOptions
@@ -15,6 +16,7 @@ from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
+from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
 
@@ -34,6 +36,8 @@ class Light(NamedTuple):
     area_mm2: int
     found: bool
     gate: float
+    peer_found: bool
+    """Whether PyTouch's contact area has any area."""
 
 
 def light_contacts() -> tuple[list[Light], list[float]]:
@@ -46,12 +50,14 @@ def light_contacts() -> tuple[list[Light], list[float]]:
             closings = [0.0, *light_closings(kind, seed, options)]
             press = squeezed(kind, seed, closings, options)
             method = RobustMethod(press.references, RobustParameters())
+            peer = contact_area_idea(median_image(press.references))
             for area_mm2, step in zip((0, *LIGHT_AREAS_MM2), press.steps, strict=True):
-                contact = method.measure(mean_image(step.frames))
+                image = mean_image(step.frames)
+                contact = method.measure(image)
                 if area_mm2 == 0:
                     empty.append(contact.gate or 0.0)
                 elif abs(step.true_mm2 / area_mm2 - 1) < 0.3:
-                    contacts.append(Light(kind, area_mm2, contact.found, contact.gate or 0.0))
+                    contacts.append(Light(kind, area_mm2, contact.found, contact.gate or 0.0, peer(image).any()))
     return contacts, empty
 
 
@@ -70,8 +76,11 @@ def detection_table() -> list[str]:
         lines.append(
             f"| {kind} | {counts} | {gates.min():.2f} to {gates.max():.2f} | {observer_signal_to_noise(kind):.0f} |"
         )
+    peers = [[one.peer_found for one in contacts if one.area_mm2 == area] for area in LIGHT_AREAS_MM2]
+    counts = " | ".join(f"{sum(found)} of {len(found)}" for found in peers)
     return [
         *lines,
+        f"| PyTouch's contact area, all four | {counts} | | |",
         "",
         f"The gate opens at 1; where nothing touched it reached {max(empty):.2f} in {len(empty)} steps. The observer",
         "knows the contact's place, shape and colours beforehand and asks only whether it is there: one known template",

@@ -38,8 +38,9 @@ def test_the_newest_is_the_units_and_a_broken_one_is_passed_over(stored, draft, 
     assert stored.current("../T0001") is None
 
 
-def test_a_verification_belongs_to_one_calibration(stored, draft):
-    verification = Verification(
+@pytest.fixture
+def verification(draft):
+    return Verification(
         id=stamp(draft.calibration.made_at),
         serial="T0001",
         calibration=draft.calibration.id,
@@ -50,6 +51,9 @@ def test_a_verification_belongs_to_one_calibration(stored, draft):
         checks=(),
         curve=(),
     )
+
+
+def test_a_verification_belongs_to_one_calibration(stored, draft, verification):
     stored.add_verification(verification, {"reference.png": b"x"})
     assert stored.last_verification(draft.calibration) == verification
     assert verification.drift == pytest.approx(-0.02)
@@ -76,6 +80,17 @@ def test_a_full_disk_leaves_nothing_and_keeps_the_calibration_before(store, draf
     assert list((tmp_path / CALIBRATIONS / "T0001").iterdir()) == []
     store.add_calibration(draft.calibration, files)
     assert store.current("T0001") == draft.calibration
+
+
+def test_a_full_disk_leaves_nothing_of_a_verification(stored, draft, verification, monkeypatch):
+    def full(_descriptor):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(CalibrationError, match="No space left on device; free space there"):
+        stored.add_verification(verification, {"reference.png": b"x"})
+    assert stored.last_verification(draft.calibration) is None
+    assert stored.current("T0001") == draft.calibration
 
 
 def test_what_a_killed_one_left_is_never_seen_and_swept_away(store, draft, tmp_path):

@@ -16,10 +16,10 @@ from station.twin.digit.sensor import Condition
 from station.vision.methods import median_image
 
 
-def verified(ball, draft):
+def verified(ball, draft, tell=lambda _progress: None):
     recipe, settings = find_recipe("rubber_ball"), CalibrationSettings()
     pictures = draft.reference, [step.image for step in draft.steps]
-    procedure = Verifying(ball, recipe, settings, draft.calibration, *pictures, "anna", lambda _progress: None)
+    procedure = Verifying(ball, recipe, settings, draft.calibration, *pictures, "anna", tell)
     return asyncio.run(procedure.run())
 
 
@@ -64,10 +64,28 @@ def test_each_ill_of_the_gel_is_named_and_shown(drawn_ball, draft, condition, il
     assert health[ill].remedy in page
 
 
-@pytest.mark.parametrize(("holder_mm", "names"), [(2.0, {"onset", "area", "rising"}), (14.0, {"onset", "area"})])
-def test_no_ball_and_another_ball_fail(drawn_ball, draft, holder_mm, names):
+@pytest.mark.parametrize(
+    ("holder_mm", "names"),
+    [
+        pytest.param(2.0, {"onset", "area", "rising"}, id="no ball"),
+        pytest.param(14.0, {"onset", "area"}, id="another ball"),
+        pytest.param(24.0, {"onset"}, id="contact at the start"),
+    ],
+)
+def test_what_is_not_the_ball_in_its_place_fails(drawn_ball, draft, holder_mm, names):
     verification = verified(drawn_ball(1, mm_per_px=0.0285, holder_mm=holder_mm), draft).verification
     assert names <= {check.name for check in verification.checks if not check.passed}
+
+
+def test_called_off_in_the_middle_the_jaws_open(drawn_ball, draft):
+    def called_off(progress):
+        if progress.number == 3:
+            raise asyncio.CancelledError
+
+    ball = drawn_ball(1, mm_per_px=0.0285)
+    with pytest.raises(asyncio.CancelledError):
+        verified(ball, draft, called_off)
+    assert ball.released == 1
 
 
 def test_real_sensors_without_contact_are_not_called_torn_or_dirty(real_images):

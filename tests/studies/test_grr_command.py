@@ -92,6 +92,23 @@ def test_a_full_disk_leaves_nothing(measurements: Path, tmp_path: Path, monkeypa
     assert [path.name for path in tmp_path.iterdir()] == [measurements.name]
 
 
+def test_interrupted_in_the_middle_it_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    gripped: list[GaugeTask] = []
+
+    def interrupted(task: GaugeTask) -> object:
+        if gripped:
+            raise KeyboardInterrupt
+        gripped.append(task)
+        return measure_part(task)
+
+    monkeypatch.setattr(grr_room, "measure_part", interrupted)
+    found = asked("--twin", "--fruit", "blueberry", "--parts", 2, "--jobs", 1, "--out", tmp_path / "out")
+    assert found.exit_code != 0
+    assert "Aborted" in found.output
+    assert gripped
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
     """One press of a smooth fruit: the area at the deciding closing is near its truth, and repeats to the digit."""
     task = GaugeTask("blueberry", 3, 0, 0, 0)

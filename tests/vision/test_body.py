@@ -50,6 +50,12 @@ def test_directions_that_turn_from_place_to_place_are_texture():
     assert [body is not None and body.textured for body in bodies] == [False, True]
 
 
+def test_without_background_what_is_finer_than_the_body_s_slopes_is_texture():
+    slopes = 0.5 * np.stack([COLUMNS - 59.5, ROWS - 79.5, 0.0 * ROWS], axis=-1)
+    bodies = [find_body(moved(change), start(45)) for change in (slopes, slopes + textured(200, levels=22.0))]
+    assert [body is not None and body.textured for body in bodies] == [False, True]
+
+
 def test_an_open_ring_is_its_whole_disc():
     ring = smooth(40) * ((away() > 26) & ((ROWS > 60) | (np.abs(COLUMNS - 60) > 10)))[..., None]
     body = find_body(moved(ring), (np.abs(ring).sum(axis=2) > 1).astype(np.uint8))
