@@ -151,7 +151,7 @@ def missing_lines(expected, output):
     return missing
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", documents_with_console())
 def test_what_a_document_says_a_command_answers_it_answers(name, pages, home, tmp_path, monkeypatch, root):
     folder = tmp_path / "work"
