@@ -18,6 +18,8 @@ from markdown_it import MarkdownIt
 
 from station.cli import cli, main
 
+pytestmark = pytest.mark.timeout(900)  # every command's module is imported, and some are carried out
+
 PLACEHOLDER = re.compile(r"[A-Z][A-Z0-9_]*$|.*…")
 BY_HAND = {"docs/plc/quick-start.md"}
 """Documents whose console blocks another test runs, against a PLC interface."""
@@ -151,7 +153,6 @@ def missing_lines(expected, output):
     return missing
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", documents_with_console())
 def test_what_a_document_says_a_command_answers_it_answers(name, pages, home, tmp_path, monkeypatch, root):
     folder = tmp_path / "work"

@@ -24,12 +24,13 @@ def printed(chromium, pages, tmp_path):
         html.write_text(f"<!doctype html><meta charset=utf-8>{base}<style>{STYLE.read_text()}</style>{body}", "utf-8")
         command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
         command += [f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={pdf}", html.as_uri()]
-        subprocess.run(command, check=True, capture_output=True, timeout=120)
+        subprocess.run(command, check=True, capture_output=True, timeout=300)
         return len(PAGE.findall(pdf.read_bytes()))
 
     return make
 
 
+@pytest.mark.timeout(400)
 @pytest.mark.parametrize(
     ("name", "number"), [("operator.md", 2), ("operator.de.md", 2), ("operator.es.md", 2), ("acceptance-test.md", 3)]
 )
