@@ -14,6 +14,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Awaitable
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
@@ -113,7 +114,7 @@ def pin() -> None:
             each.cpu_affinity(cores[-1:] if name == "plc" else cores[:-1] or cores)
 
 
-async def phase(site: Configuration, work: "asyncio.Future[None] | asyncio.Task[None]") -> Phase:
+async def phase(site: Configuration, work: Awaitable[object]) -> Phase:
     """Measure while something is done."""
     poller, before, began_s = Poller(site), use(), time.monotonic()
     poller.start()

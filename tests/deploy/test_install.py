@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.timeout(400)  # on a busy machine pip takes its time
+pytestmark = pytest.mark.timeout(900)  # on a busy machine pip takes its time
 
 
 def test_interrupted_then_installed_twice_then_undone_leaves_nothing(system, root, install, environment, tree_of):

@@ -9,7 +9,7 @@ from contextlib import closing
 
 import pytest
 
-pytestmark = pytest.mark.timeout(400)  # four starts of a whole station, on a busy machine
+pytestmark = pytest.mark.timeout(900)  # four starts of a whole station, on a busy machine
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def installation(installer, sources, environment):
     def make(layout, services, version):
         what = installer("release").Source(sources[version])
         packages = installer("release").Packages(environment=environment)
-        return installer("installing").Installation(layout, services, what, packages, limit_s=90.0)
+        return installer("installing").Installation(layout, services, what, packages, limit_s=200.0)
 
     return make
 
