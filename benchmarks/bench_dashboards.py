@@ -25,7 +25,7 @@ from monitoring.document import DOCUMENT, alerts, with_part
 from monitoring.drawing import Answer, Rows, draw
 
 IMAGES = DOCUMENT.parent / "images"
-FRUITS = 5
+FRUITS = 9
 DAYS, STEP_S = 30, 240
 BEGIN_S = 1_788_220_800
 """2026-09-01, midnight, UTC."""
