@@ -188,7 +188,7 @@ def _table(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]
     if isinstance(answer, Rows):
         columns, rows = answer.columns, [[_cell(unit, each) for each in row] for row in answer.rows]
     else:
-        columns = [*(key for key in answer[0].labels if key != "__name__"), "value"]
+        columns = [*(key for key in (answer[0] if answer else Series({}, [])).labels if key != "__name__"), "value"]
         rows = [
             [*(each.labels.get(key, "") for key in columns[:-1]), value_of(unit, each.points[-1][1])] for each in answer
         ]
@@ -201,6 +201,8 @@ def _table(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]
 
 def _heat(axes: Axes, _panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
     found = sorted(_series(answers[0][1]), key=lambda each: float(each.labels["le"]))
+    if not found:
+        return
     times = _times(found[0])
     at_most = [dict(zip(_times(each), (value for _, value in each.points), strict=True)) for each in found]
     cells = [

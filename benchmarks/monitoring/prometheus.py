@@ -115,6 +115,10 @@ class Prometheus:
         found = self._ask("query_range", query=expr, start=begin_s, end=end_s, step=step_s)
         return [Series(each["metric"], [_point(pair) for pair in each["values"]]) for each in found["result"]]
 
+    def names(self) -> set[str]:
+        """Of all metrics and recorded series that it has of stations."""
+        return {each["__name__"] for each in self._ask("series", **{"match[]": '{station!=""}'})}
+
     def get(self, what: str) -> Any:
         """Another part of its interface, as `rules`.
 

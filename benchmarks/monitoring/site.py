@@ -74,6 +74,7 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
         "arm": {"host": host, "stale_after_s": 1.0},
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
+        "handshake": {"station_lost_after_s": 30.0},
         "records": {"free_reserve_mb": 1},
         "outbox": {
             "station": STATION,
