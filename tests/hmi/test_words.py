@@ -139,13 +139,11 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
     [
         ("en", "an inspection is under way", "an inspection is under way"),
         ("de", "an inspection is under way", "eine Prüfung läuft"),
-        ("es", "a calibration is under way: let it end, or call it off.",
-         "una calibración está en curso: espere a que termine o cancélela."),
-        ("de", ("Lot B-7 cannot begin: the PLC's number 9 is plum now, and no longer cherry; choose a recipe again. "
-         "No recipe is active: choose one by its number (1, 2)."),
-         ("Los B-7 kann nicht beginnen: die SPS-Nummer 9 ist jetzt plum und nicht mehr cherry; wählen Sie neu. "
-         "Kein Rezept ist aktiv: Wählen Sie eines (1, 2).")),
-        ("de", "No recipe is active: choose one by its number (1).", "Kein Rezept ist aktiv: Wählen Sie eines (1)."),
+        ("es", "reset did not come to its end within 2.5 s: an inspection is under way",
+         "reset no terminó en 2,5 s: hay una inspección en curso"),
+        ("es", "Lot B-7 cannot begin: an inspection is under way. No recipe is active: choose one by its number (1).",
+         "El lote B-7 no puede empezar: hay una inspección en curso. No hay receta activa: elija una (1)."),
+        ("es", "No recipe is active: choose one by its number (1, 2).", "No hay receta activa: elija una (1, 2)."),
         ("es", "The area at 3.0 mm of closing is at least 61.2 mm², over the limit of 45 mm².",
          "El área a 3,0 mm de cierre es de al menos 61,2 mm², por encima del límite de 45 mm²."),
         ("de", "the <arm> is away", '<span lang="en">the &lt;arm&gt; is away</span>'),
