@@ -113,6 +113,8 @@ def cohort_curves(studies: Sequence[Study]) -> bytes:
                 f"{'failed' if failed else 'did not fail'}",
                 fontsize=10,
             )
+    highest = max(float(_mm2(sample.areas_px).max()) for study in studies for sample in study.samples)
+    axes[0, 0].set_ylim(0, 1.05 * max(1.0, highest))
     for axis in axes[:-1].flat:
         axis.set_xlabel("")
     for axis in axes[:, 1]:
