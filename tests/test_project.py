@@ -14,7 +14,6 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[1]
 LOCKS = ("requirements-build.lock", "requirements.lock", "requirements-dev.lock")
 PIN = re.compile(r"^(?P<name>[a-z0-9._-]+)==(?P<version>[^ ;]+)", re.MULTILINE)
-LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
 
 
 def pins(lock: str) -> dict[str, str]:
@@ -53,16 +52,6 @@ def test_a_lock_has_hashes_and_no_address(lock):
     text = (ROOT / lock).read_text()
     assert "://" not in text
     assert all(" \\\n    --hash=sha256:" in block for block in re.split(r"\n(?=[a-z])", text.strip()))
-
-
-def test_relative_links_in_the_documents_lead_somewhere():
-    broken = [
-        f"{page.relative_to(ROOT)}: {link}"
-        for page in tracked("*.md")
-        for link in LINK.findall(page.read_text())
-        if not (page.parent / link).exists()
-    ]
-    assert not broken
 
 
 def test_the_readmes_figures_are_those_that_the_benchmark_wrote():

@@ -57,7 +57,7 @@ def light_contacts() -> tuple[list[Light], list[float]]:
                 if area_mm2 == 0:
                     empty.append(contact.gate or 0.0)
                 elif abs(step.true_mm2 / area_mm2 - 1) < 0.3:
-                    contacts.append(Light(kind, area_mm2, contact.found, contact.gate or 0.0, peer(image).any()))
+                    contacts.append(Light(kind, area_mm2, contact.found, contact.gate or 0.0, bool(peer(image).any())))
     return contacts, empty
 
 

@@ -69,8 +69,9 @@ def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
 
 def _address(layout: Layout, release: Path) -> tuple[str, int]:
     metrics = json.loads(station(layout, release, "config", "show"))["metrics"]
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(metrics["host"], metrics["host"])  # noqa: S104 (asked, not listened on)
-    return host, metrics["port"]
+    host = str(metrics["host"])
+    asked = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 (asked, not listened on)
+    return asked, metrics["port"]
 
 
 def _asked(host: str, port: int, path: str) -> tuple[int, dict[str, Any]]:

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Literal
 
 from station.calibration.bench import Place, Progress, Unit
-from station.calibration.calibrating import Calibrating
+from station.calibration.calibrating import Calibrating, Draft
 from station.calibration.model import Calibration, Verification
-from station.calibration.report import calibration_files, verification_files
 from station.calibration.store import CalibrationStore
-from station.calibration.verifying import Verifying
+from station.calibration.verifying import Verified, Verifying
 from station.channel.messages import Message
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -222,7 +221,7 @@ class PanelBall:
             lambda progress: _note_step(run, progress),
         ).run()
         before, new = self._store.current(draft.calibration.serial), draft.calibration
-        files = await asyncio.to_thread(calibration_files, draft)
+        files = await asyncio.to_thread(_calibration_files, draft)
         entry = calibration_stored(
             run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
         )
@@ -250,7 +249,7 @@ class PanelBall:
             run.actor.who,
             lambda progress: _note_step(run, progress),
         ).run()
-        files = await asyncio.to_thread(verification_files, verified, calibration)
+        files = await asyncio.to_thread(_verification_files, verified, calibration)
         made = verified.verification
         entry = calibration_verified(
             run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
@@ -331,3 +330,16 @@ def _there(folder: Path) -> tuple[str, ...]:
     with contextlib.suppress(OSError):
         return tuple(name for name in _PICTURES if (folder / name).is_file())
     return ()
+
+
+# The plots' library is a third of what this process would load at its start, for pages that are made once a shift.
+def _calibration_files(draft: Draft) -> dict[str, bytes]:
+    from station.calibration.report import calibration_files  # noqa: PLC0415
+
+    return calibration_files(draft)
+
+
+def _verification_files(verified: Verified, calibration: Calibration) -> dict[str, bytes]:
+    from station.calibration.report import verification_files  # noqa: PLC0415
+
+    return verification_files(verified, calibration)

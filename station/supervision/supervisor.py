@@ -42,7 +42,7 @@ class Program:
 
     name: str
     command: tuple[str, ...]
-    start_limit_s: float = 30.0
+    start_limit_s: float = 60.0
     watchdog_s: float = 10.0
     stop_limit_s: float = 30.0
     """From SIGTERM to SIGKILL."""

@@ -98,7 +98,7 @@ NEWER = {
 # A machine whose cores all are busy starts a process later than a packhouse's.
 PATIENT = {
     "station/supervision/supervisor.py": (
-        "start_limit_s: float = 30.0\n    watchdog_s: float = 10.0",
+        "start_limit_s: float = 60.0\n    watchdog_s: float = 10.0",
         "start_limit_s: float = 240.0\n    watchdog_s: float = 60.0",
     )
 }
