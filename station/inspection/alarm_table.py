@@ -189,7 +189,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         Priority.MEDIUM,
         "The light of the untouched gel is not the golden reference's: a colour of it is missing.",
         "The inspection became NO_RESULT, and so will the next.",
-        "Change the sensor; after a change remove the golden reference from the home folder.",
+        "Change the sensor and calibrate it; without a calibration remove the golden reference from the home folder.",
         (P("camera", "led_dead"),),
     ),
     AlarmId.CAMERA_DIRTY: AlarmRow(
@@ -221,7 +221,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
         Priority.LOW,
         "The light of the untouched gel moves away from the golden reference's: halfway to where it is refused.",
         "Areas become less certain; further away the reference is refused.",
-        "Take a new golden reference at the next pause, on a clean gel.",
+        "Calibrate at the next pause, on a clean gel; without a calibration remove the home folder's golden reference.",
         (P("camera", "lens_fogged"),),
     ),
     AlarmId.PLC_HEARTBEAT_LOST: AlarmRow(

@@ -7,7 +7,7 @@ from station.channel.line import Reason
 _BARS = "▁▂▃▄▅▆▇█"
 
 SENTENCES: dict[Reason, str] = {
-    Reason.AREA_OVER_LIMIT: "the contact area was over the recipe's limit at one of its closings",
+    Reason.AREA_OVER_LIMIT: "the contact area was not safely below the recipe's limit at one of its closings",
     Reason.GROWTH_OVER_LIMIT: "the contact area grew faster than the recipe's limit",
     Reason.EARLY_STOP: "the steps ended early to spare the fruit: the recipe's early stop limit was passed",
     Reason.NO_CONTACT: "the gripper closed without touching a fruit",
