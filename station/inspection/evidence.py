@@ -18,6 +18,10 @@ LIGHT_TOUCH = 0.5
 """Below this share of the first damage threshold's closing a contact is too light to say anything for or against: a
 seed is outlined in place of the body (docs/robust.md, limits)."""
 
+AT_MM = 0.03
+"""So near to a closing that the recipe names, a step is at it: the gripper has counts, and eight of them are 2.996 mm.
+An area at its growth limit changes by 1.2 mm² over this, a quarter of what repeating an image changes it by."""
+
 _WINDOW_POINTS = 4
 """Of which the median of pairwise slopes bears one that is wrong."""
 _WINDOW_MM = 2.0
@@ -53,7 +57,8 @@ class Evidence:
     def __init__(self, press: Press, recipe: Recipe) -> None:
         self._recipe = recipe
         self._onset_uncertainty_mm = press.onset_uncertainty_mm
-        self.points = _in_order(press.points)
+        named_mm = [threshold.closing_mm for threshold in recipe.damage.area]
+        self.points = _in_order([_at(point, named_mm) for point in press.points])
 
     @property
     def judged_from_mm(self) -> float:
@@ -175,6 +180,13 @@ def _begins_at_mm(points: Sequence[Measured]) -> float | None:
     steps = _slopes(points)
     slope = median(steps) if steps else 0.0
     return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
+
+
+def _at(point: Measured, named_mm: Sequence[float]) -> Measured:
+    for closing_mm in named_mm:
+        if abs(point.closing_mm - closing_mm) <= AT_MM:
+            return replace(point, closing_mm=closing_mm)
+    return point
 
 
 def _in_order(points: Sequence[Measured]) -> list[Measured]:

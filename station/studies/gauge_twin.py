@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from station.inspection.judge import judge
+from station.inspection.judge import early_stop, judge
 from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe import find_recipe
@@ -115,8 +115,9 @@ def _true_area_mm2(fruit: Fruit, pose: Pose, closing_mm: float) -> float:
 def measure_part(task: GaugeTask) -> Measurement:
     """Grip a part once, by its recipe, and judge it.
 
-    The gripper closes count by count to the first contact, then by the recipe's steps to one step beyond the last
-    damage threshold; the area is the judge's own at that threshold. A press without that area gives 0 mm².
+    The gripper closes count by count to the first contact, then by the recipe's steps until the judge stops it: that
+    press has the outcome. Where it ended before one step beyond the last damage threshold it goes on to there, so that
+    the area at that threshold, which is the judge's own, is known; one that was never seen is 0 mm².
 
     Args:
         task: which part, who and how often.
@@ -126,15 +127,16 @@ def measure_part(task: GaugeTask) -> Measurement:
     fruit, setup = part_of(task), setup_of(task)
     generator = np.random.default_rng([task.seed, 103, task.part, task.operator, task.repeat])
     grip = _Grip(recipe, fruit, pose_of(task), setup, int(generator.integers(2**31)))
-    verdict = judge(grip.press(float(generator.uniform(0.0, 1.0))), recipe)
+    pressed = grip.press(float(generator.uniform(0.0, 1.0)))
     deciding_mm = deciding_closing_mm(recipe)
-    area_mm2 = next(area.area_mm2 for area in verdict.areas if area.closing_mm == deciding_mm)
+    areas = judge(pressed.on_to_the_threshold, recipe).areas
+    area_mm2 = next(area.area_mm2 for area in areas if area.closing_mm == deciding_mm)
     return Measurement(
         f"{task.part + 1}",
         "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[task.operator],
         f"{task.repeat + 1}",
         area_mm2 or 0.0,
-        verdict.outcome,
+        judge(pressed.as_stopped, recipe).outcome,
         "FAIL" if fruit.bruised else "PASS",
     )
 
@@ -167,6 +169,13 @@ def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
     return mean(bruised=False), mean(bruised=True)
 
 
+class _Pressed(NamedTuple):
+    """One closing, as far as the station goes, and as far as its area at the last threshold needs."""
+
+    as_stopped: Press
+    on_to_the_threshold: Press
+
+
 class _Grip:
     """One fruit between gel and sponge, seen and measured as the station does."""
 
@@ -181,7 +190,7 @@ class _Grip:
         references = self._frames(None, recipe.imaging.reference_frames)
         self._method = make_method(references, recipe.segmentation)
 
-    def press(self, phase: float) -> Press:
+    def press(self, phase: float) -> _Pressed:
         """Close to the onset, then step by step.
 
         Args:
@@ -193,13 +202,20 @@ class _Grip:
             ((at, seen) for at, width in enumerate(widths) if (seen := self._touched(width)) is not None), (None, None)
         )
         if onset is None or contact is None:
-            return Press(None, 0.0, ())
-        step_mm, last_mm = self._recipe.steps.step_mm, deciding_closing_mm(self._recipe)
-        points = [self._point(0.0, contact)]
-        for step in range(1, round(last_mm / step_mm) + 2):
-            closing_mm = round(step * step_mm / self._count_mm) * self._count_mm
-            points.append(self._point(closing_mm, self._measured(widths[onset] - closing_mm)))
-        return Press(widths[onset] + self._zero_mm, self._count_mm if onset else 0.0, tuple(points))
+            untouched = Press(None, 0.0, ())
+            return _Pressed(untouched, untouched)
+        steps, enough_mm = self._recipe.steps, deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm
+        press = Press(widths[onset] + self._zero_mm, self._count_mm if onset else 0.0, (self._point(0.0, contact),))
+        stopped: Press | None = None
+        for step in range(1, steps.number + 1):
+            closing_mm = round(step * steps.step_mm / self._count_mm) * self._count_mm
+            if stopped is None and early_stop(press, self._recipe) is not None:
+                stopped = press
+            if stopped is not None and press.points[-1].closing_mm > enough_mm - self._count_mm:
+                break
+            point = self._point(closing_mm, self._measured(widths[onset] - closing_mm))
+            press = replace(press, points=(*press.points, point))
+        return _Pressed(stopped or press, press)
 
     def _touched(self, width_mm: float) -> Contact | None:
         """One frame; where it shows a contact, a full step at the same width has to confirm it."""

@@ -150,6 +150,15 @@ def test_a_sound_step_beyond_the_last_threshold_speaks_for_an_uncertain_one_befo
     assert judge(alone, STRAWBERRY).outcome == "NO_RESULT", "one trusted point shows no onset"
 
 
+@pytest.mark.parametrize(("counted_mm", "outcome"), [(3.9957, "PASS"), (3.93, "NO_RESULT")])
+def test_a_step_at_a_threshold_but_for_the_grippers_counts_is_the_last_that_a_pass_asks_for(counted_mm, outcome):
+    press = spoilt(pressed(15), 5.0, Flag.CUT_BY_BORDER)
+    counted = replace(
+        press, points=tuple(replace(p, closing_mm=counted_mm) if p.closing_mm == 4 else p for p in press.points)
+    )
+    assert judge(counted, STRAWBERRY).outcome == outcome
+
+
 def test_it_does_not_where_it_may_be_over_the_limit_itself_or_the_onset_was_too_soon():
     over = Press(35.0, 0.0, tuple(point(c, 34.0 * c) for c in (0.0, 1.0, 2.0, 3.4, 4.9, 6.0)))
     assert judge(over, STRAWBERRY).outcome == "PASS"
