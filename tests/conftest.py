@@ -34,6 +34,15 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep a folder's tests together, in whatever order they are: whole stations are kept running for some folders."""
+    order: dict[Path, int] = {}
+    for item in items:
+        order.setdefault(item.path.parent, len(order))
+    items.sort(key=lambda item: order[item.path.parent])
+
+
 def _remember_tasks() -> None:
     """Have every event loop note its tasks: to search the heap for them costs more than most tests."""
     plain = asyncio.BaseEventLoop.create_task

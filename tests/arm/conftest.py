@@ -45,7 +45,7 @@ class Bench:
             "host": self.host,
             "joint_speed_rad_s": 2.0,
             "joint_acceleration_rad_s2": 8.0,
-            "watchdog_hz": 1.0,
+            "watchdog_hz": 0.5,
             "stale_after_s": 1.0,
             "link_lost_after_s": 2.0,
         }

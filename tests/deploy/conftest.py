@@ -8,6 +8,7 @@ import socket
 import stat
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -108,7 +109,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "9999"
-down_revision = "0004"
+down_revision = "{before}"
 
 
 def upgrade() -> None:
@@ -124,7 +125,9 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         version: make_source(folder / version, version, changes)
         for version, changes in {"0.1.0": PATIENT, "0.2.0": {**PATIENT, **NEWER}}.items()
     }
-    (made["0.2.0"] / "station/records/migrations/versions/9999_form.py").write_text(FORM)
+    forms = made["0.2.0"] / "station" / "records" / "migrations" / "versions"
+    newest = max(path.name[:4] for path in forms.glob("[0-9]*.py"))
+    (forms / "9999_form.py").write_text(FORM.format(before=newest))
     return made
 
 
@@ -223,12 +226,14 @@ class StandIn:
 
 
 @pytest.fixture
-def stand_in(installer: Callable[[str], Any], releases: Path, tmp_path: Path) -> Iterator[StandIn]:
-    """One for the scratch root `station` in the test's folder, in which the releases are made."""
-    shutil.copytree(releases, tmp_path / "station", symlinks=True)
-    made = StandIn(installer, tmp_path / "station")
-    yield made
-    made.close()
+def stand_in(installer: Callable[[str], Any], releases: Path) -> Iterator[StandIn]:
+    """One for a scratch root in which the releases are made, whose path leaves room for the name of a socket."""
+    with tempfile.TemporaryDirectory(prefix="root-") as folder:
+        root = Path(folder) / "r"
+        shutil.copytree(releases, root, symlinks=True)
+        made = StandIn(installer, root)
+        yield made
+        made.close()
 
 
 @pytest.fixture

@@ -218,9 +218,9 @@ def said(log: Path, words: str, process: psutil.Process) -> bool:
     return words in log.read_text()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
-    """One station for all tests of a session; each test leaves it ready, or makes it so."""
+    """One station for all tests of this folder; each test leaves it ready, or makes it so."""
     folder = tmp_path_factory.mktemp("cell")
     modbus, metrics, hmi, camera, console = free_ports(5)
     host = f"127.82.{os.getpid() % 250 + 1}.1"

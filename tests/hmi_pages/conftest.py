@@ -216,7 +216,7 @@ def nothing_left_by_the_module() -> Iterator[None]:
         time.sleep(0.05)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     folder = tmp_path_factory.mktemp("site")
     host = f"127.79.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
@@ -285,7 +285,7 @@ def _answers(address: str) -> bool:
     return False
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def orchard(site: Site) -> Site:
     """A station that has inspected a good fruit and a soft one, which is tried again where a device failed."""
     site.inspect(bruised=False, seed=3)
@@ -320,7 +320,7 @@ class Answer:
     headers: dict[str, str]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def api(site: Site) -> Callable[..., Answer]:
     """Sends one request to the pages' server, as a program does."""
 
@@ -354,7 +354,7 @@ def api(site: Site) -> Callable[..., Answer]:
     return send
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def token_of(site: Site) -> Callable[[str, Role], str]:
     """Makes a token as `station api-token add` does."""
     return ApiTokens(site.home / "hmi").add

@@ -74,7 +74,7 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
     assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 5
     query = "SELECT lot, outcome, reasons, area_mm2, fruit, jsonb_array_length(curve), began::text FROM inspections"
     first, *_ = rows(server, f"{query} WHERE station = 'as-they-are' ORDER BY sequence")
-    assert first == ("L00000", "PASS", [], 21.0, "strawberry", 4, "2026-01-01 00:00:03+00")
+    assert first == ("L00000", "PASS", [], 21.0, "raspberry", 4, "2026-01-01 00:00:03+00")
     ((grower, ended, revision),) = rows(server, "SELECT grower, ended, revision FROM lots WHERE name = 'Aü'")
     assert (grower, revision, ended is None) == ("Meier", 2, False)
     ((who, old, new, digest),) = rows(server, "SELECT who, old, new, hash FROM audit WHERE station = 'as-they-are'")

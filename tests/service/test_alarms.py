@@ -52,6 +52,9 @@ def caused(cell, alarm):
     return cell.station.service.alarms.alarms.get(alarm).state in CAUSED
 
 
+FRAMES_UNDER_WAY = 6
+
+
 def active(cell):
     return {alarm.id for alarm in cell.station.service.alarms.alarms.active}
 
@@ -81,7 +84,8 @@ def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench, un
             for fault, amount, alarm, refused in LOOKED_AT:
                 await cell.line.ready()
                 cell.twin.boards["camera"].set(fault, amount)
-                await asyncio.sleep(0.2)  # frames that were drawn before are over
+                drawn = cell.twin.camera.drawn
+                await until(lambda drawn=drawn: cell.twin.camera.drawn > drawn + FRAMES_UNDER_WAY)
                 outcome = await cell.line.inspect()
                 assert ("reference_bad" in outcome.reasons) == refused, (fault, outcome.reasons)
                 assert alarm in active(cell), fault

@@ -186,6 +186,12 @@ class DigitCameraServer:
             light=(blue / _BRIGHTEST, green / _BRIGHTEST, red / _BRIGHTEST),
         )
 
+    @property
+    def drawn(self) -> int:
+        """The number of the newest frame."""
+        newest = self._newest()
+        return newest.sequence if newest else 0
+
     def _newest(self) -> _Captured | None:
         return next(reversed(self._frames.values()), None)
 

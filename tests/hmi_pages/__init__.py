@@ -1,0 +1,1 @@
+"""The pages and the HTTP API against a station on the twin's bench."""
