@@ -192,6 +192,9 @@ def _table(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]
         rows = [
             [*(each.labels.get(key, "") for key in columns[:-1]), value_of(unit, each.points[-1][1])] for each in answer
         ]
+    if not rows:
+        axes.text(0.0, 0.9, "no rows: nothing that it asks for", fontsize=6.5, color="#555555", va="top")
+        return
     drawn = axes.table(rows[:_ROWS], colLabels=columns, loc="upper center", cellLoc="left", edges="horizontal")
     drawn.auto_set_font_size(value=False)
     drawn.set_fontsize(6.5)

@@ -454,7 +454,7 @@ def test_two_hundred_connections_and_drops_leave_nothing_behind(bench, until):
     """Four controllers at a time, because most of a connection is waiting; threads and processes the fixture counts."""
 
     async def cycle(made) -> None:
-        async with UrArm(made.settings()) as arm:
+        async with UrArm(made.settings(stale_after_s=0.3)) as arm:
             await arm.ready(60.0)
             made.controller.network.cut()
 
