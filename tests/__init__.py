@@ -1,0 +1,1 @@
+"""The tests; a package, so that a folder of them may have the name of what it tests."""
