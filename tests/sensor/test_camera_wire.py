@@ -334,10 +334,10 @@ def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings)
     async def play():
         async with bench() as one:
             settings = twin_settings(one.server.port)
-            for _ in range(5):  # a busy machine delivers fewer frames than were promised, and the probe says so
-                [good] = await probe_camera(settings)
-                if good.verdict == "ok":
-                    break
+            [good] = await probe_camera(settings)
+            for _ in range(4):  # a busy machine delivers fewer frames than were promised, and the probe says so
+                if good.verdict != "ok":
+                    [good] = await probe_camera(settings)
             assert (good.device, good.verdict, good.remedy) == ("camera", "ok", "")
             assert "480x640" in good.found
             one.server.faults.set("frame_black")
