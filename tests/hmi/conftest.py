@@ -155,11 +155,17 @@ class Cell:
         """A ready station with a recipe and its fruit; on a bench a person says first that the jaws are clear."""
         self.twin(do="remove")
         self.until(lambda state: not state.busy and (state.state in {"unknown", "held", "idle", "stopped"}))
+        eventually(self._settled)
         orders = [(CommandName.RESET, 0), (CommandName.CHANGE_RECIPE, NUMBERS[kind])]
         for done in self.ask_line(*((Command(command=name, argument=n), CommandDone) for name, n in orders)):
             assert done.done, done.why
         self.twin(do="fruit", kind=kind, seed=1, bruised=False)
         self.until(lambda state: state.ready)
+
+    def _settled(self) -> bool:
+        """Whether the PLC interface has seen each start of the service: it calls off what it did not trigger itself."""
+        log = (self.folder / "station.log").read_text()
+        return log.count("what was open is settled") > log.count("the process service ended")
 
     def begin(self) -> int:
         """Trigger, as often as it takes on a machine that has other work; gives the accepted inspection's number."""
