@@ -19,7 +19,7 @@ LIGHT_TOUCH = 0.5
 seed is outlined in place of the body (docs/robust.md, limits)."""
 
 AT_MM = 0.03
-"""So near to a closing that the recipe names, a step is at it: the gripper has counts, and eight of them are 2.996 mm.
+"""So little short of a damage threshold's closing, a step is at it: eight counts of the gripper are 2.996 mm.
 An area at its growth limit changes by 1.2 mm² over this, a quarter of what repeating an image changes it by."""
 
 _WINDOW_POINTS = 4
@@ -184,7 +184,7 @@ def _begins_at_mm(points: Sequence[Measured]) -> float | None:
 
 def _at(point: Measured, named_mm: Sequence[float]) -> Measured:
     for closing_mm in named_mm:
-        if abs(point.closing_mm - closing_mm) <= AT_MM:
+        if 0 <= closing_mm - point.closing_mm <= AT_MM:
             return replace(point, closing_mm=closing_mm)
     return point
 

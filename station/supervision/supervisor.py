@@ -217,8 +217,9 @@ class Supervisor:
             await self._look((), ended)
 
     def _feed(self) -> None:
-        """Feed the watchdog above once every program that is kept running was heard since the last time."""
-        if all(child.ready and child.heard_s > self._fed_s for child in self._children if not child.given_up):
+        """Feed the watchdog above once every program that is kept running, if any is, was heard since the last time."""
+        kept = [child for child in self._children if not child.given_up]
+        if kept and all(child.ready and child.heard_s > self._fed_s for child in kept):
             notify("WATCHDOG=1")
             self._fed_s = time.monotonic()
 
