@@ -114,7 +114,7 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         window = max(_LEAST_WINDOW_PX, _WINDOW_SHARE * radius)
         level, spread = level_of(moved, window)
         level *= moved.evening
-        cap = max(_quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
+        cap = max(quantile(level[region > 0], _CAP_QUANTILE), _LEAST_LEVEL)
         if last:
             known = min(1.0, float(moved.background.mean()) / _WELL_KNOWN)
             coherence = known * _coherence(moved, region, _COHERENCE_WINDOW_SHARE * radius)
@@ -151,8 +151,8 @@ def _fine_share(change: FloatImage, region: Mask) -> float:
     """How much of a region's squared change is as fine as seeds are: the medians' ratio."""
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in _FINE_PX)
     inside = region > 0
-    fine, whole = (np.median(length_squared(one)[inside]) for one in (elements - slopes, elements))
-    return float(fine / max(whole, _LEAST_LEVEL))
+    fine, whole = (quantile(length_squared(one)[inside], 0.5) for one in (elements - slopes, elements))
+    return fine / max(whole, _LEAST_LEVEL)
 
 
 def evening(light: FloatImage) -> FloatImage:
@@ -183,7 +183,7 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.background)
     floor = _floor(few, weight)
     scatter = np.abs(np.sqrt(few) - np.sqrt(floor))
-    spread = _NORMAL_OF_MEDIAN * (weighted_median(scatter, weight) if _is_seen(weight) else _quantile(scatter, _LOWEST))
+    spread = _NORMAL_OF_MEDIAN * (weighted_median(scatter, weight) if _is_seen(weight) else quantile(scatter, _LOWEST))
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
@@ -193,7 +193,7 @@ def _is_seen(background: FloatImage) -> bool:
 
 def _floor(field: FloatImage, background: FloatImage) -> float:
     """What a field has where nothing touches: its median there, or nearly its least where hardly anything is free."""
-    return weighted_median(field, background) if _is_seen(background) else _quantile(thinned(field).ravel(), _LOWEST)
+    return weighted_median(field, background) if _is_seen(background) else quantile(thinned(field).ravel(), _LOWEST)
 
 
 def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float = 0.0) -> float:
@@ -218,8 +218,8 @@ def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
     whole = np.maximum(whole, _LEAST_LEVEL)
-    kept = whole >= _quantile(whole, leave_out)
-    return float(np.median(agreed[kept] / whole[kept]))
+    kept = whole >= quantile(whole, leave_out)
+    return quantile(agreed[kept] / whole[kept], 0.5)
 
 
 def _most_gained(gain: FloatImage, middle: tuple[float, float], reach_px: float, every: int) -> _Floats:
@@ -243,7 +243,8 @@ def _drawn(middle: tuple[float, float], radii_px: _Floats, every: int, shape: tu
 
 def _within(region: Mask) -> Mask:
     """The inner part of a region's convex hull: a flat centre lies there, be its ring closed or not."""
-    hull = cv2.convexHull(cv2.findNonZero(region))[:, 0].astype(np.float64)
+    outlines, _ = cv2.findContours(region, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hull = cv2.convexHull(np.concatenate(outlines))[:, 0].astype(np.float64)
     moments = cv2.moments(hull.astype(np.float32))
     inner = np.zeros_like(region)
     if moments["m00"] > 0:
@@ -257,7 +258,13 @@ def _radius(region: Mask) -> float:
     return max(3.0, float(np.sqrt(np.count_nonzero(region) / np.pi)))
 
 
-def _quantile(values: npt.NDArray[np.floating], share: float) -> float:
+def quantile(values: npt.NDArray[np.floating], share: float) -> float:
+    """The value below which a share of all lies, of those that occur.
+
+    Args:
+        values: any shape, not empty.
+        share: 0 to 1.
+    """
     values = values.ravel()
     place = int(share * (values.size - 1))
     return float(np.partition(values, place)[place])

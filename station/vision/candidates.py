@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision.body import Movement, level_of
+from station.vision.body import Movement, level_of, quantile
 from station.vision.clusters import boundaries
 from station.vision.contact import FloatImage, Mask
 
@@ -51,7 +51,7 @@ def body_candidates(moved: Movement, bend: FloatImage, threshold: float) -> Cand
     if strongest <= threshold:
         return Candidates([], level, levels)
     strong = level[bend > min(threshold, _STRONG_SHARE * strongest)]
-    wanted = _SHARE_OF_LOW * float(np.quantile(strong, _LOW_QUANTILE))
+    wanted = _SHARE_OF_LOW * quantile(strong, _LOW_QUANTILE)
     beside = [cut for cut in levels if _BESIDE[0] * wanted < cut < _BESIDE[1] * wanted]
     lowest = max(_OVER_SPREAD * spread, min(beside, key=lambda cut: abs(np.log(cut / wanted)), default=wanted))
     seen = ((level > lowest) | (bend > threshold)).astype(np.uint8)

@@ -6,6 +6,7 @@ import numpy.typing as npt
 _BINS = 64
 _MOST = 6
 _EXPLAINED = 0.9
+_LEAST_RANGE = 1e-12
 
 
 def boundaries(values: npt.NDArray[np.floating]) -> list[float]:
@@ -20,7 +21,9 @@ def boundaries(values: npt.NDArray[np.floating]) -> list[float]:
     Returns:
         Ascending, one fewer than there are clusters; empty where all values are one.
     """
-    counts, edges = np.histogram(values, _BINS)
+    edges = np.linspace(float(values.min()), float(values.max()), _BINS + 1)
+    places = ((values - edges[0]) * (_BINS / max(edges[-1] - edges[0], _LEAST_RANGE))).astype(np.intp)
+    counts = np.bincount(np.minimum(places, _BINS - 1).ravel(), minlength=_BINS)
     middles = (edges[1:] + edges[:-1]) / 2
     number, first, second = (np.concatenate([[0.0], np.cumsum(counts * middles**power)])[None] for power in range(3))
     n, s, q = (total - total.T for total in (number, first, second))

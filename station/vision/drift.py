@@ -37,7 +37,7 @@ _PATTERN_SIGMA_PX = 4.0
 _STREAK_PRIOR_SHARE = 0.1
 _STRIP_PX = 10
 _NO_PRIOR = 1e-3
-_MEDIAN_SIDE = 40
+_MEDIAN_SIDE = 28
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +196,7 @@ def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: float)
 
 
 def thinned(field: FloatImage) -> FloatImage:
-    """Every few pixels of a field, about 40 along each side: enough for a median.
+    """Every few pixels of a field, about 28 along each side: enough for a median.
 
     Args:
         field: shape (height, width).

@@ -138,29 +138,30 @@ def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray
         Shape (rays,): the step on each ray.
     """
     rays, steps = cost.shape
-    turns = np.concatenate([cost, cost[: rays // 2]])
+    turns = np.concatenate([cost, cost[: rays // 2]]).astype(np.float32)
     half = len(turns) // 2
-    both = np.stack([turns[:half], turns[: half - 1 : -1]], axis=1)
-    price = (stiffness * np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1) ** 2)[:, None]
-    padded = np.full((2, steps + 2 * _LONGEST_JUMP), np.inf)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, steps, axis=1)
-    inner = padded[:, _LONGEST_JUMP:-_LONGEST_JUMP]
+    between = np.full((half, _LONGEST_JUMP), np.inf, np.float32)
+    both = np.concatenate([turns[:half], between, turns[: half - 1 : -1]], axis=1)
+    other, width = steps + _LONGEST_JUMP, both.shape[1]
+    price = (stiffness * np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1, dtype=np.float32) ** 2)[:, None]
+    padded = np.full(width + 2 * _LONGEST_JUMP, np.inf, np.float32)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
+    inner = padded[_LONGEST_JUMP:-_LONGEST_JUMP]
     inner[:] = both[0]
-    jumps = np.full((half, 2, steps), _LONGEST_JUMP)
-    candidates = np.empty((2, len(price), steps))
-    for index in range(1, half):
-        np.add(windows, price, out=candidates)
-        candidates.argmin(axis=1, out=jumps[index])
-        np.minimum.reduce(candidates, axis=1, out=inner)
-        inner += both[index]
-    join = windows[0] + price
-    meeting = int((join.min(axis=0) + inner[1]).argmin())
+    jumped = np.empty((half - 1, len(price), width), np.float32)
+    for reached, further in zip(jumped, both[1:], strict=True):
+        np.add(windows, price, out=reached)
+        np.minimum.reduce(reached, axis=0, out=inner)
+        np.add(inner, further, out=inner)
+    join = windows[:, :steps] + price
+    meeting = int((join.min(axis=0) + inner[other:]).argmin())
     ends = (meeting + int(join[:, meeting].argmin()) - _LONGEST_JUMP, meeting)
     path = np.empty(len(turns), np.intp)
     for side, end in enumerate(ends):
         place = end
-        for index in range(half - 1, -1, -1):
+        for index in range(half - 1, 0, -1):
             path[index if side == 0 else len(turns) - 1 - index] = place
-            place += int(jumps[index, side, place]) - _LONGEST_JUMP
+            place += int(jumped[index - 1, :, place + side * other].argmin()) - _LONGEST_JUMP
+        path[-side] = place
     start = rays // 4
     return np.roll(path[start : start + rays], start)
