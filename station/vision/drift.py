@@ -34,7 +34,8 @@ _LATER_SHARE = 0.02
 """What a place counts that the first guess took for contact, once the fit has reached it."""
 _TUKEY_WIDTH = 3.0
 _PATTERN_SIGMA_PX = 4.0
-_STREAK_PRIOR_SHARE = 0.1
+_STREAK_PRIOR_SHARES, _STREAKS_WELL_KNOWN = (0.03, 0.1), 0.3
+"""Of a line's cells: a skirt must not pass for the offset of a line that a large contact leaves little of."""
 _STRIP_PX = 10
 _NO_PRIOR = 1e-3
 _MEDIAN_SIDE = 28
@@ -181,7 +182,8 @@ def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
 
 def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
-    prior = _STREAK_PRIOR_SHARE * strips.shape[axis]
+    known = max(float(background.mean()) / _STREAKS_WELL_KNOWN, _LEAST_KNOWN)
+    prior = strips.shape[axis] * float(np.clip(_STREAK_PRIOR_SHARES[0] / known**_KNOWN_POWER, *_STREAK_PRIOR_SHARES))
     away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
