@@ -128,9 +128,9 @@ def main() -> None:
     lines = [
         "# How long a measurement takes",
         "",
-        f"Written by `./run bench vision`: medians of {RUNS} runs ({PEER_RUNS} of the other libraries), one thread, 640x480.",
-        f"The stages' image is a simulated raspberry's at {CLOSINGS_MM[1]:g} mm of closing; whole methods measure four fruits'",
-        f"at {', '.join(f'{mm:g}' for mm in CLOSINGS_MM)} mm, in turn, the quietest of {ROUNDS} rounds for each frame.",
+        f"Written by `./run bench vision`: medians of {RUNS} runs ({PEER_RUNS} of the other libraries), one thread,",
+        f"640x480 images: the stages of a simulated raspberry's at {CLOSINGS_MM[1]:g} mm of closing, the whole methods of",
+        f"four fruits' at {', '.join(f'{mm:g}' for mm in CLOSINGS_MM)} mm, in turn, the quietest of {ROUNDS} rounds each.",
         f"OpenCV {cv2.__version__}, numpy {np.__version__}.",
         "",
         "| stage | ms | the same step elsewhere | ms |",
