@@ -18,7 +18,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import numpy.typing as npt
-from measurement.light_touch import detection_table
+from measurement.light_touch import UNTOUCHED_RADII, Beside, detection_table
 from measurement.on_the_twin import FRAMES_PER_STEP, peers_table, twin_table
 from measurement.peers import methods
 
@@ -101,6 +101,16 @@ def presses_table(folder: Path, worst: Path | None) -> list[str]:
                 overlap=edge.overlap,
             )
     return lines
+
+
+def beside_contacts(folder: Path) -> list[Beside]:
+    """The real presses, and where in them nothing touches."""
+    reference = read(folder / "reference.jpg")
+    rows = list(csv.DictReader((folder / "contacts.csv").read_text().splitlines()))
+    for row in rows:
+        row["far"] = str(UNTOUCHED_RADII * float(row["outline_radius_px"]))
+    keys = ("outline_x_px", "outline_y_px", "far")
+    return [(reference, read(folder / row["image"]), ~circle(row, keys)) for row in rows]
 
 
 def draw_worst(
@@ -270,7 +280,7 @@ def main() -> None:
         "",
         "## The lightest touch: each fruit at five places on two units",
         "",
-        *detection_table(),
+        *detection_table(beside_contacts(arguments.images / "digit_presses")),
         "",
         f"Peak memory of the robust method over a press of 20 frames: {peak_memory_mb():.0f} MB beside the frames.",
         "",

@@ -26,7 +26,7 @@ FRUITS = ("strawberry", "raspberry", "blueberry", "rubber_ball")
 FRAMES_PER_STEP = 3
 """As in the recipes; the station measures their mean."""
 FRAMES_PER_S = 30.0
-TWIN_SEEDS = (0, 1400)
+TWIN_SEEDS = (0, 2600)
 """Of the first press of each fruit; nothing was chosen on the second."""
 FIRM_MM2 = 20
 LARGE_ERROR = 0.25

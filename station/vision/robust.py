@@ -80,6 +80,51 @@ class RobustMethod:
         Raises:
             ValueError: the image's shape or dtype is not the references'.
         """
+        seen = self._look(image)
+        sure = seen.gate > _SURE_GATE
+        if self._parameters.contacts == "several":
+            candidates = separate_candidates(seen.bend, seen.threshold)
+        else:
+            candidates = body_candidates(seen.moved, seen.bend, seen.threshold)
+        found = self._outlines(seen, candidates.regions, sure=sure)
+        mask = self._mask(found)
+        if on_stage:
+            pictures.emit(
+                on_stage,
+                self.stages,
+                difference=capped(seen.work) - self._light,
+                change=seen.change,
+                bend=seen.bend,
+                candidates=candidates,
+                threshold=seen.threshold,
+                edges=[outline.edge for outline in found],
+                mask=mask,
+            )
+        flags, confidence = self._judge(seen.work, seen.drift, mask, found, seen.gate)
+        return contact_from_mask(
+            mask,
+            flags,
+            confidence=confidence,
+            gate=seen.gate,
+            drift_levels=seen.drift.strength_levels,
+        )
+
+    def bending(self, image: Image) -> tuple[FloatImage, float]:
+        """How much the gel bends at half the working size, and from how much on contact is looked for.
+
+        Args:
+            image: as for `measure`.
+
+        Returns:
+            Shape (height, width) and the gate's threshold, grey levels per pixel of the working image.
+
+        Raises:
+            ValueError: as `measure`.
+        """
+        seen = self._look(image)
+        return seen.bend, seen.threshold
+
+    def _look(self, image: Image) -> "_Seen":
         if image.shape != self._shape or image.dtype != np.uint8:
             raise ValueError(
                 f"image {image.shape} {image.dtype} must be uint8 and of the reference's shape {self._shape}"
@@ -100,35 +145,8 @@ class RobustMethod:
         bend = bending(half, _FINE_STEP)
         noise = noise_of(bend, background)
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
-        gate = float(bend.max()) / threshold
-        sure = gate > _SURE_GATE
         moved = movement(half, background, self._evening)
-        if self._parameters.contacts == "several":
-            candidates = separate_candidates(bend, threshold)
-        else:
-            candidates = body_candidates(moved, bend, threshold)
-        found = self._outlines(_Seen(change, half, drift.background, moved), candidates.regions, sure=sure)
-        mask = self._mask(found)
-        if on_stage:
-            pictures.emit(
-                on_stage,
-                self.stages,
-                difference=difference,
-                change=change,
-                bend=bend,
-                candidates=candidates,
-                threshold=threshold,
-                edges=[outline.edge for outline in found],
-                mask=mask,
-            )
-        flags, confidence = self._judge(work, drift, mask, found, gate)
-        return contact_from_mask(
-            mask,
-            flags,
-            confidence=confidence,
-            gate=gate,
-            drift_levels=drift.strength_levels,
-        )
+        return _Seen(work, drift, change, half, moved, bend, threshold)
 
     def _outlines(self, seen: "_Seen", candidates: list[Mask], *, sure: bool) -> list[Outline]:
         """The outlines that the image supports, or any where contact is sure."""
@@ -145,7 +163,7 @@ class RobustMethod:
                 continue
             smooth = denoised(seen.change, seen.half, body.radius_px * width / candidate.shape[1])
             length = resized(length_of(smooth), (width, height))
-            outline = find_outline(length, body, seen.background, self._parameters.edge_stiffness)
+            outline = find_outline(length, body, seen.drift.background, self._parameters.edge_stiffness)
             if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline):
                 continue
             if sure or outline.confidence >= _LEAST_SUPPORT:
@@ -186,14 +204,21 @@ class RobustMethod:
 
 
 class _Seen(NamedTuple):
-    """One frame without drift, as the search for outlines needs it."""
+    """One frame without drift, before contacts are looked for."""
 
+    work: Image
+    drift: Drift
     change: FloatImage
     half: FloatImage
     """The change averaged down to the bending's size."""
-    background: FloatImage
-    """Of the change's size."""
     moved: Movement
+    bend: FloatImage
+    threshold: float
+
+    @property
+    def gate(self) -> float:
+        """The strongest bending over the gate's threshold."""
+        return float(self.bend.max()) / self.threshold
 
 
 def _one_sided(change: FloatImage, outline: Outline) -> bool:
