@@ -102,7 +102,7 @@ class RobustMethod:
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
         gate = float(bend.max()) / threshold
         sure = gate > _SURE_GATE
-        moved = movement(half, background, self._evening)
+        moved = movement(half, background, self._evening, bend)
         if self._parameters.contacts == "several":
             candidates = separate_candidates(bend, threshold)
         else:
