@@ -31,7 +31,7 @@ _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
 _SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
 _FINE_PX, _STRONGEST, _FINE_ON_SKIN = (3.0, 12.0), 0.9, 0.105
-_BENT_QUANTILE, _BENT_SHARE = 0.6, 0.33
+_SKIRT_OVER_LOWEST, _SKIRT_BEND, _BENT_QUANTILE, _BENT_SHARE = 1.5, 0.5, 0.6, 0.3
 _SPAN = 1.9
 _INNER_SHARE = 0.6
 _STEPS = 80
@@ -146,8 +146,8 @@ def _bent(moved: Movement, region: Mask, middle: tuple[float, float], radii: _Fl
 
     Without background the skirt's level is the body's; seeds and drupelets bend the gel, and the skirt does not.
     """
-    bend = moved.bend * moved.evening
-    bend = np.sqrt(np.maximum(np.square(bend) - _quantile(thinned(bend), _LOWEST) ** 2, 0), dtype=np.float32)
+    floor = min(_SKIRT_OVER_LOWEST * _quantile(thinned(moved.bend), _LOWEST), _SKIRT_BEND)
+    bend = np.sqrt(np.maximum(np.square(moved.bend) - np.float32(floor**2), 0), dtype=np.float32)
     cap = max(_quantile(bend[region > 0], _BENT_QUANTILE), _LEAST_LEVEL)
     gain = np.minimum(bend * np.float32(1 / cap), 1) - np.float32(_BENT_SHARE)
     bent_radii = _most_gained(gain, middle, _SPAN * _radius(region), 1)
