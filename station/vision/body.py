@@ -30,13 +30,15 @@ _SHARES = (0.2, 0.76)
 _COHERENCE_WINDOW_SHARE = 0.13
 _SMOOTH_SMALL, _SMOOTH, _SMOOTH_PER_SIZE = 0.7, 1.393, 0.222
 _SKIN_WINDOW_SHARE, _SKIN_LEFT_OUT = 0.11, 0.25
-_FINE_PX, _FINE_ON_SKIN = (3.0, 12.0), 0.075
+_FINE_PX, _STRONGEST, _FINE_ON_SKIN = (3.0, 12.0), 0.9, 0.105
+_SKIRT_OVER_LOWEST, _SKIRT_BEND, _BENT_QUANTILE, _BENT_SHARE = 1.5, 0.5, 0.6, 0.28
 _SPAN = 1.9
 _INNER_SHARE = 0.6
 _STEPS = 80
 _FIRST_EVERY = 2
 _HALF_FROM_PX = 2.5
 _STIFFNESS = 0.05
+_WIDE_WINDOW_PX, _WIDE_SHARE, _FAR_LEVELS = 3.0, 0.3, 6.0
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_LEVEL = 1e-3
 _LEAST_BACKGROUND, _WELL_KNOWN, _LOWEST = 0.02, 0.1, 0.03
@@ -55,6 +57,8 @@ class Movement(NamedTuple):
     """How surely a place is background, shape (height, width), 0 to 1."""
     evening: FloatImage
     """What makes up for weak light, shape (height, width), about 1."""
+    bend: FloatImage
+    """How much the gel bends, shape (height, width), grey levels per pixel of the working size."""
 
 
 class Body(NamedTuple):
@@ -84,16 +88,17 @@ class Body(NamedTuple):
         return _radius(self.region)
 
 
-def movement(half: FloatImage, background: FloatImage, evening: FloatImage) -> Movement:
+def movement(half: FloatImage, background: FloatImage, evening: FloatImage, bend: FloatImage) -> Movement:
     """Prepare a frame's change.
 
     Args:
         half: without drift, at half the working size, shape (height, width, 3), grey levels.
         background: shape (height, width), 0 to 1.
         evening: from `evening`, shape (height, width).
+        bend: from `bending`, shape (height, width).
     """
     change = np.asarray(cv2.GaussianBlur(half, (0, 0), _BLUR_PX), np.float32)
-    return Movement(change, length_squared(change), background, evening)
+    return Movement(change, length_squared(change), background, evening, bend)
 
 
 def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body | None:
@@ -131,28 +136,57 @@ def find_body(moved: Movement, start: Mask, others: Mask | None = None) -> Body 
         region = _drawn(middle, radii, every, (region.shape[0], region.shape[1]))
         if not region.any():
             return None
-    return Body(region, middle, radii, level, spread, coherence, _is_textured(moved, region))
+    textured = _is_textured(moved, region)
+    if textured and float(moved.background.mean()) < _WELL_KNOWN:
+        region, radii = _bent(moved, region, middle, radii)
+    return Body(region, middle, radii, level, spread, coherence, textured)
+
+
+def _bent(moved: Movement, region: Mask, middle: tuple[float, float], radii: _Floats) -> tuple[Mask, _Floats]:
+    """The part of a textured body's region that bends, and its radii, or the region where none does.
+
+    Without background the skirt's level is the body's; seeds and drupelets bend the gel, and the skirt does not.
+    """
+    floor = min(_SKIRT_OVER_LOWEST * quantile(thinned(moved.bend), _LOWEST), _SKIRT_BEND)
+    bend = np.sqrt(np.maximum(np.square(moved.bend) - np.float32(floor**2), 0), dtype=np.float32)
+    cap = max(quantile(bend[region > 0], _BENT_QUANTILE), _LEAST_LEVEL)
+    gain = np.minimum(bend * np.float32(1 / cap), 1) - np.float32(_BENT_SHARE)
+    bent_radii = _most_gained(gain, middle, _SPAN * _radius(region), 1)
+    bent = _drawn(middle, bent_radii, 1, (region.shape[0], region.shape[1]))
+    return (bent, bent_radii) if bent.any() else (region, radii)
 
 
 def _is_textured(moved: Movement, region: Mask) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
 
-    Without background the fit of the drift has bent the body's own slopes: what is finer than those is asked as well.
+    Without background the fit of the drift has bent the body's own slopes, and directions tell nothing: there skin is
+    what is finer than those slopes, times how much the strongest tenth bends.
     """
+    if float(moved.background.mean()) < _WELL_KNOWN:
+        strongest = quantile(moved.bend[region > 0], _STRONGEST)
+        return _fine_share(moved.change, region) * strongest > _FINE_ON_SKIN
     skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
-    if float(moved.background.mean()) >= _WELL_KNOWN:
-        return skin < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
-    if skin < _SMOOTH_SMALL or _is_seen(moved.background):
-        return skin < _SMOOTH_SMALL
-    return _fine_share(moved.change, region) > _FINE_ON_SKIN
+    return skin < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
 
 
 def _fine_share(change: FloatImage, region: Mask) -> float:
     """How much of a region's squared change is as fine as seeds are: the medians' ratio."""
-    elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in _FINE_PX)
-    inside = region > 0
+    size = (change.shape[1] // 2, change.shape[0] // 2)
+    change = resized(change, size)
+    elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma / 2), np.float32) for sigma in _FINE_PX)
+    inside = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST) > 0
     fine, whole = (quantile(length_squared(one)[inside], 0.5) for one in (elements - slopes, elements))
     return fine / max(whole, _LEAST_LEVEL)
+
+
+def has_moved_widely(moved: Movement) -> bool:
+    """Whether three tenths of the frame have moved far beyond what drift leaves over.
+
+    A large smooth body bends the gel evenly and leaves skirt for background, above whose bending it hardly stands out.
+    On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² it was 15.
+    """
+    level, _ = level_of(moved, _WIDE_WINDOW_PX)
+    return quantile(thinned(level), 1 - _WIDE_SHARE) > _FAR_LEVELS
 
 
 def evening(light: FloatImage) -> FloatImage:

@@ -14,7 +14,7 @@ import numpy as np
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.body import Movement, evening, find_body, movement
+from station.vision.body import Movement, evening, find_body, has_moved_widely, movement
 from station.vision.candidates import body_candidates, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
@@ -34,6 +34,8 @@ _COARSE_STEP, _FINE_STEP = 4, 2
 _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
+_GATE_OF_WIDE = 0.6
+"""Of the gate's threshold, where so much has moved that the background's bending is the skirt's."""
 
 
 class RobustMethod:
@@ -145,7 +147,9 @@ class RobustMethod:
         bend = bending(half, _FINE_STEP)
         noise = noise_of(bend, background)
         threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
-        moved = movement(half, background, self._evening)
+        moved = movement(half, background, self._evening, bend)
+        if bend.max() <= threshold and has_moved_widely(moved):
+            threshold *= _GATE_OF_WIDE
         return _Seen(work, drift, change, half, moved, bend, threshold)
 
     def _outlines(self, seen: "_Seen", candidates: list[Mask], *, sure: bool) -> list[Outline]:
