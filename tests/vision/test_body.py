@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from station.vision.body import evening, find_body, level_of, movement
+from station.vision.bending import bending
+from station.vision.body import evening, find_body, has_moved_widely, level_of, movement
 
 SHAPE = (160, 120)
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]]
@@ -14,9 +15,9 @@ def away(x=60.0, y=80.0):
 
 
 def moved(change, seed=0, noise_levels=1.0):
-    noisy = change + np.random.default_rng(seed).normal(0, noise_levels, (*SHAPE, 3))
+    noisy = (change + np.random.default_rng(seed).normal(0, noise_levels, (*SHAPE, 3))).astype(np.float32)
     background = (np.abs(change).sum(axis=2) < 0.5).astype(np.float32)
-    return movement(noisy.astype(np.float32), background, np.ones(SHAPE, np.float32))
+    return movement(noisy, background, np.ones(SHAPE, np.float32), bending(noisy, 2))
 
 
 def smooth(radius, levels=12.0):
@@ -54,6 +55,19 @@ def test_without_background_what_is_finer_than_the_body_s_slopes_is_texture():
     slopes = 0.5 * np.stack([COLUMNS - 59.5, ROWS - 79.5, 0.0 * ROWS], axis=-1)
     bodies = [find_body(moved(change), start(45)) for change in (slopes, slopes + textured(200, levels=22.0))]
     assert [body is not None and body.textured for body in bodies] == [False, True]
+
+
+def test_without_background_skin_ends_where_the_gel_stops_bending():
+    skirt = 0.3 * np.stack([COLUMNS - 59.5, ROWS - 79.5, 0.0 * ROWS], axis=-1)
+    body = find_body(moved(skirt + textured(58, levels=30.0)), start(70))
+    assert body is not None
+    assert body.textured
+    assert 0.8 < np.count_nonzero(body.region) / (np.pi * 58**2) < 1.4
+
+
+def test_a_wide_movement_is_neither_noise_nor_a_small_contact():
+    changes = (np.zeros((*SHAPE, 3)), textured(25), smooth(70, levels=25.0))
+    assert [has_moved_widely(moved(change)) for change in changes] == [False, False, True]
 
 
 def test_an_open_ring_is_its_whole_disc():

@@ -9,8 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.settings.segmentation import RobustParameters
+from station.studies.cohort import member
 from station.twin.digit.press import render_press
 from station.twin.fruit import draw_fruit
+from station.twin.gel import MM_PER_PX
 from station.vision.contact import Flag
 from station.vision.robust import RobustMethod
 
@@ -169,6 +171,20 @@ def test_a_contact_that_fills_the_field_is_a_lower_bound_and_not_sure():
     contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
     assert contact.area_px > 0.8 * press.true_masks[0].size
     assert {Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE} <= contact.flags
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "from_mm2", "rel"),
+    [("rubber_ball", 11, 85, 0.1), ("strawberry", 298, 120, 0.35), ("raspberry", 14, 110, 0.2)],
+)
+def test_a_contact_that_leaves_hardly_any_background_ends_at_its_edge(kind, number, from_mm2, rel):
+    press = member(kind, 2025, number).press()
+    method = RobustMethod(press.references, RobustParameters())
+    truths = [np.count_nonzero(mask) for mask in press.true_masks]
+    deep = [place for place, truth in enumerate(truths) if truth * MM_PER_PX**2 > from_mm2]
+    assert len(deep) >= 3
+    ratios = [method.measure(press.frames[place]).area_px / truths[place] for place in deep]
+    assert ratios == pytest.approx([1.0] * len(deep), abs=rel)
 
 
 def test_a_crown_is_not_taken_for_its_blueberry():
