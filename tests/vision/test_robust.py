@@ -32,7 +32,7 @@ def measure(reference, image, **parameters):
 @FEW
 @given(
     where=st.fixed_dictionaries(
-        {"x_px": st.floats(110, 370), "y_px": st.floats(110, 530), "radius_px": st.floats(30, 80)}
+        {"x_px": st.floats(110, 370), "y_px": st.floats(110, 530), "radius_px": st.floats(40, 80)}
     ),
     levels=st.floats(30, 70),
     seed=st.integers(0, 1000),
