@@ -1,0 +1,94 @@
+"""The pages as pictures for the documents."""
+
+import io
+from pathlib import Path
+
+import psutil
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+PICTURES = Path(__file__).resolve().parents[2] / "docs" / "images"
+PIN = "482915"
+SIZES = {"": (1280, 800), "-phone": (390, 844)}
+PAGES = {
+    "run": "/",
+    "change": "/change",
+    "confirm": "/change/2",
+    "recipes": "/recipes",
+    "recipe": "/recipes/strawberry",
+    "recipe-edit": "/recipes/strawberry/edit",
+    "history": "/history",
+    "inspection": "/history/{number}",
+    "step": "/history/{number}/step/1",
+    "audit": "/history/audit",
+    "alarms": "/alarms",
+    "maintenance": "/maintenance",
+    "maintenance-hand": "/maintenance/hand",
+    "maintenance-image": "/maintenance/image",
+    "maintenance-sensor": "/maintenance/sensor",
+    "maintenance-registers": "/maintenance/registers",
+    "people": "/people",
+}
+
+
+def draw(address: str, process: psutil.Process, browser: Browser) -> None:
+    """Every page as a picture, at the panel's size and a phone's.
+
+    Args:
+        address: of the pages, at their first start.
+        process: the pages'.
+        browser: which draws them.
+    """
+    for size, (width, height) in SIZES.items():
+        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
+        page.goto(f"{address}/people")
+        if page.locator("form[action='/people/begin']").count():
+            keep(page, "first-start")
+            page.fill("#pin", PIN)
+            page.fill("#again", PIN)
+            with page.expect_navigation():
+                page.locator("form[action='/people/begin'] .main").click()
+            with page.expect_navigation():
+                page.locator(".who form button").click()
+            page.goto(f"{address}/people")
+        keep(page, f"log-in{size}")
+        page.locator("input[name=name]").first.check(force=True)
+        page.fill("#pin", PIN)
+        with page.expect_navigation():
+            page.locator(".log-in .main").click()
+        page.goto(address + "/")
+        settled(page)
+        tiles = page.locator(".tile-fail").all() or page.locator(".tile").all()
+        number = next((tile.get_attribute("href") or "" for tile in tiles), "").rpartition("/")[2]
+        for name, path in PAGES.items():
+            page.goto(address + path.format(number=number))
+            settled(page)
+            keep(page, f"{name}{size}")
+        page.goto(f"{address}/alarms")
+        if page.locator(".alarm h2 a").count():
+            page.locator(".alarm h2 a").first.click()
+            keep(page, f"alarm{size}")
+        page.context.close()
+    for size, (width, height) in SIZES.items():  # the last, as the station raises an alarm of it
+        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
+        page.goto(address)
+        settled(page)
+        process.suspend()
+        page.locator("body.stale").wait_for()
+        page.wait_for_timeout(2500)
+        keep(page, f"stale{size}")
+        process.resume()
+        page.locator("body:not(.stale)").wait_for()
+        page.context.close()
+
+
+def keep(page: Page, name: str) -> None:
+    """A picture of what is seen without scrolling, in few colours: the pages are grey."""
+    drawn = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    drawn.quantize(64, dither=Image.Dither.NONE).save(PICTURES / f"hmi-{name}.png", optimize=True)
+
+
+def settled(page: Page) -> None:
+    """Until the pictures are there."""
+    page.wait_for_load_state("load")
+    page.wait_for_timeout(1200)
