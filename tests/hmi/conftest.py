@@ -415,6 +415,7 @@ class Pages:
     app: Any
     context: Any
     cookies: dict[str, str] = field(default_factory=dict)
+    asked_from: str = "127.0.0.1"
 
     def __call__(
         self, method: str, path: str, body: bytes = b"", *, headers: dict[str, str] | None = None, chunks: int = 1
@@ -432,7 +433,7 @@ class Pages:
             "query_string": path.partition("?")[2].encode(),
             "root_path": "",
             "headers": [(name.encode(), value.encode()) for name, value in given.items() if value],
-            "client": ("127.0.0.1", 50_000),
+            "client": (self.asked_from, 50_000),
             "server": ("127.0.0.1", 8080),
         }
         return run_apart(self._ask(scope, body, chunks))

@@ -206,12 +206,12 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     page = person.go("/maintenance/hand")
     page.get_by_role("button", name="Set manual mode").click()
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
-    page.get_by_label("Width, mm").fill("40")
+    page.get_by_label("Width, mm").fill("40,4")
     page.get_by_role("button", name="Go there").click()
     told = page.get_by_text(re.compile(r"The fingers stand at [\d.]+ mm"))
     expect(told).to_be_visible()
     width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
-    assert abs(width_mm - 40) < 1
+    assert abs(width_mm - 40.4) < 0.3
     assert not orchard.state().ready
     page.get_by_role("button", name="Open", exact=True).click()
     expect(told).not_to_contain_text(f"{width_mm:.1f}")
@@ -231,6 +231,39 @@ def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, pan
     row = page.locator("tr", has_text="reference_u16")
     expect(row).to_contain_text("4660")
     expect(page.locator("tr", has_text="packml_mode")).to_contain_text("production")
+
+
+def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/image")
+    held: list[Any] = []
+    asked: list[str] = []
+    page.route("**/maintenance/image/*.jpg", held.append)
+    page.on("request", lambda request: asked.append(request.url) if "/image/part" in request.url else None)
+    while not held:
+        page.wait_for_timeout(50)
+    before = len(asked)
+    page.wait_for_timeout(1500)  # seven times the pause between two
+    assert (len(asked), len(held)) == (before, 1), "the next is not asked for before this one was taken"
+    page.unroute("**/maintenance/image/*.jpg")
+    held[0].continue_()
+    with page.expect_request("**/maintenance/image/part*"):
+        pass
+
+
+def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/registers")
+    held: list[Any] = []
+    page.route("**/maintenance/registers/part", held.append)
+    part = page.locator("[data-poll]")
+    expect(part).to_have_class(re.compile("old-part"))
+    assert re.search(r"No data for \d+ s", part.get_attribute("data-old") or "")
+    assert part.evaluate("part => part.inert")
+    assert page.locator("body:not(.stale)").count() == 1, "the station itself is heard"
+    page.unroute("**/maintenance/registers/part")
+    for each in held:
+        each.abort()
+    expect(part).not_to_have_class(re.compile("old-part"))
+    assert not part.evaluate("part => part.inert")
 
 
 def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, panel: Any) -> None:
