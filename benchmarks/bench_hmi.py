@@ -88,7 +88,7 @@ def demo() -> Iterator[Demo]:
             "arm": {"host": HOST, "stale_after_s": 1.0},
             "gripper": {"urcap": {"host": HOST}, "modbus_rtu": {"host": HOST}, "answer_timeout_s": 2.0},
             "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
-            "service": {"patience": 5.0},
+            "service": {"patience": 5.0, "inspection_deadline_s": 30.0},
         }
         file.write_text(json.dumps(values), encoding="utf-8")
         environment = {

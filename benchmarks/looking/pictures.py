@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, Page
 
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "images"
 PIN = "482915"
+FAIL_WITHIN_S = 300
 SIZES = {"": (1280, 800), "-phone": (390, 844)}
 PAGES = {
     "run": "/",
@@ -18,8 +19,6 @@ PAGES = {
     "recipe": "/recipes/strawberry",
     "recipe-edit": "/recipes/strawberry/edit",
     "history": "/history",
-    "inspection": "/history/{number}",
-    "step": "/history/{number}/step/1",
     "audit": "/history/audit",
     "alarms": "/alarms",
     "maintenance": "/maintenance",
@@ -57,11 +56,13 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
         with page.expect_navigation():
             page.locator(".log-in .main").click()
         page.goto(address + "/")
-        settled(page)
-        tiles = page.locator(".tile-fail").all() or page.locator(".tile").all()
-        number = next((tile.get_attribute("href") or "" for tile in tiles), "").rpartition("/")[2]
-        for name, path in PAGES.items():
-            page.goto(address + path.format(number=number))
+        failed = page.locator(".tile-fail").first  # of which every image is kept
+        failed.wait_for(timeout=1000 * FAIL_WITHIN_S)
+        inspection = (failed.get_attribute("href") or "").replace("/fruit/", "/history/")
+        page.goto(address + inspection)
+        step = page.locator(".steps a").last.get_attribute("href") or ""
+        for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
+            page.goto(address + path)
             settled(page)
             keep(page, f"{name}{size}")
         page.goto(f"{address}/alarms")

@@ -17,11 +17,13 @@ from hmi.recipe_form import field_keys, groups
 from hmi.words import FOLDER, NO_VALUE, Wording, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.camera.interface import FrameFault
 from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
 from station.settings.recipe import load_recipes
+from station.vision.contact import Flag
 from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
@@ -29,12 +31,8 @@ LANGUAGES = ("en", "de", "es")
 STATION = HMI.parent / "station"
 NOT_FOR_OPERATORS = {
     "alarm {}: expected an id of docs/alarms.md, as {}",
-    "the PLC interface has not asked yet",
-    "see the detail, and `station devices check`",
-    "start it: station plc run",
-    "none: see `station recipes check`",
 }
-"""Of addresses that a page never asks for, and of health for supervisors."""
+"""Of addresses that a page never asks for."""
 FAULTS_FROM = (
     *(
         f"devices/arm/{name}"
@@ -232,6 +230,7 @@ def test_no_text_that_a_page_uses_is_missing():
     used |= {f"reason.{reason}" for reason in Reason} | {f"packml.{state}" for state in PackmlState}
     used |= {f"order.{order}" for order in OrderName} | {f"alarms.state.{state}" for state in AlarmState}
     used |= {f"nav.{entry.name}" for entry in entries()}
+    used |= {f"inspection.flag_{flag}" for flag in Flag} | {f"maintenance.fault_{fault}" for fault in FrameFault}
     assert used <= set(catalogue("en")), used - set(catalogue("en"))
     assert len(used) > 100
 
