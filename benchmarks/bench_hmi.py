@@ -84,7 +84,7 @@ def demo() -> Iterator[Demo]:
         values = {
             "modbus": {"port": modbus},
             "metrics": {"port": metrics},
-            "hmi": {"port": hmi, "refresh_s": REFRESH_S},
+            "hmi": {"port": hmi, "refresh_s": REFRESH_S, "idle_s": 3600.0},
             "arm": {"host": HOST, "stale_after_s": 1.0},
             "gripper": {"urcap": {"host": HOST}, "modbus_rtu": {"host": HOST}, "answer_timeout_s": 2.0},
             "camera": {"oldest_s": 2.0, "twin": {"port": camera}},

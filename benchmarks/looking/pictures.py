@@ -20,7 +20,6 @@ PAGES = {
     "recipe-edit": "/recipes/strawberry/edit",
     "history": "/history",
     "audit": "/history/audit",
-    "alarms": "/alarms",
     "maintenance": "/maintenance",
     "maintenance-hand": "/maintenance/hand",
     "maintenance-image": "/maintenance/image",
@@ -38,49 +37,53 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
         process: the pages'.
         browser: which draws them.
     """
+    page = browser.new_context().new_page()
+    page.goto(f"{address}/people")
+    kept_in_all_sizes(page, "first-start")
+    page.fill("#pin", PIN)
+    page.fill("#again", PIN)
+    with page.expect_navigation():
+        page.locator("form[action='/people/begin'] .main").click()
+    with page.expect_navigation():
+        page.locator(".who form button").click()
+    page.goto(f"{address}/people")
+    kept_in_all_sizes(page, "log-in")
+    page.locator("input[name=name]").first.check(force=True)
+    page.fill("#pin", PIN)
+    with page.expect_navigation():
+        page.locator(".log-in .main").click()
+    page.goto(f"{address}/alarms")
+    kept_in_all_sizes(page, "alarms")
+    page.locator(".alarm h2 a").first.click()  # no recipe was chosen before the line did
+    kept_in_all_sizes(page, "alarm")
+    with page.expect_navigation():
+        page.get_by_role("button", name="Acknowledge").first.click()
+    page.goto(address)
+    failed = page.locator(".tile-fail").first  # of which every image is kept
+    failed.wait_for(timeout=1000 * FAIL_WITHIN_S)
+    inspection = (failed.get_attribute("href") or "").replace("/fruit/", "/history/")
+    page.goto(address + inspection)
+    step = page.locator(".steps a").last.get_attribute("href") or ""
+    for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
+        page.goto(address + path)
+        kept_in_all_sizes(page, name)
+    page.goto(address)
+    settled(page)
+    process.suspend()  # the last, as the station raises an alarm of it
+    page.locator("body.stale").wait_for()
+    page.wait_for_timeout(2500)
+    kept_in_all_sizes(page, "stale")
+    process.resume()
+    page.locator("body:not(.stale)").wait_for()
+    page.context.close()
+
+
+def kept_in_all_sizes(page: Page, name: str) -> None:
+    """At the panel's size and at a phone's."""
     for size, (width, height) in SIZES.items():
-        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
-        page.goto(f"{address}/people")
-        if page.locator("form[action='/people/begin']").count():
-            keep(page, "first-start")
-            page.fill("#pin", PIN)
-            page.fill("#again", PIN)
-            with page.expect_navigation():
-                page.locator("form[action='/people/begin'] .main").click()
-            with page.expect_navigation():
-                page.locator(".who form button").click()
-            page.goto(f"{address}/people")
-        keep(page, f"log-in{size}")
-        page.locator("input[name=name]").first.check(force=True)
-        page.fill("#pin", PIN)
-        with page.expect_navigation():
-            page.locator(".log-in .main").click()
-        page.goto(address + "/")
-        failed = page.locator(".tile-fail").first  # of which every image is kept
-        failed.wait_for(timeout=1000 * FAIL_WITHIN_S)
-        inspection = (failed.get_attribute("href") or "").replace("/fruit/", "/history/")
-        page.goto(address + inspection)
-        step = page.locator(".steps a").last.get_attribute("href") or ""
-        for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
-            page.goto(address + path)
-            settled(page)
-            keep(page, f"{name}{size}")
-        page.goto(f"{address}/alarms")
-        if page.locator(".alarm h2 a").count():
-            page.locator(".alarm h2 a").first.click()
-            keep(page, f"alarm{size}")
-        page.context.close()
-    for size, (width, height) in SIZES.items():  # the last, as the station raises an alarm of it
-        page = browser.new_context(viewport={"width": width, "height": height}).new_page()
-        page.goto(address)
+        page.set_viewport_size({"width": width, "height": height})
         settled(page)
-        process.suspend()
-        page.locator("body.stale").wait_for()
-        page.wait_for_timeout(2500)
-        keep(page, f"stale{size}")
-        process.resume()
-        page.locator("body:not(.stale)").wait_for()
-        page.context.close()
+        keep(page, f"{name}{size}")
 
 
 def keep(page: Page, name: str) -> None:

@@ -98,6 +98,11 @@ class TestRequests:
         kind["content-length"] = ""
         assert pages("POST", "/language", body, headers=kind, chunks=chunks)[0] == 413
 
+    def test_what_is_too_large_is_not_taken_to_its_end(self, pages):
+        kind = {"content-type": "application/x-www-form-urlencoded", "content-length": ""}
+        assert pages("POST", "/language", b"x" * (2 * LARGEST_BODY_BYTES), headers=kind, chunks=8)[0] == 413
+        assert pages.unread >= 3
+
     def test_a_form_that_is_not_what_is_expected_is_refused(self, pages):
         log_in(pages)
         assert pages.post("/change", csrf=pages.token(), number="70000")[0] == 400
