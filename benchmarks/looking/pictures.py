@@ -14,7 +14,6 @@ SIZES = {"": (1280, 800), "-phone": (390, 844)}
 PAGES = {
     "run": "/",
     "change": "/change",
-    "confirm": "/change/2",
     "recipes": "/recipes",
     "recipe": "/recipes/strawberry",
     "recipe-edit": "/recipes/strawberry/edit",
@@ -67,6 +66,9 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
     for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
         page.goto(address + path)
         kept_in_all_sizes(page, name)
+    page.goto(f"{address}/change")
+    page.locator(".fruit-tile:not(.active)").first.click()
+    kept_in_all_sizes(page, "confirm")
     page.goto(address)
     settled(page)
     process.suspend()  # the last, as the station raises an alarm of it
