@@ -150,6 +150,17 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     assert all(size == 480 for size in sizes)
 
 
+def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orchard: Any, panel: Any) -> None:
+    page = panel(locale="de").go("/history")
+    page.locator("[name=number]").fill("4.711")
+    page.locator(".search .main, .search button").first.click()
+    expect(page.locator("main")).to_contain_text("es gibt keine Prüfung 4711; aufgezeichnet sind")
+    page = panel().go("/history")
+    page.locator("[name=number]").fill("fruit 7")
+    page.get_by_role("button", name="Search").click()
+    expect(page.get_by_role("alert")).to_contain_text("This search is none")
+
+
 def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
     page = panel().go("/history")
     page.get_by_label("Recipe").select_option("strawberry")
