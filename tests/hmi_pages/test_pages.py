@@ -42,6 +42,17 @@ def edit(page: Page, field: str, value: str) -> None:
     page.locator(f'[name="v:{field}"]').fill(value)
 
 
+def holding(page: Page, address: str) -> list[Any]:
+    """Keeps what a page asks for from being answered; gives what was asked."""
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    page.route(address, hold)
+    return held
+
+
 @pytest.mark.parametrize("path", PAGES)
 def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, path: str) -> None:
     person = panel("Ada")
@@ -246,9 +257,8 @@ def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, pan
 
 def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: Any, panel: Any) -> None:
     page = panel().go("/maintenance/image")
-    held: list[Any] = []
     asked: list[str] = []
-    page.route("**/maintenance/image/*.jpg", held.append)
+    held = holding(page, "**/maintenance/image/*.jpg")
     page.on("request", lambda request: asked.append(request.url) if "/image/part" in request.url else None)
     while not held:
         page.wait_for_timeout(50)
@@ -263,8 +273,7 @@ def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: 
 
 def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: Any, panel: Any) -> None:
     page = panel().go("/maintenance/registers")
-    held: list[Any] = []
-    page.route("**/maintenance/registers/part", held.append)
+    held = holding(page, "**/maintenance/registers/part")
     part = page.locator("[data-poll]")
     expect(part).to_have_class(re.compile("old-part"))
     assert re.search(r"No data for \d+ s", part.get_attribute("data-old") or "")
