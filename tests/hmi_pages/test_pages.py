@@ -265,23 +265,20 @@ def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: 
     before = len(asked)
     page.wait_for_timeout(1500)  # seven times the pause between two
     assert (len(asked), len(held)) == (before, 1), "the next is not asked for before this one was taken"
-    page.unroute("**/maintenance/image/*.jpg")
-    held[0].continue_()
+    page.unroute("**/maintenance/image/*.jpg")  # which lets it go on
     with page.expect_request("**/maintenance/image/part*"):
         pass
 
 
 def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: Any, panel: Any) -> None:
     page = panel().go("/maintenance/registers")
-    held = holding(page, "**/maintenance/registers/part")
+    holding(page, "**/maintenance/registers/part")
     part = page.locator("[data-poll]")
     expect(part).to_have_class(re.compile("old-part"))
     assert re.search(r"No data for \d+ s", part.get_attribute("data-old") or "")
     assert part.evaluate("part => part.inert")
     assert page.locator("body:not(.stale)").count() == 1, "the station itself is heard"
     page.unroute("**/maintenance/registers/part")
-    for each in held:
-        each.abort()
     expect(part).not_to_have_class(re.compile("old-part"))
     assert not part.evaluate("part => part.inert")
 
