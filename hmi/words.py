@@ -42,14 +42,19 @@ def catalogue(language: Language) -> Mapping[str, str]:
 
 @cache
 def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """The station's own sentences, `said.what` of the English catalogue, as patterns; the most particular first."""
+    """The station's own sentences, `said.what` of the English catalogue, as patterns; the most particular first.
+
+    A device's fault, `said.fault_of_what`, is a frame around what was seen and what to do: those come before all.
+    """
     texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("said.")}
     parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
     patterns = {
         key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in told)
         for key, told in parts.items()
     }
-    order = sorted(parts, key=lambda key: -sum(len(literal) for literal, *_ in parts[key]))
+    order = sorted(
+        parts, key=lambda key: (not key.startswith("said.fault_of_"), -sum(len(literal) for literal, *_ in parts[key]))
+    )
     return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 
 

@@ -41,6 +41,8 @@ ENTRY = Entry("history", "/history")
 DEADLINE_S = 20.0
 PAGE = 20
 _KEPT_STAGES = 3
+_BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
+"""What a number as 4,711 may be written with."""
 _FOR_EVER = {"cache-control": "private, max-age=31536000, immutable"}
 
 Words = Annotated[str, Query(max_length=64)]
@@ -85,14 +87,15 @@ async def search(
     reason: Words = "",
     begun_from: Annotated[str, Query(alias="from", max_length=32)] = "",
     begun_to: Annotated[str, Query(alias="to", max_length=32)] = "",
-    number: Annotated[str, Query(max_length=12)] = "",
+    number: Annotated[str, Query(max_length=16)] = "",
     below: Annotated[int | None, Query(ge=1, le=2**32)] = None,
 ) -> Response:
     """A page of what is found; with a fruit's number, that fruit."""
-    if number.strip().isascii() and number.strip().isdigit() and 0 < int(number) < 2**32:
-        return go_to(f"/history/{int(number)}")
+    typed = number.translate(_BETWEEN_DIGITS)
+    if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
+        return go_to(f"/history/{int(typed)}")
     asked = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
-    wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
+    wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
         find = FindInspections(search=wanted, limit=PAGE, below=below)

@@ -1,4 +1,4 @@
-// What changes on a page by itself: parts sent by the station's pages, their age, times that go on, and pictures.
+// What changes on a page by itself: parts sent by the station's pages, their age, and times that go on.
 "use strict";
 
 (() => {
@@ -100,13 +100,7 @@
       part.inert = stale;
     }
     if (line) {
-      const text = !stale
-        ? ""
-        : old === Infinity
-          ? line.dataset.never
-          : line.dataset.text
-              .replace("{age}", Math.floor(old / 1000))
-              .replace("{clock}", new Date(Date.now() - old).toLocaleTimeString(document.documentElement.lang, { hourCycle: "h23" }));
+      const text = !stale ? "" : old === Infinity ? line.dataset.never : oldWords(old);
       if (line.textContent !== text) {
         line.textContent = text;
       }
@@ -120,6 +114,11 @@
     }
   }
 
+  const oldWords = (old) =>
+    line.dataset.text
+      .replace("{age}", Math.floor(old / 1000))
+      .replace("{clock}", new Date(Date.now() - old).toLocaleTimeString(document.documentElement.lang, { hourCycle: "h23" }));
+
   function spoken(seconds) {
     if (seconds < 60) {
       return `${seconds} s`;
@@ -128,30 +127,7 @@
     return minutes < 60 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
   }
 
-  // A picture that is renewed for ever, the next only when the one before has come: never faster than it is taken.
-  function stream(picture) {
-    const again = (pause) => setTimeout(next, pause);
-    const next = () => {
-      if (!picture.isConnected) {
-        return;
-      }
-      if (document.hidden) {
-        again(AGAIN_MS);
-        return;
-      }
-      const coming = new Image();
-      coming.onload = () => {
-        picture.src = coming.src;
-        picture.dataset.at = Date.now();
-        again(Number(picture.dataset.pauseMs || 200));
-      };
-      coming.onerror = () => again(AGAIN_MS);
-      coming.src = `${picture.dataset.stream}?${Date.now()}`;
-    };
-    next();
-  }
-
-  document.querySelectorAll("img[data-stream]").forEach(stream);
+  globalThis.staleness = { staleMs: STALE_MS, words: oldWords };
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);
   window.addEventListener("pageshow", (event) => event.persisted && location.reload());

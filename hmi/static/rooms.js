@@ -5,6 +5,7 @@
   const AFTER_FAULT_MS = 1500;
   const PATIENCE_MS = 15000;
   const TYPED_MS = 300;
+  const LOOK_MS = 250;
 
   async function fetched(address) {
     const ended = new AbortController();
@@ -26,8 +27,33 @@
       [...part.querySelectorAll("img:not([loading])")].map((image) => (image.decode ? image.decode().catch(() => 0) : 0)),
     );
 
+  // As for what is sent: older than two seconds, whatever failed, and it is greyed, untouchable and says how old it is.
+  function aging(part) {
+    let takenAt = performance.now();
+    const look = () => {
+      const old = performance.now() - takenAt;
+      const isOld = old > staleness.staleMs;
+      part.classList.toggle("old-part", isOld);
+      part.inert = isOld;
+      if (isOld) {
+        part.dataset.old = staleness.words(old);
+      } else {
+        delete part.dataset.old;
+      }
+    };
+    const timer = setInterval(look, LOOK_MS);
+    return {
+      renewed: () => {
+        takenAt = performance.now();
+        look();
+      },
+      over: () => clearInterval(timer),
+    };
+  }
+
   async function poll(part) {
     const everyMs = Number(part.dataset.everyMs);
+    const age = aging(part);
     let pauseMs = everyMs;
     while (part.isConnected) {
       await new Promise((done) => setTimeout(done, pauseMs));
@@ -53,17 +79,17 @@
             }
           }
         }
-        part.classList.remove("old-part");
+        age.renewed();
         pauseMs = everyMs;
         await shown(part);
         if (headers.get("x-over")) {
-          return;
+          break;
         }
       } catch {
-        part.classList.add("old-part");
         pauseMs = AFTER_FAULT_MS;
       }
     }
+    age.over();
   }
 
   function draw(form) {

@@ -236,7 +236,7 @@ class PastCurve(Message):
     onset_mm: float | None
     """The fruit's width."""
     confidence: float | None
-    """The least of its points."""
+    """Of the last point that the judge needs."""
 
 
 class PastCurves(Message):

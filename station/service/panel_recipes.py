@@ -325,7 +325,8 @@ def _curve(
         Measured(closing_mm, area_mm2, area_px or 0, usual_uncertainty_mm2(area_mm2), confidence, frozenset())
         for closing_mm, area_mm2, area_px, confidence in points
     )
-    growths = Evidence(Press(onset_mm, 0.0, measured, ()), recipe).growths if measured else ()
+    evidence = Evidence(Press(onset_mm, 0.0, measured, ()), recipe) if measured else None
+    growths, needed = ((), ()) if evidence is None else (evidence.growths, evidence.needed)
     return PastCurve(
         sequence=number,
         outcome=outcome,
@@ -333,5 +334,5 @@ def _curve(
         areas_mm2=tuple(point.area_mm2 for point in measured),
         growth_mm2_per_mm=max((growth.mm2_per_mm for growth in growths), default=None),
         onset_mm=onset_mm,
-        confidence=min((point.confidence for point in measured if point.confidence is not None), default=None),
+        confidence=needed[-1].confidence if needed else None,
     )

@@ -415,6 +415,9 @@ class Pages:
     app: Any
     context: Any
     cookies: dict[str, str] = field(default_factory=dict)
+    asked_from: str = "127.0.0.1"
+    unread: int = 0
+    """Pieces of the last request that nobody took."""
 
     def __call__(
         self, method: str, path: str, body: bytes = b"", *, headers: dict[str, str] | None = None, chunks: int = 1
@@ -432,7 +435,7 @@ class Pages:
             "query_string": path.partition("?")[2].encode(),
             "root_path": "",
             "headers": [(name.encode(), value.encode()) for name, value in given.items() if value],
-            "client": ("127.0.0.1", 50_000),
+            "client": (self.asked_from, 50_000),
             "server": ("127.0.0.1", 8080),
         }
         return run_apart(self._ask(scope, body, chunks))
@@ -454,6 +457,7 @@ class Pages:
 
         with contextlib.suppress(RuntimeError):  # which the framework raises on from its own error page
             await self.app(scope, receive, send)
+        self.unread = len(coming)
         headers = {name.decode(): value.decode() for name, value in sent[0]["headers"]}
         if "set-cookie" in headers:
             name, _, value = headers["set-cookie"].partition(";")[0].partition("=")

@@ -49,7 +49,9 @@ class TestRequests:
 
     @pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "[::2]"])
     def test_another_hosts_name_is_refused(self, pages, host):
-        assert pages("GET", "/", headers={"host": host})[0] == 421
+        status, headers, _ = pages("GET", "/", headers={"host": host})
+        assert status == 421
+        assert "default-src 'none'" in headers["content-security-policy"], "what is refused is no way around it"
 
     @pytest.mark.parametrize(
         "headers",
@@ -95,6 +97,11 @@ class TestRequests:
         assert pages("POST", "/language", body, headers=kind)[0] == 413
         kind["content-length"] = ""
         assert pages("POST", "/language", body, headers=kind, chunks=chunks)[0] == 413
+
+    def test_what_is_too_large_is_not_taken_to_its_end(self, pages):
+        kind = {"content-type": "application/x-www-form-urlencoded", "content-length": ""}
+        assert pages("POST", "/language", b"x" * (2 * LARGEST_BODY_BYTES), headers=kind, chunks=8)[0] == 413
+        assert pages.unread >= 3
 
     def test_a_form_that_is_not_what_is_expected_is_refused(self, pages):
         log_in(pages)
@@ -154,6 +161,20 @@ class TestLogIn:
         again = pages.post("/people/begin", csrf=pages.token(), name="eve", pin=OTHER_PIN, again=OTHER_PIN)
         assert again[0] == 400
         assert list(pages.context.people.names()) == ["admin"]
+
+    def test_the_first_start_is_at_the_station_itself(self, pages):
+        pages.asked_from = "192.0.2.7"
+        assert b"/people/begin" not in pages("GET", "/people")[2]
+        assert pages.post("/people/begin", csrf=pages.token(), name="eve", pin=PIN, again=PIN)[0] == 403
+        assert pages.context.people.first_start
+
+    def test_who_is_logged_in_may_not_try_pins_without_end_either(self, pages):
+        pages.context.people.begin("admin", PIN)
+        log_in(pages)
+        for _ in range(FREE_TRIES + 1):
+            assert pages.post("/people/own-pin", csrf=pages.token(), old=OTHER_PIN, pin=OTHER_PIN)[0] == 403
+        assert pages.post("/people/own-pin", csrf=pages.token(), old=PIN, pin=OTHER_PIN)[0] == 429
+        assert pages.context.people.check("admin", PIN) is Role.ADMIN
 
     def test_wrong_pins_have_to_wait(self, pages):
         pages.context.people.begin("admin", PIN)

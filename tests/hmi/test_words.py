@@ -16,10 +16,14 @@ from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import field_keys, groups
 from hmi.words import FOLDER, NO_VALUE, Wording, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.camera.interface import FrameFault
+from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
 from station.settings.recipe import load_recipes
+from station.vision.contact import Flag
 from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
@@ -27,12 +31,38 @@ LANGUAGES = ("en", "de", "es")
 STATION = HMI.parent / "station"
 NOT_FOR_OPERATORS = {
     "alarm {}: expected an id of docs/alarms.md, as {}",
-    "the PLC interface has not asked yet",
-    "see the detail, and `station devices check`",
-    "start it: station plc run",
-    "none: see `station recipes check`",
 }
-"""Of addresses that a page never asks for, and of health for supervisors."""
+"""Of addresses that a page never asks for."""
+FAULTS_FROM = (
+    *(
+        f"devices/arm/{name}"
+        for name in ("child", "dashboard", "diagnosis", "faults", "link", "messages", "process", "ur")
+    ),
+    *(f"devices/gripper/{name}" for name in ("calibration", "errors", "modbus_rtu", "robotiq", "urcap")),
+    *(f"devices/camera/{name}" for name in ("digit", "feed")),
+    *(f"service/{name}" for name in ("bare_grip", "crew", "grip", "outcome_watch", "reference", "upkeep", "watching")),
+)
+"""Where what is wrong with a device, and so an alarm's detail or why fruit are refused, is put into words."""
+NO_FAULTS = {
+    "the arm's process",
+    "the arm's link",
+    "words of the arm's process",
+    "get robot model",
+    "get serial number",
+    "unlock protective stop",
+    "close safety popup",
+    "already in use",
+    "could not connect",
+    "the protective stop",
+    "URCap at {}:{}",
+    "UR10e at {}",
+    "is in remote control",
+    "{} is {}; expected 0 to 15",
+    "Modbus RTU unit {} at {}",
+    "Robotiq 2F-85 by {}",
+    "watch of the {}",
+}
+"""Names, what is asked on the wire or looked for in an answer, and what a setting is refused with."""
 COMPOSED = {
     "said.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
     "said.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
@@ -125,6 +155,13 @@ def test_what_operators_are_refused_with_is_said_in_every_language():
         assert told - NOT_FOR_OPERATORS <= known, module
 
 
+@pytest.mark.parametrize("module", FAULTS_FROM)
+def test_every_fault_of_a_device_is_said_in_every_language(module):
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    told = {text for text in sentences(STATION / f"{module}.py") if len(text.split()) > 2 and text != text.upper()}
+    assert told - NO_FAULTS <= known
+
+
 def test_every_sentence_to_translate_is_one_that_the_station_says():
     """A sentence that was changed there would go on in English, unnoticed."""
     told = {text for path in STATION.rglob("*.py") for text in sentences(path)}
@@ -154,6 +191,27 @@ def test_what_the_station_says_is_said_in_the_language_of_the_page(language, eng
     assert Wording(language).said(english) == said
 
 
+@pytest.mark.parametrize(
+    ("language", "fault", "what", "remedy"),
+    [
+        ("de", ArmFault(ArmCause.PROTECTIVE_STOP, "the arm is in a protective stop"), "Arm: der Arm ist im Schutzhalt",
+         ". Herausfinden, warum der Arm hielt, seinen Weg frei machen, dann den Schutzhalt bestätigen."),
+        ("es", GripperFaultError(0xD), "Pinza: su activación falló (fallo 0x0D, activation_fault)",
+         "; busque qué bloquea los dedos, despeje los dedos y active de nuevo la pinza"),
+        ("de", GripperError("its reset did not end in time: it stands at count 7, with no motion asked for", "look"),
+         "Greifer: sein Rücksetzen endete nicht rechtzeitig: er steht bei Zähler 7, ohne dass eine Bewegung verlangt "  # noqa: ISC004
+         "war",
+         "; look"),
+        ("de", "camera left: no frame newer than asked for within 2.5 s; the newest is 9.25 s old. "  # noqa: ISC004
+         "Check its cable and its light, then `station devices check`",
+         "Kamera left: in 2,5 s kein neues Bild; das neueste ist 9,25 s alt",
+         ". Kabel und Licht prüfen, dann `station devices check`"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_said_whole_with_what_to_do(language, fault, what, remedy):
+    assert Wording(language).said(str(fault)) == what + remedy
+
+
 @pytest.mark.parametrize("language", ["de", "es"])
 def test_every_value_of_a_recipe_is_explained_in_every_language(language):
     assert {key for key in catalogue(language) if key.startswith("recipe_field.")} == set(field_keys())
@@ -172,6 +230,7 @@ def test_no_text_that_a_page_uses_is_missing():
     used |= {f"reason.{reason}" for reason in Reason} | {f"packml.{state}" for state in PackmlState}
     used |= {f"order.{order}" for order in OrderName} | {f"alarms.state.{state}" for state in AlarmState}
     used |= {f"nav.{entry.name}" for entry in entries()}
+    used |= {f"inspection.flag_{flag}" for flag in Flag} | {f"maintenance.fault_{fault}" for fault in FrameFault}
     assert used <= set(catalogue("en")), used - set(catalogue("en"))
     assert len(used) > 100
 

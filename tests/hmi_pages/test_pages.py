@@ -42,6 +42,17 @@ def edit(page: Page, field: str, value: str) -> None:
     page.locator(f'[name="v:{field}"]').fill(value)
 
 
+def holding(page: Page, address: str) -> list[Any]:
+    """Keeps what a page asks for from being answered; gives what was asked."""
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    page.route(address, hold)
+    return held
+
+
 @pytest.mark.parametrize("path", PAGES)
 def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, path: str) -> None:
     person = panel("Ada")
@@ -150,6 +161,17 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     assert all(size == 480 for size in sizes)
 
 
+def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orchard: Any, panel: Any) -> None:
+    page = panel(locale="de").go("/history")
+    page.locator("[name=number]").fill("4.711")
+    page.locator(".search .main, .search button").first.click()
+    expect(page.locator("main")).to_contain_text("es gibt keine Prüfung 4711; aufgezeichnet sind")
+    page = panel().go("/history")
+    page.locator("[name=number]").fill("fruit 7")
+    page.get_by_role("button", name="Search").click()
+    expect(page.get_by_role("alert")).to_contain_text("This search is none")
+
+
 def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
     page = panel().go("/history")
     page.get_by_label("Recipe").select_option("strawberry")
@@ -206,12 +228,12 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     page = person.go("/maintenance/hand")
     page.get_by_role("button", name="Set manual mode").click()
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
-    page.get_by_label("Width, mm").fill("40")
+    page.get_by_label("Width, mm").fill("40,4")
     page.get_by_role("button", name="Go there").click()
     told = page.get_by_text(re.compile(r"The fingers stand at [\d.]+ mm"))
     expect(told).to_be_visible()
     width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
-    assert abs(width_mm - 40) < 1
+    assert abs(width_mm - 40.4) < 0.3
     assert not orchard.state().ready
     page.get_by_role("button", name="Open", exact=True).click()
     expect(told).not_to_contain_text(f"{width_mm:.1f}")
@@ -231,6 +253,34 @@ def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, pan
     row = page.locator("tr", has_text="reference_u16")
     expect(row).to_contain_text("4660")
     expect(page.locator("tr", has_text="packml_mode")).to_contain_text("production")
+
+
+def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/image")
+    asked: list[str] = []
+    held = holding(page, "**/maintenance/image/*.jpg")
+    page.on("request", lambda request: asked.append(request.url) if "/image/part" in request.url else None)
+    while not held:
+        page.wait_for_timeout(50)
+    before = len(asked)
+    page.wait_for_timeout(1500)  # seven times the pause between two
+    assert (len(asked), len(held)) == (before, 1), "the next is not asked for before this one was taken"
+    page.unroute("**/maintenance/image/*.jpg")  # which lets it go on
+    with page.expect_request("**/maintenance/image/part*"):
+        pass
+
+
+def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/registers")
+    holding(page, "**/maintenance/registers/part")
+    part = page.locator("[data-poll]")
+    expect(part).to_have_class(re.compile("old-part"))
+    assert re.search(r"No data for \d+ s", part.get_attribute("data-old") or "")
+    assert part.evaluate("part => part.inert")
+    assert page.locator("body:not(.stale)").count() == 1, "the station itself is heard"
+    page.unroute("**/maintenance/registers/part")
+    expect(part).not_to_have_class(re.compile("old-part"))
+    assert not part.evaluate("part => part.inert")
 
 
 def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, panel: Any) -> None:

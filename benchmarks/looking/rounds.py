@@ -1,0 +1,204 @@
+"""The PLC's latency and the processor with nobody looking, with panels and with browsers, in turn in every round."""
+
+import contextlib
+import os
+import statistics
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+from bench_plc import Figures, measured
+from playwright.sync_api import Browser
+
+NOBODY, PANELS, BROWSERS = "nobody looks", "three panels", "three browsers on these cores"
+LOOKERS = 3
+SCAN_US = 10_000
+MOST_PERCENT = 5
+"""Wanted of three panels on two cores."""
+CLIENTS = Path(__file__).with_name("clients.py")
+CORES = os.cpu_count() or 1
+
+
+class Round(NamedTuple):
+    """What one condition gave in one round."""
+
+    latency: Figures
+    shares: dict[str, float]
+    """By process, % of a core."""
+
+
+@contextlib.contextmanager
+def panels(host: str, port: int) -> Iterator[None]:
+    """Three panels without a browser, as on machines of their own: one process for all."""
+    command = [sys.executable, str(CLIENTS), host, str(port), str(LOOKERS)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        if process.stdout is None or process.stdout.readline() != "looking\n":
+            raise SystemExit("the panels were told nothing")
+        yield
+        if process.poll() is not None:
+            raise SystemExit("the panels ended before the round did")
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
+
+
+@contextlib.contextmanager
+def browsers(browser: Browser, host: str, port: int) -> Iterator[None]:
+    """Three browsers with the page Run, on the cores that the station has."""
+    contexts = [browser.new_context() for _ in range(LOOKERS)]
+    try:
+        for context in contexts:
+            page = context.new_page()
+            page.goto(f"http://{host}:{port}")
+            page.locator("body:not(.stale)").wait_for()
+        yield
+    finally:
+        for context in contexts:
+            context.close()
+
+
+def compared(
+    conditions: dict[str, Callable[[], contextlib.AbstractContextManager[None]]],
+    parts: dict[str, psutil.Process],
+    load: Callable[[float], Figures],
+    rounds: int,
+    seconds: float,
+) -> dict[str, list[Round]]:
+    """Each condition in each round, another one first each time; the processor while the latency is measured."""
+    found: dict[str, list[Round]] = {name: [] for name in conditions}
+    names = list(conditions)
+    for number in range(rounds):
+        first = number % len(names)
+        for name in names[first:] + names[:first]:
+            with conditions[name]():
+                load(0.5)
+                before = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
+                latency = load(seconds)
+                after = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
+            shares = {part: 100 * (after[part] - before[part]) / seconds for part in parts}
+            found[name].append(Round(latency, shares))
+    return found
+
+
+def asking(program: Path, port: int) -> Callable[[float], Figures]:
+    """The PLC, which reads once each scan for some seconds."""
+    return lambda seconds: measured(program, port, 1, SCAN_US, seconds)
+
+
+class Difference(NamedTuple):
+    """Of two conditions, paired by their rounds."""
+
+    median: float
+    lowest: float
+    highest: float
+    confidence: float
+
+    @property
+    def beyond_noise(self) -> bool:
+        """Whether the interval leaves 0 out."""
+        return not self.lowest <= 0 <= self.highest
+
+
+def difference(before: list[float], after: list[float]) -> Difference:
+    """The paired differences' median, and an interval of theirs that holds the true median with 95 % or more.
+
+    The sign test's: the true median lies between the k-th lowest and the k-th highest of n with the probability
+    1 - 2 P(B < k), B binomial with n and 1/2. Where no k reaches 95 %, their whole range, and what that reaches.
+    """
+    from scipy.stats import binom  # noqa: PLC0415 (not for the panels' own processes)
+
+    ordered = sorted(late - early for early, late in zip(before, after, strict=True))
+    number = len(ordered)
+    reached = {k: float(1 - 2 * binom.cdf(k - 1, number, 0.5)) for k in range(1, (number + 1) // 2 + 1)}
+    k = max((k for k, confidence in reached.items() if confidence >= 0.95), default=1)
+    return Difference(statistics.median(ordered), ordered[k - 1], ordered[-k], reached[k])
+
+
+class Row(NamedTuple):
+    """A line of the table."""
+
+    title: str
+    unit: str
+    digits: int
+    of: Callable[[Round], float]
+
+
+ROWS = (
+    Row("the pages' process", "% of a core", 1, lambda each: each.shares["hmi"]),
+    Row("the station's process", "% of a core", 1, lambda each: each.shares["service"]),
+    Row("both processes", f"% of {CORES} cores", 1, lambda each: sum(each.shares.values()) / CORES),
+    Row("PLC's latency at a 10 ms scan, p50", "µs", 0, lambda each: each.latency.p50_us),
+    Row("PLC's latency at a 10 ms scan, p99", "µs", 0, lambda each: each.latency.p99_us),
+    Row("PLC's latency at a 10 ms scan, worst", "µs", 0, lambda each: each.latency.worst_us),
+)
+BOTH, P50, P99 = ROWS[2:5]
+
+
+def table(found: dict[str, list[Round]]) -> list[str]:
+    """Medians over the rounds, and from the lowest round to the highest."""
+    lines = ["| | " + " | ".join(found) + " |", "|---|" + "---|" * len(found)]
+    for row in ROWS:
+        cells = []
+        for rounds in found.values():
+            values = [row.of(each) for each in rounds]
+            middle, low, high = (
+                f"{each:,.{row.digits}f}" for each in (statistics.median(values), min(values), max(values))
+            )
+            cells.append(f"{middle} ({low} to {high})")
+        lines.append(f"| {row.title}, {row.unit} | {' | '.join(cells)} |")
+    return lines
+
+
+def differences(found: dict[str, list[Round]]) -> list[str]:
+    """Each condition against nobody looking, round by round, and what follows."""
+    lines = ["| against nobody looking | " + " | ".join(list(found)[1:]) + " |", "|---|" + "---|" * (len(found) - 1)]
+    sentences = []
+    told = {row: {name: _against(found, name, row) for name in list(found)[1:]} for row in (BOTH, P50, P99)}
+    for row, each in told.items():
+        cells = [
+            f"{_signed(one.median, row)} ({_signed(one.lowest, row)} to {_signed(one.highest, row)})"
+            for one in each.values()
+        ]
+        lines.append(f"| {row.title}, {row.unit} | {' | '.join(cells)} |")
+    panels_cost = told[BOTH][PANELS]
+    under = "less" if panels_cost.highest < MOST_PERCENT else "not surely less"
+    sentences.append(f"- What three panels cost of both processes is {under} than {MOST_PERCENT} % of {CORES} cores.")
+    for name in list(found)[1:]:
+        said = [_sentence(row, told[row][name]) for row in (P50, P99)]
+        sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(said)}.")
+    confidence = told[P99][PANELS].confidence
+    note = (
+        "Median of the rounds' differences, and the interval that holds the true median with "
+        f"{100 * confidence:.0f} % (sign test). From it:"
+    )
+    return [*lines, "", note, "", *sentences]
+
+
+def _against(found: dict[str, list[Round]], name: str, row: Row) -> Difference:
+    return difference([row.of(each) for each in found[NOBODY]], [row.of(each) for each in found[name]])
+
+
+def _signed(value: float, row: Row) -> str:
+    return f"{value:+,.{row.digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _sentence(row: Row, told: Difference) -> str:
+    name = row.title.rpartition(" ")[2]
+    if not told.beyond_noise:
+        return f"no difference of {name} beyond noise"
+    more = "later" if told.median > 0 else "earlier"
+    return f"{name} is {abs(told.median):,.0f} µs {more}, which is beyond noise"
+
+
+def conditions_of(rounds: int, seconds: float) -> str:
+    """Under which circumstances this was measured."""
+    return (
+        f"{rounds} rounds of {seconds:g} s for each, another first in each round; median, and lowest to highest round. "
+        f"FastAPI {version('fastapi')}, uvicorn {version('uvicorn')}, Python {sys.version.split()[0]}, {CORES} cores "
+        "that twin, station, line, who looks and other work share."
+    )

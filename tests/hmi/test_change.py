@@ -1,0 +1,45 @@
+"""The page Change fruit where the check with the ball is due, asked without a browser."""
+
+import json
+import re
+
+import pytest
+
+from station.channel.panel_live import OrderName, OrderShown, PanelState, RecipeNamed, Recipes, RecipeShown
+from station.settings.recipe import load_recipes
+
+DUE = (
+    "The calibration was never verified, and it is demanded: verify it with the ball; on the page Maintenance in "
+    "manual mode, or by `station verify` with the station stopped."
+)
+
+
+def state(check_due):
+    order = OrderShown(
+        ticket=1, order=OrderName.CHOOSE_RECIPE, argument="2", state="done", why="", who="Ana", began_utc_ms=1,
+        ended_utc_ms=2,
+    )  # fmt: skip
+    recipe = RecipeNamed(number=2, name="blueberry", title="Blueberry", revision="1")
+    return PanelState.model_construct(
+        boot="1", utc_ms=1, state="idle", sentence="", packml_state=None, mode=1, ready=not check_due,
+        why_not_ready=check_due, busy=False, needs_person=False, stopping=False, simulated=False, recipe=recipe,
+        check_due=check_due, alarms=(), devices=(), orders=(order,), may=(), recoveries=(),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("path", ["/change/2", "/change/progress"])
+def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypatch, path):
+    gateway, values = pages.context.gateway, json.dumps(load_recipes()["blueberry"].model_dump(mode="json"))
+    chosen = RecipeShown(number=2, name="blueberry", title="Blueberry", revision="1", values=values)
+
+    async def ask(*_, **__):
+        return Recipes(recipes=(chosen,), active=chosen, problems=())
+
+    monkeypatch.setattr(gateway, "ask", ask)
+    for due in (DUE, ""):
+        gateway.state = state(due)
+        status, _, body = pages("GET", path, headers={"accept-language": "de"})
+        text = re.sub(r"\s+", " ", body.decode())
+        assert status == 200
+        assert ("Die Kalibrierung wurde nie geprüft" in text) == bool(due)
+        assert ('href="/maintenance/sensor"' in text) == bool(due)
