@@ -1,5 +1,8 @@
 """The report, read by a real browser from the disk with no network."""
 
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
 import pytest
 from playwright.sync_api import sync_playwright
 
@@ -50,4 +53,6 @@ def test_names_from_outside_are_shown_as_text(press, analyze, page, tmp_path):
     assert done.returncode == 0, done.stderr
     page.goto((out / "report.html").as_uri())
     assert page.inner_text(".tile b") == name
+    mask = page.eval_on_selector(".tile a", "link => link.href")
+    assert Path(unquote(urlsplit(mask).path)).is_file()
     assert page.title() == "Contact areas of 1 images"
