@@ -222,6 +222,13 @@ def test_a_bad_recipe_is_refused_with_line_field_and_expectation(small, write, o
     assert str(caught.value).splitlines() == [f"{path}:{each}" for each in expected]
 
 
+def test_of_very_many_problems_the_first_fifty_are_told(small, write):
+    with pytest.raises(SettingsError) as caught:
+        load_recipe(write(small + "".join(f"key_{number}: 1\n" for number in range(3000))))
+    assert len(caught.value.problems) == 51
+    assert caught.value.problems[-1].expected == "and more: mend these first"
+
+
 @pytest.mark.parametrize("content", ["", "[]", "7", "text"])
 def test_what_is_no_mapping_is_no_recipe(write, content):
     with pytest.raises(SettingsError, match=r"r\.yaml:1: file: expected a mapping with schema_version, name, "):
