@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.export import exported, recipe_table
 from station.settings.recipe import Recipe, load_recipe
-from station.settings.schema import leaves, schema_of
+from station.settings.schema import branches, leaves, resolved, schema_of
 
 
 def test_schemas_example_and_tables_are_fresh(root):
@@ -24,6 +24,20 @@ def test_every_field_has_a_title_a_description_and_where_it_has_one_a_unit():
             assert leaf.node.get("description"), leaf.path
             suffix = re.search(r"_(mm|s|n|px|mm2|mm_s|mm2_per_mm)$", str(leaf.path[-1]))
             assert bool(suffix) <= ("unit" in leaf.node), leaf.path
+
+
+def test_every_number_has_bounds():
+    found = 0
+    for model in (Recipe, Configuration):
+        root = schema_of(model)
+        nodes = [branch for leaf in leaves(root, into_lists=True) for branch in branches(leaf.node, root)]
+        for node in nodes:
+            nodes += [resolved(each, root) for each in (node.get("items"), *node.get("prefixItems", ())) if each]
+            if node.get("type") in {"integer", "number"} and not {"enum", "const"} & set(node):
+                found += 1
+                assert {"minimum", "exclusiveMinimum"} & set(node), node
+                assert {"maximum", "exclusiveMaximum"} & set(node), node
+    assert found > 50
 
 
 def test_the_schema_shows_bounds_and_units_to_an_editor(root):
