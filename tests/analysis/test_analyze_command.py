@@ -280,12 +280,12 @@ def test_on_a_terminal_a_bar_shows_how_far_it_is(press, tmp_path):
 
 def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
     """The limit falls into the table itself: no half row may stay."""
-    for number in range(200):
-        shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 30}{number}.png")
+    for number in range(30):
+        shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 38}{number}.png")
     out = tmp_path / "out"
 
     def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
 
     done = analyze(
         "--reference", press.reference, "--method", "paper", "--out", out, press.folder,
@@ -294,7 +294,7 @@ def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
     assert done.returncode == 2
     assert "results.csv: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
-    assert (out / "results.csv").stat().st_size > 6_000
+    assert (out / "results.csv").stat().st_size > 4_000
     assert all(row["flags"] is not None for row in read_table(out / "results.csv"))
     assert (out / "results.csv").read_bytes().endswith(b"\r\n")
 
@@ -416,7 +416,7 @@ def test_without_any_contact_it_is_said_that_there_is_no_curve(press, analyze, t
     out = tmp_path / "out"
     done = analyze("--reference", press.reference, "--widths", press.widths, "--out", out, press.folder / "frame_7.png")
     assert done.returncode == 0
-    assert "nothing touched the gel in any image" in done.stderr
+    assert "no contact was found in any image" in done.stderr
     assert not (out / "curve.csv").exists()
     assert "there is no onset, and so no curve" in (out / "report.html").read_text()
 

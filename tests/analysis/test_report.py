@@ -46,7 +46,7 @@ def test_the_report_shows_every_picture_and_the_curve_without_a_network(press, a
 
 
 def test_names_from_outside_are_shown_as_text(press, analyze, page, tmp_path):
-    name = "<img src=x onerror=document.title='owned'>.png"
+    name = "<img src=x onerror=document.title='owned'>#1 100%.png"
     (press.folder / "frame_9.png").rename(press.folder / name)
     out = tmp_path / "out"
     done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder / name)
