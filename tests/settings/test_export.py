@@ -4,11 +4,12 @@ import json
 import re
 
 import pytest
+from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.export import exported, recipe_table
-from station.settings.recipe import Recipe, load_recipe
+from station.settings.recipe import Recipe, load_recipe, load_recipes
 from station.settings.schema import branches, leaves, resolved, schema_of
 
 
@@ -45,6 +46,17 @@ def test_the_schema_shows_bounds_and_units_to_an_editor(root):
     step = schema["$defs"]["WidthSteps"]["properties"]["step_mm"]
     assert {key: step[key] for key in ("unit", "minimum", "maximum")} == {"unit": "mm", "minimum": 0.4, "maximum": 5.0}
     assert schema["additionalProperties"] is False
+
+
+def test_an_editor_takes_what_is_shipped_and_marks_a_mistake(root):
+    validator = Draft202012Validator(json.loads((root / "recipes" / "recipe.schema.json").read_text()))
+    for recipe in load_recipes().values():
+        values = json.loads(recipe.model_dump_json())
+        assert not list(validator.iter_errors(values))
+        values["steps"]["step_mm"] = "fine"
+        values["steps"]["stop"] = 1
+        assert {error.validator for error in validator.iter_errors(values)} == {"type", "additionalProperties"}
+    Draft202012Validator.check_schema(json.loads((root / "deploy" / "station.schema.json").read_text()))
 
 
 def test_the_example_with_nothing_commented_out_is_the_default(root, write):
