@@ -34,6 +34,14 @@ def test_the_shipped_recipes_are_good_from_anywhere(station):
     )
 
 
+def test_before_the_first_start_nobody_is_asked_to_submit_what_is_shipped(station):
+    done = station("recipes", "list")
+    assert (done.returncode, done.stderr) == (0, "")
+    first, *others = done.stdout.splitlines()
+    assert first.startswith("nothing is in force yet: the station's first start takes up what is here")
+    assert [line.split(":")[0] for line in others] == ["blueberry", "raspberry", "rubber_ball", "strawberry"]
+
+
 def test_all_problems_of_all_files_and_the_good_ones_beside_them(station, small, write):
     good = write(small, "good.yaml")
     bad = write(small.replace("force_n: 20", "force_n: 0").replace("step_mm: 1", "step_mm: x"), "bad.yaml")
