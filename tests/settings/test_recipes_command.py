@@ -83,19 +83,22 @@ def test_a_bad_environment_is_a_message_and_exit_code_2(station):
 def test_what_is_hostile_is_a_message_and_exit_code_2(station, write, tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     bomb = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40))])
-    for path in (
+    hostile = (
         tmp_path / "pipe.yaml",
-        write(bomb),
-        write(b"\xff\xfe"),
-        write("[" * 60_000),
-        write(""),
+        write(bomb, "bomb.yaml"),
+        write(b"\xff\xfe", "bytes.yaml"),
+        write("[" * 60_000, "deep.yaml"),
+        write("", "empty.yaml"),
         "a\nb.yaml",
         "x" * 5000,
-    ):
-        done = station("recipes", "check", path)
-        assert done.returncode == 2
-        assert "Traceback" not in done.stderr
-        assert re.match(r".+:\d+: .+: ", done.stderr)
+    )
+    done = station("recipes", "check", *hostile)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.splitlines()
+    assert all(re.match(r".+:\d+: .+: ", line) for line in lines)
+    for path in hostile:
+        shown = str(path).replace("\n", r"\n")[:900]
+        assert [line for line in lines if line.startswith(shown)], shown
 
 
 def test_the_guides_example_is_what_happens(station, root, write):
