@@ -87,7 +87,7 @@ def _problems(
         path = path[:-1]
     if any(path[: len(each)] == each for each in doubtful):
         return []
-    if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
+    if details["type"] == "too_short" and len(details["input"]) >= details.get("ctx", {}).get("min_length", 0):
         return []  # pydantic counts the good items only; what is wrong with the others it says itself
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, Contradiction):
