@@ -123,6 +123,7 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
     name = item.source.name
     picture = thumbnail(outlined(item.image, item.contact.mask), _THUMBNAIL_PX)
     width_mm = widths_mm[name] if widths_mm is not None else None
+    unknown = Flag.UNDECIDED in item.contact.flags
     gathered.rows.append(
         ReportRow(
             image=name,
@@ -139,8 +140,9 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
         )
     )
     gathered.details.append((name, replace(item.contact, mask=_NO_MASK)))
-    gathered.thumbnails.append((f"{name}\n{area_mm2:.2f} mm2", [picture]))
-    if width_mm is not None and Flag.UNDECIDED not in item.contact.flags:  # its area is unknown, not 0
+    area = "area unknown" if unknown else f"{area_mm2:.2f} mm2"
+    gathered.thumbnails.append((f"{name}\n{area}", [picture]))
+    if width_mm is not None and not unknown:
         gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2)))
     if item.stages:
         gathered.stage_names = tuple(item.stages)

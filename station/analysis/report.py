@@ -43,7 +43,7 @@ class Report:
     errors: Sequence[tuple[str, str]]
     curve_svg: str | None
     no_onset: bool
-    """There are widths, and nothing touched: there is no curve."""
+    """There are widths, and no contact was found: there is no curve."""
     stages: Sequence[tuple[str, str]]
     """The stages' sheets: the file beside the report, and a data URI."""
     quality: str | None

@@ -1,5 +1,6 @@
 """What the user names on the command line, as an ordered list of images that are decoded when needed."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +33,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """The sources found, and how many other files were passed over in folders."""
+    """The sources found, and the other files that were passed over in folders."""
 
     sources: tuple[Source, ...]
     passed_over: tuple[Path, ...]
@@ -143,6 +144,7 @@ class _Video:
     """A video read forwards, one frame at a time."""
 
     def __init__(self, path: Path) -> None:
+        os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what FFmpeg says of a bad file names no remedy
         self._path = path
         self._capture = cv2.VideoCapture(str(path))
         self.announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))

@@ -13,7 +13,7 @@ from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.revision import Revision, Status
-from station.recipe_store.standing import Standing
+from station.recipe_store.standing import FileState, Standing
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened
@@ -73,10 +73,14 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
 @_config
 def list_all(config: Path | None) -> None:
     """List the recipes: the revision in force, what the file says beside it, and what waits for whom."""
-    standings, problems = _store(config).read()
+    store = _store(config)
+    standings, problems = store.read()
+    begun = bool(store.history())
+    if not begun:
+        click.echo("nothing is in force yet: the station's first start takes up what is here, or station recipes adopt")
     for standing in standings:
         click.echo(_line(standing))
-        if standing.note:
+        if standing.note and (begun or standing.file_state is not FileState.DRAFT):
             click.echo(f"    {standing.note}")
     for problem in problems:
         click.echo(problem, err=True)

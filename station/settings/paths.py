@@ -1,10 +1,14 @@
 """Types of paths in settings; whether there is anything at a path is for whoever opens it to say."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator
+
+LONGEST_BYTES, LONGEST_NAME_BYTES = 1000, 255
+"""Linux takes 4096 (limits.h, PATH_MAX) and 255 (NAME_MAX); the rest is room for what lies in a folder."""
 
 
 def _plain(what: str) -> Callable[[Path], Path]:
@@ -13,6 +17,8 @@ def _plain(what: str) -> Callable[[Path], Path]:
     def check(path: Path) -> Path:
         if path == Path() or "\0" in str(path) or "~" in path.parts:
             raise ValueError(f"expected the path of a {what}, written out without ~")
+        if len(os.fsencode(path)) > LONGEST_BYTES or any(len(os.fsencode(p)) > LONGEST_NAME_BYTES for p in path.parts):
+            raise ValueError(f"expected a path of at most {LONGEST_BYTES} bytes, {LONGEST_NAME_BYTES} a name")
         return path
 
     return check

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Path
@@ -11,6 +11,19 @@ from station.settings.segmentation import Segmentation
 
 LARGEST_AREA_MM2 = 260.0
 """No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
+
+
+def _integer(value: object) -> object:
+    """Pydantic takes true and 1.0 for the choice 1, also where it is strict."""
+    if type(value) is not int:
+        raise ValueError("expected 1")
+    return value
+
+
+def _printable(title: str) -> str:
+    if not title.isprintable():
+        raise ValueError("expected printable characters: no control characters, none that turn the direction of text")
+    return title
 
 
 class WidthRange(Settings):
@@ -226,7 +239,7 @@ class EarlyStop(Settings):
 class Recipe(Settings):
     """One fruit's width steps, segmentation and damage thresholds."""
 
-    schema_version: Literal[1] = setting(
+    schema_version: Annotated[Literal[1], BeforeValidator(_integer)] = setting(
         title="Schema version", description="The version of this form; the number rises when a field's meaning changes."
     )
     name: str = setting(
@@ -234,7 +247,7 @@ class Recipe(Settings):
         description="The recipe's name in commands and records: small letters, digits and underscores.",
         pattern=r"^[a-z][a-z0-9_]{0,31}$",
     )
-    title: str = setting(
+    title: Annotated[str, AfterValidator(_printable)] = setting(
         title="Title",
         description="The name that operators see, one line of at most 40 characters.",
         pattern=r"^\S.{0,39}$",

@@ -1,8 +1,11 @@
 """How a recipe has the contact found in an image: the method and every parameter of it."""
 
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from station.settings.model import Settings, setting
+from station.settings.problems import Contradiction
 
 
 class PaperParameters(Settings):
@@ -84,6 +87,18 @@ class PaperParameters(Settings):
         ge=0,
         le=2**31 - 1,
     )
+
+    @model_validator(mode="after")
+    def _windows_have_a_centre(self) -> Self:
+        """OpenCV takes an even window for the next odd one without a word, and an even kernel shifts the mask."""
+        even = [
+            ((name,), f"expected an odd side, got {side_px}")
+            for name in ("template_window_px", "search_window_px", "kernel_px")
+            if (side_px := getattr(self, name)) % 2 == 0
+        ]
+        if even:
+            raise Contradiction(even)
+        return self
 
 
 class RobustParameters(Settings):

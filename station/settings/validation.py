@@ -13,7 +13,7 @@ from station.settings.model import Settings
 from station.settings.problems import Contradiction, Problem, SettingsError, shortened
 from station.settings.problems import Path as Where
 from station.settings.schema import Node, expectation, find, names, schema_of, shown
-from station.settings.yaml_loader import Document, read_document
+from station.settings.yaml_loader import MOST_PROBLEMS, Document, read_document
 
 Model = TypeVar("Model", bound=Settings)
 
@@ -55,11 +55,21 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
         checked = model.model_validate_json(json.dumps(value))
     except ValidationError as error:
         for details in error.errors():
+            if len(problems) > MOST_PROBLEMS:
+                break
             problems += _problems(details, value, schema_of(model), locate, document.doubtful)
-        raise SettingsError(sorted(dict.fromkeys(problems), key=_line)) from error
+        raise SettingsError(_readable(sorted(dict.fromkeys(problems), key=_line))) from error
     if problems:
         raise SettingsError(problems)
     return checked
+
+
+def _readable(problems: list[Problem]) -> list[Problem]:
+    """As many as anybody reads."""
+    if len(problems) <= MOST_PROBLEMS:
+        return problems
+    more = Problem(problems[MOST_PROBLEMS].place, "file", "and more: mend these first")
+    return [*problems[:MOST_PROBLEMS], more]
 
 
 def _line(problem: Problem) -> int:
@@ -77,6 +87,8 @@ def _problems(
         path = path[:-1]
     if any(path[: len(each)] == each for each in doubtful):
         return []
+    if details["type"] == "too_short" and len(details["input"]) >= details.get("ctx", {}).get("min_length", 0):
+        return []  # pydantic counts the good items only; what is wrong with the others it says itself
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, Contradiction):
         return [Problem(*locate(path + inner), text) for inner, text in cause.parts]

@@ -1,7 +1,9 @@
 """`station analyze` through the command line."""
 
+import contextlib
 import csv
 import os
+import pty
 import resource
 import shutil
 import subprocess
@@ -174,8 +176,8 @@ def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze, tmp
     done = analyze("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
     assert done.returncode == 2
     assert words in done.stderr
+    assert [line for line in done.stderr.splitlines() if not line.startswith("station: ")] == []
     assert "bad" in done.stderr
-    assert "Traceback" not in done.stderr
     assert [row["image"] for row in read_table(out / "results.csv")] == ["frame_9.png", "frame_12.png"]
     (error,) = read_table(out / "errors.csv")
     assert words in error["error"]
@@ -239,17 +241,51 @@ def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze, tmp_path):
     assert "cannot be written" in done.stderr
     assert "results so far are kept" in done.stderr
     assert "Traceback" not in done.stderr
-    assert len(read_table(out / "results.csv")) >= 6
+    rows = read_table(out / "results.csv")
+    assert len(rows) >= 6
+    assert all((out / "masks" / row["image"]).is_file() for row in rows)
+    assert all(cv2.imread(str(picture)) is not None for picture in out.rglob("*.png"))
+
+
+def test_a_mask_that_does_not_fit_the_disk_leaves_no_row(press, analyze, tmp_path):
+    out = tmp_path / "out"
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
+
+    done = analyze(
+        "--reference", press.reference, "--method", "paper", "--out", out, press.folder / "frame_9.png",
+        preexec_fn=limit, env=WITHOUT_COVERAGE,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "frame_9.png: cannot be written" in done.stderr
+    assert not out.exists()
+
+
+def test_on_a_terminal_a_bar_shows_how_far_it_is(press, tmp_path):
+    ours, theirs = pty.openpty()
+    arguments = ("--reference", press.reference, "--method", "paper", "--out", tmp_path / "out", press.folder)
+    command = [sys.executable, "-m", "station", "analyze", *map(str, arguments)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=theirs, timeout=90, check=False)
+    os.close(theirs)
+    shown = b""
+    with contextlib.suppress(OSError):  # the end of a terminal
+        while part := os.read(ours, 4096):
+            shown += part
+    os.close(ours)
+    assert done.returncode == 0
+    assert b"measuring" in shown
+    assert b"100%" in shown
 
 
 def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
     """The limit falls into the table itself: no half row may stay."""
-    for number in range(200):
-        shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 30}{number}.png")
+    for number in range(30):
+        shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 38}{number}.png")
     out = tmp_path / "out"
 
     def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
 
     done = analyze(
         "--reference", press.reference, "--method", "paper", "--out", out, press.folder,
@@ -258,7 +294,7 @@ def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
     assert done.returncode == 2
     assert "results.csv: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
-    assert (out / "results.csv").stat().st_size > 6_000
+    assert (out / "results.csv").stat().st_size > 4_000
     assert all(row["flags"] is not None for row in read_table(out / "results.csv"))
     assert (out / "results.csv").read_bytes().endswith(b"\r\n")
 
@@ -380,7 +416,7 @@ def test_without_any_contact_it_is_said_that_there_is_no_curve(press, analyze, t
     out = tmp_path / "out"
     done = analyze("--reference", press.reference, "--widths", press.widths, "--out", out, press.folder / "frame_7.png")
     assert done.returncode == 0
-    assert "nothing touched the gel in any image" in done.stderr
+    assert "no contact was found in any image" in done.stderr
     assert not (out / "curve.csv").exists()
     assert "there is no onset, and so no curve" in (out / "report.html").read_text()
 

@@ -1,5 +1,8 @@
 """The report, read by a real browser from the disk with no network."""
 
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
 import pytest
 from playwright.sync_api import sync_playwright
 
@@ -43,11 +46,13 @@ def test_the_report_shows_every_picture_and_the_curve_without_a_network(press, a
 
 
 def test_names_from_outside_are_shown_as_text(press, analyze, page, tmp_path):
-    name = "<img src=x onerror=document.title='owned'>.png"
+    name = "<img src=x onerror=document.title='owned'>#1 100%.png"
     (press.folder / "frame_9.png").rename(press.folder / name)
     out = tmp_path / "out"
     done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder / name)
     assert done.returncode == 0, done.stderr
     page.goto((out / "report.html").as_uri())
     assert page.inner_text(".tile b") == name
+    mask = page.eval_on_selector(".tile a", "link => link.href")
+    assert Path(unquote(urlsplit(mask).path)).is_file()
     assert page.title() == "Contact areas of 1 images"

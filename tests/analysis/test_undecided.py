@@ -1,5 +1,6 @@
 """An image whose area is unknown is no point of the curve."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -29,6 +30,13 @@ def test_an_undecided_image_is_told_and_left_out_of_the_curve(tmp_path: Path, mo
     for number, level in enumerate((100, 20, 200)):
         cv2.imwrite(str(tmp_path / f"step_{number}.png"), np.full((64, 64, 3), level, np.uint8))
     monkeypatch.setattr("station.analysis.analysis.make_method", lambda *_: Stub())
+    captions: list[str] = []
+
+    def sheet(columns: Sequence[tuple[str, Sequence[np.ndarray]]], _row_names: Sequence[str]) -> np.ndarray:
+        captions.extend(caption for caption, _ in columns)
+        return np.zeros((9, 9, 3), np.uint8)
+
+    monkeypatch.setattr("station.analysis.analysis.sheet", sheet)
     request = Request(
         sources=list_sources([tmp_path]).sources,
         references=[Decoded(np.zeros((64, 64, 3), np.uint8), ())],
@@ -44,4 +52,5 @@ def test_an_undecided_image_is_told_and_left_out_of_the_curve(tmp_path: Path, mo
     curve = (tmp_path / "out" / "curve.csv").read_text().splitlines()
     assert [line.split(",")[0] for line in curve[1:]] == ["step_0.png", "step_2.png"]
     assert "undecided" in (tmp_path / "out" / "results.csv").read_text()
+    assert [caption.endswith("area unknown") for caption in captions] == [False, True, False]
     assert "unknown: something bends the gel" in (tmp_path / "out" / "report.html").read_text()

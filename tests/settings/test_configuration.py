@@ -125,6 +125,14 @@ class TestBadFile:
                 "home: ~/station\n",
                 "1: home: expected the path of a folder, written out without ~, got '~/station'",
             ),
+            (
+                f"home: /{'x' * 256}\n",
+                f"1: home: expected a path of at most 1000 bytes, 255 a name, got '/{'x' * 38}…'",
+            ),
+            (
+                f"home: {'/x' * 501}\n",
+                f"1: home: expected a path of at most 1000 bytes, 255 a name, got '{'/x' * 19}/…'",
+            ),
             ("recipes_folder: [a]\n", "1: recipes_folder: expected a path or null, got a list of 1"),
             ("hmi:\n  host: -x\n", "2: hmi.host: expected an IP address or a host's name, got '-x'"),
         ],

@@ -4,12 +4,13 @@ import json
 import re
 
 import pytest
+from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.export import exported, recipe_table
-from station.settings.recipe import Recipe, load_recipe
-from station.settings.schema import leaves, schema_of
+from station.settings.recipe import Recipe, load_recipe, load_recipes
+from station.settings.schema import branches, leaves, resolved, schema_of
 
 
 def test_schemas_example_and_tables_are_fresh(root):
@@ -26,11 +27,36 @@ def test_every_field_has_a_title_a_description_and_where_it_has_one_a_unit():
             assert bool(suffix) <= ("unit" in leaf.node), leaf.path
 
 
+def test_every_number_has_bounds():
+    found = 0
+    for model in (Recipe, Configuration):
+        root = schema_of(model)
+        nodes = [branch for leaf in leaves(root, into_lists=True) for branch in branches(leaf.node, root)]
+        for node in nodes:
+            nodes += [resolved(each, root) for each in (node.get("items"), *node.get("prefixItems", ())) if each]
+            if node.get("type") in {"integer", "number"} and not {"enum", "const"} & set(node):
+                found += 1
+                assert {"minimum", "exclusiveMinimum"} & set(node), node
+                assert {"maximum", "exclusiveMaximum"} & set(node), node
+    assert found > 50
+
+
 def test_the_schema_shows_bounds_and_units_to_an_editor(root):
     schema = json.loads((root / "recipes" / "recipe.schema.json").read_text())
     step = schema["$defs"]["WidthSteps"]["properties"]["step_mm"]
     assert {key: step[key] for key in ("unit", "minimum", "maximum")} == {"unit": "mm", "minimum": 0.4, "maximum": 5.0}
     assert schema["additionalProperties"] is False
+
+
+def test_an_editor_takes_what_is_shipped_and_marks_a_mistake(root):
+    validator = Draft202012Validator(json.loads((root / "recipes" / "recipe.schema.json").read_text()))
+    for recipe in load_recipes().values():
+        values = json.loads(recipe.model_dump_json())
+        assert not list(validator.iter_errors(values))
+        values["steps"]["step_mm"] = "fine"
+        values["steps"]["stop"] = 1
+        assert {error.validator for error in validator.iter_errors(values)} == {"type", "additionalProperties"}
+    Draft202012Validator.check_schema(json.loads((root / "deploy" / "station.schema.json").read_text()))
 
 
 def test_the_example_with_nothing_commented_out_is_the_default(root, write):

@@ -16,6 +16,7 @@ from station.settings.yaml_loader import parse_document
 
 ALIKE = "expected a value that YAML 1.1 and 1.2 read alike, got"
 CLOSING = "a number above 0 and at most 50 mm"
+PRINTABLE = "expected printable characters: no control characters, none that turn the direction of text"
 
 # What is changed in the small recipe, by regular expression, and what has to be said then.
 BAD = {
@@ -87,6 +88,40 @@ BAD = {
                 "install that, or write the older form"
             ),
         ],
+    ),
+    "true for the version": (
+        r"schema_version: 1",
+        "schema_version: true",
+        ["1: schema_version: expected 1, got true"],
+    ),
+    "broken number for the version": (
+        r"schema_version: 1",
+        "schema_version: 1.0",
+        ["1: schema_version: expected 1, got 1.0"],
+    ),
+    "title that colours the terminal": (
+        r"title: Cherry",
+        r'title: "\\e[31mCherry"',
+        [f"3: title: {PRINTABLE}, got '\\x1b[31mCherry'"],
+    ),
+    "title that runs backwards": (
+        r"title: Cherry",
+        r'title: "\\u202eCherry"',
+        [f"3: title: {PRINTABLE}, got '\\u202eCherry'"],
+    ),
+    "even windows": (
+        r"damage:",
+        "segmentation:\n  paper:\n    template_window_px: 20\n    search_window_px: 8\n    kernel_px: 4\ndamage:",
+        [
+            "23: segmentation.paper.template_window_px: expected an odd side, got 20",
+            "24: segmentation.paper.search_window_px: expected an odd side, got 8",
+            "25: segmentation.paper.kernel_px: expected an odd side, got 4",
+        ],
+    ),
+    "only item wrong": (
+        r"\[4, 8\]",
+        "[x]",
+        ["12: steps.result_closings_mm[0]: expected a number above 0 and at most 50 mm, got 'x'"],
     ),
     "name": (
         r"name: cherry",
@@ -185,6 +220,13 @@ def test_a_bad_recipe_is_refused_with_line_field_and_expectation(small, write, o
     with pytest.raises(SettingsError) as caught:
         load_recipe(path)
     assert str(caught.value).splitlines() == [f"{path}:{each}" for each in expected]
+
+
+def test_of_very_many_problems_the_first_fifty_are_told(small, write):
+    with pytest.raises(SettingsError) as caught:
+        load_recipe(write(small + "".join(f"key_{number}: 1\n" for number in range(3000))))
+    assert len(caught.value.problems) == 51
+    assert caught.value.problems[-1].expected == "and more: mend these first"
 
 
 @pytest.mark.parametrize("content", ["", "[]", "7", "text"])

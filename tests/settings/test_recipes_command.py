@@ -34,6 +34,14 @@ def test_the_shipped_recipes_are_good_from_anywhere(station):
     )
 
 
+def test_before_the_first_start_nobody_is_asked_to_submit_what_is_shipped(station):
+    done = station("recipes", "list")
+    assert (done.returncode, done.stderr) == (0, "")
+    first, *others = done.stdout.splitlines()
+    assert first.startswith("nothing is in force yet: the station's first start takes up what is here")
+    assert [line.split(":")[0] for line in others] == ["blueberry", "raspberry", "rubber_ball", "strawberry"]
+
+
 def test_all_problems_of_all_files_and_the_good_ones_beside_them(station, small, write):
     good = write(small, "good.yaml")
     bad = write(small.replace("force_n: 20", "force_n: 0").replace("step_mm: 1", "step_mm: x"), "bad.yaml")
@@ -75,19 +83,22 @@ def test_a_bad_environment_is_a_message_and_exit_code_2(station):
 def test_what_is_hostile_is_a_message_and_exit_code_2(station, write, tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     bomb = "\n".join(["a0: &a0 [x]", *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40))])
-    for path in (
+    hostile = (
         tmp_path / "pipe.yaml",
-        write(bomb),
-        write(b"\xff\xfe"),
-        write("[" * 60_000),
-        write(""),
+        write(bomb, "bomb.yaml"),
+        write(b"\xff\xfe", "bytes.yaml"),
+        write("[" * 60_000, "deep.yaml"),
+        write("", "empty.yaml"),
         "a\nb.yaml",
         "x" * 5000,
-    ):
-        done = station("recipes", "check", path)
-        assert done.returncode == 2
-        assert "Traceback" not in done.stderr
-        assert re.match(r".+:\d+: .+: ", done.stderr)
+    )
+    done = station("recipes", "check", *hostile)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.splitlines()
+    assert all(re.match(r".+:\d+: .+: ", line) for line in lines)
+    for path in hostile:
+        shown = str(path).replace("\n", r"\n")[:900]
+        assert [line for line in lines if line.startswith(shown)], shown
 
 
 def test_the_guides_example_is_what_happens(station, root, write):

@@ -57,6 +57,31 @@ def test_denoising_takes_noise_and_keeps_the_edge():
     assert denoised[:, 45:70].mean() - denoised[:, 10:35].mean() > 110
 
 
+def test_denoising_is_non_local_means_of_brightness_and_of_colour_with_the_papers_numbers():
+    noise = np.random.default_rng(4).normal(0, 20, (50, 60, 3))
+    step = np.where(np.arange(60)[None, :, None] < 30, 60.0, 180.0)
+    difference = np.clip(step + noise, 0, 255).astype(np.uint8)
+    lab = cv2.cvtColor(difference, cv2.COLOR_LBGR2LAB)
+    brightness = cv2.fastNlMeansDenoising(np.ascontiguousarray(lab[:, :, 0]), None, 20, 21, 7)
+    colour = cv2.fastNlMeansDenoising(np.ascontiguousarray(lab[:, :, 1:]), None, 21, 21, 7)
+    golden = cv2.cvtColor(np.dstack([brightness, colour]), cv2.COLOR_LAB2LBGR)
+    assert np.array_equal(denoise(difference, PARAMETERS), golden)
+
+
+def test_of_several_starts_the_most_compact_wins_whatever_was_drawn_before():
+    image = np.random.default_rng(0).integers(0, 255, (40, 40, 3), dtype=np.uint8)
+
+    def spread(starts: int, seed: int) -> float:
+        bright = brightest_cluster(image, PaperParameters(kmeans_starts=starts, seed=seed)) > 0
+        return sum(float(part.var(axis=0).sum() * len(part)) for part in (image[bright], image[~bright]))
+
+    alone = [spread(1, seed) for seed in range(8)]
+    assert len(set(alone)) > 1
+    cv2.setRNGSeed(12345)
+    assert alone == [spread(1, seed) for seed in range(8)]
+    assert max(spread(10, seed) for seed in range(3)) < np.median(alone)
+
+
 def test_clustering_takes_the_brighter_of_two():
     image = np.full((30, 30, 3), 20, np.uint8)
     image[5:15, 5:15] = 200
@@ -73,6 +98,13 @@ def test_cleaning_fills_pinholes_removes_specks_and_drops_what_is_small():
     assert 4600 < np.count_nonzero(small) < 5000
     assert np.array_equal(clean(np.maximum(mask, small), PARAMETERS), clean(whole, PARAMETERS))
     assert np.count_nonzero(clean(whole, PARAMETERS)) == pytest.approx(np.count_nonzero(whole), rel=0.001)
+
+
+def test_closing_comes_before_opening():
+    """Points beside each other become one area; opening first would take them all away."""
+    mask = np.zeros((640, 480), np.uint8)
+    mask[100:301:2, 100:301:2] = 255
+    assert np.count_nonzero(clean(mask, PARAMETERS)) == pytest.approx(201 * 201, rel=0.01)
 
 
 @settings(deadline=None)
@@ -106,6 +138,8 @@ def test_a_bright_press_is_found_in_any_size_and_orientation(shape):
     assert (found & truth).sum() / (found | truth).sum() > 0.9
     assert contact.centroid_px == pytest.approx(((shape[1] // 2), (shape[0] // 2)), abs=0.5)
     assert tuple(stages) == PaperMethod.stages
+    assert np.array_equal(stages["difference"], np.where(truth[:, :, None], 250, 0).repeat(3, axis=2))
+    assert np.array_equal(stages["denoised"], denoise(stages["difference"], PARAMETERS))
     assert np.array_equal(stages["segmented"], contact.mask)
     assert all(stage.shape[:2] == shape and stage.dtype == np.uint8 for stage in stages.values())
 
