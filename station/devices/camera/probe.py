@@ -50,7 +50,8 @@ def _judged(camera: Camera, frames: list[Frame]) -> Finding:
     description = camera.description
     rate = (len(frames) - 1) / (frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
-    found = f"{description.name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
+    name = f"{description.name}, revision {description.revision}" if description.revision else description.name
+    found = f"{name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
     if faults:
         sick = sum(1 for frame in frames if frame.faults)
         remedy = "; ".join(REMEDIES[fault] for fault in faults)

@@ -188,7 +188,7 @@ def _words(error: OSError | EOFError) -> str:
     if isinstance(error, TimeoutError):
         return f"nothing came for {_SILENCE_S:g} s"
     number = error.errno or 0
-    return f"the connection failed: {os.strerror(number) if number > 0 else error}"
+    return f"the connection failed: {os.strerror(number) if number > 0 else error.strerror or error}"
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
