@@ -394,10 +394,10 @@ def test_the_dashboard_answers_line_by_line(bench, until):
         ("emergency_stop", ["fault", "ok", "ok"], "button"),
         ("protective_stop", ["fault", "ok", "ok"], "confirm"),
         ("registers_in_use", ["ok", "warning", "ok"], "EtherNet/IP"),
-        ("rtde_silent", ["ok", "fault", "ok"], "cable"),
+        ("rtde_silent", ["ok", "fault", "ok"], "answers later than 2.5 s"),
         ("stuck", ["ok", "fault", "ok"], "frozen"),
         ("delayed", ["ok", "fault", "ok"], "late"),
-        ("link_cut", ["fault"], "cable"),
+        ("link_cut", ["fault"], "Check arm.host"),
         ("garbage", ["fault"], "cable"),
     ],
 )

@@ -70,7 +70,11 @@ def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
         (
             "{nobody}",
             "{urcap: {host: {nobody}}}",
-            ("no controller answers at {nobody}", "no connection to the URCap at {nobody}", "check the robot's address"),
+            (
+                "no controller answers at {nobody}",
+                "URCap at {nobody}:63352 (Connection refused)",
+                "check the robot's address",
+            ),
         ),
     ],
 )

@@ -75,9 +75,11 @@ def _short(words: str) -> str:
 
 async def _rtde(host: str) -> Finding:
     """Ask for protocol version 2, for what a fieldbus holds and for the clock; the claim ends with the connection."""
+    place, connected = f"{host}:{RTDE_PORT}", False
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, RTDE_PORT)
+            connected = True
             try:
                 accepted = await _exchange(reader, writer, b"V", struct.pack(">H", 2))
                 version = struct.unpack(">4I", await _exchange(reader, writer, b"v", b""))
@@ -86,9 +88,12 @@ async def _rtde(host: str) -> Finding:
                 fresh = await _advances(reader, writer)
             finally:
                 writer.transport.abort()
-    except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error):
-        return Finding("arm RTDE", f"nobody speaks RTDE at {host}:{RTDE_PORT}", "fault", NOBODY_THERE)
-    found = f"RTDE at {host}:{RTDE_PORT}, controller {'.'.join(map(str, version))}"
+    except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error) as error:
+        if not connected:
+            return Finding("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
+        how = f"answers later than {PORT_DEADLINE_S:g} s" if isinstance(error, TimeoutError) else "hangs up"
+        return Finding("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
+    found = f"RTDE at {place}, controller {'.'.join(map(str, version))}"
     if accepted[:1] != b"\x01":
         return Finding("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
     if not fresh:
