@@ -82,6 +82,18 @@ class FakeCapture:
         self.released = True
 
 
+def test_the_mode_is_asked_for_in_full_with_no_queue_of_old_frames():
+    capture = FakeCapture()
+    set_mode(capture, "D20966")
+    assert capture.properties == {
+        cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*"YUYV"),
+        cv2.CAP_PROP_FRAME_WIDTH: 640,
+        cv2.CAP_PROP_FRAME_HEIGHT: 480,
+        cv2.CAP_PROP_FPS: 30,
+        cv2.CAP_PROP_BUFFERSIZE: 1,
+    }
+
+
 def test_a_mode_other_than_asked_for_is_an_error():
     with pytest.raises(CameraError, match="asked for 640x480 at 30 frames/s, the driver gave 320x480 at 30"):
         set_mode(FakeCapture(width=320.0), "D20966")
@@ -101,10 +113,12 @@ def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_
         await camera.open()
         assert camera.description.revision == "0200"
         while len(opened) < 2:
-            assert (await camera.frame(time.monotonic(), 5.0)).image.shape == (640, 480, 3)
+            assert (await camera.frame(time.monotonic(), 20.0)).image.shape == (640, 480, 3)
+        await camera.frame(time.monotonic(), 20.0)
+        assert opened[1][1].properties[cv2.CAP_PROP_ZOOM] == 0xF9F
         await camera.set_leds(Leds(1, 2, 3))
         for _ in range(2):
-            await camera.frame(time.monotonic(), 5.0)
+            await camera.frame(time.monotonic(), 20.0)
         await camera.close()
         await camera.close()
 
