@@ -18,6 +18,7 @@ from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.settings.configuration import Configuration, load_configuration
+from station.supervision.memory import keep_freed_memory
 
 ROOT = Path(__file__).resolve().parents[1]
 HOST = "127.0.0.9"
@@ -127,6 +128,7 @@ def bare_client() -> float:
 
 def main() -> None:
     """Measure, print and write the table."""
+    keep_freed_memory()  # as `station service` does
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "station.yaml"
         file.write_text(
