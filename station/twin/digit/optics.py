@@ -112,7 +112,7 @@ class Optics:
         if rows.size:
             box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
             found = self._look_up(slope_x[box], slope_y[box], size[box], self._places[(slice(None), *box)])
-            coarse[box] = found if gain is None else found * gain
+            coarse[box] = found if gain is None else cv2.multiply(found, (*map(float, gain), 1.0))
         height, width = SENSOR_SHAPE
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
@@ -125,5 +125,4 @@ class Optics:
         total = np.zeros((*size.shape, 3), np.float32)
         for table, place in zip(self._tables, places, strict=True):
             cv2.accumulateProduct(cv2.remap(table, map_x, map_y, cv2.INTER_LINEAR), place, total)
-        total[size <= SLOPE_KNOTS[0]] = 0.0
-        return total
+        return np.asarray(cv2.copyTo(total, (size > SLOPE_KNOTS[0]).astype(np.uint8)), np.float32)
