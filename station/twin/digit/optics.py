@@ -112,7 +112,7 @@ class Optics:
         if rows.size:
             box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
             found = self._look_up(slope_x[box], slope_y[box], size[box], self._places[(slice(None), *box)])
-            coarse[box] = found if gain is None else cv2.multiply(found, (*map(float, gain), 1.0))
+            coarse[box] = found if gain is None else found * gain
         height, width = SENSOR_SHAPE
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
