@@ -26,6 +26,7 @@ from station.devices.camera.health import FrameHealth
 from station.devices.camera.twin import TwinCamera
 from station.settings.camera import CameraSettings, TwinCameraSettings
 from station.settings.segmentation import PaperParameters
+from station.supervision.memory import keep_freed_memory
 from station.twin.clock import SteadyClock
 from station.twin.digit.fit import (
     PRESS_GAP_S,
@@ -349,6 +350,7 @@ def main() -> None:
     parser.add_argument("--side-by-side", type=Path)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
+    keep_freed_memory()  # as `station twin` does
     reference, presses = read_presses(arguments.real / "digit_presses")
     if arguments.side_by_side:
         side_by_side(arguments.side_by_side, reference, presses)

@@ -10,6 +10,7 @@ from station.logs import configure_logging
 from station.service.last_good import load_or_last_good
 from station.service.station import Station
 from station.settings.configuration import Configuration
+from station.supervision.memory import keep_freed_memory
 
 
 @click.command("service")
@@ -33,6 +34,7 @@ def service(config: Path | None, style: str) -> None:
 
 
 async def _run(configuration: Configuration, broken: str) -> None:
+    keep_freed_memory()
     station = Station(configuration, broken)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, station.stop)

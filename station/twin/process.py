@@ -13,6 +13,7 @@ from station.settings.arm import ArmPoses, ArmSettings
 from station.settings.camera import TwinCameraSettings
 from station.settings.can import CanSettings
 from station.settings.gripper import GripperSettings
+from station.supervision.memory import keep_freed_memory
 from station.supervision.notify import feed_watchdog, notify
 from station.twin.can.faults import line_faults
 from station.twin.can.line import LineNodes
@@ -188,6 +189,7 @@ async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
     Raises:
         BadInputError: an address cannot be had.
     """
+    keep_freed_memory()
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -10,6 +10,12 @@ def test_the_defaults_suit_the_twin_and_have_the_remote_control_check_done():
     assert ArmSettings().host not in {"localhost", "127.0.0.1", "192.168.56.101"}
 
 
+def test_the_defaults_are_as_impatient_as_ur_rtde_needs():
+    defaults = ArmSettings()
+    assert (defaults.stale_after_s, defaults.constructor_limit_s) == (0.1, 8.0)
+    assert defaults.link_lost_after_s < 1.0
+
+
 def test_poses_come_as_lists_from_a_file():
     assert ArmPoses.model_validate({"nest": [0, 1, 2, 3, 4, 5]}).joints_rad("nest") == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
 

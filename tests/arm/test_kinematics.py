@@ -124,6 +124,15 @@ def simulate(body: Body, until_s: float, start_s: float = 0.0, step_s: float = 0
 HOME = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
 
+def test_a_joint_motion_is_no_faster_than_the_slowest_joint_can():
+    body = Body(HOME, 0.0)
+    body.move_joints((2.5, -1.5708, 1.5708, 0.0, -1.5708, 0.0), 3.14, 40.0)
+    _, speeds = simulate(body, 3.0)
+    assert not body.moving
+    assert speeds.max(axis=0)[0] == pytest.approx(JOINT_SPEED_LIMITS_RAD_S[0], rel=1e-3)
+    assert (np.abs(speeds) <= np.array(JOINT_SPEED_LIMITS_RAD_S) * (1 + 1e-9)).all()
+
+
 def test_a_straight_tool_motion_is_straight_continuous_and_in_time():
     body = Body(HOME, 0.0)
     body.tcp_offset = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)

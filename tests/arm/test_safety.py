@@ -102,3 +102,12 @@ def test_from_the_emergency_stop_back_to_running():
     assert safety.release_brakes(0.6)
     safety.advance(1.2)
     assert safety.may_move
+
+
+def test_a_protective_stop_cannot_be_unlocked_in_its_first_five_seconds():
+    safety = Safety(running=True)
+    safety.stop_protectively(1.0)
+    assert not safety.unlock(5.99)
+    assert safety.safety_mode is SafetyMode.PROTECTIVE_STOP
+    assert safety.unlock(6.0)
+    assert safety.may_move

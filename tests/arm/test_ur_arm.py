@@ -271,6 +271,19 @@ def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm,
     asyncio.run(run())
 
 
+def test_a_persons_verb_is_refused_at_once_where_local_control_forbids_it(healthy_arm, until):
+    async def run():
+        async with healthy_arm(recovery_deadline_s=30.0) as (bench, arm):
+            bench.faults.set("protective_stop")
+            await until(lambda: has_cause(arm, ArmCause.PROTECTIVE_STOP))
+            bench.faults.set("local_mode")
+            await until(lambda: not bench.controller.safety.remote)
+            assert await cause_of(arm.confirm_protective_stop()) is ArmCause.LOCAL_CONTROL
+            assert await cause_of(arm.power_on_and_release_brakes()) is ArmCause.LOCAL_CONTROL
+
+    asyncio.run(run())
+
+
 @pytest.mark.parametrize(
     ("fault", "cause"), [("local_mode", ArmCause.LOCAL_CONTROL), ("registers_in_use", ArmCause.REGISTERS_IN_USE)]
 )

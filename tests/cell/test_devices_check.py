@@ -1,5 +1,8 @@
 """`station devices check` against a twin with one thing wrong at a time."""
 
+import subprocess
+import sys
+
 import pytest
 
 DEVICES = ("arm controller", "arm RTDE", "arm programs", "gripper", "camera")
@@ -54,3 +57,37 @@ def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
     done = cell.station("devices", "check")
     assert done.returncode == 1
     assert "not usable: arm, camera, gripper" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arm", "gripper", "words"),
+    [
+        (
+            "no-such-robot.invalid",
+            "{driver: modbus_rtu, modbus_rtu: {serial_port: /dev/no-such-port}}",
+            ("there is no machine of that name", "/dev/no-such-port", "check the serial port"),
+        ),
+        (
+            "{nobody}",
+            "{urcap: {host: {nobody}}}",
+            (
+                "no controller answers at {nobody}",
+                "URCap at {nobody}:63352 (Connection refused)",
+                "check the robot's address",
+            ),
+        ),
+    ],
+)
+def test_a_sites_wrong_addresses_are_named_with_what_to_correct(own_host, tmp_path, arm, gripper, words):
+    nobody = own_host()
+    file = tmp_path / "station.yaml"
+    file.write_text(
+        f"arm: {{host: {arm}}}\ngripper: {gripper}\n".replace("{nobody}", nobody)
+        + "camera: {driver: digit, open_deadline_s: 0.3, digit: {serial: D00001}}\n"
+    )
+    command = [sys.executable, "-m", "station", "devices", "check", "--config", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "station: not usable: arm, camera, gripper\n"
+    for word in (*words, "Check arm.host in station.yaml", "no DIGIT D00001 is plugged in", "check cable and serial"):
+        assert word.replace("{nobody}", nobody) in done.stdout

@@ -16,7 +16,7 @@ def plug(root, node, usb_id, serial, index="0"):
     video = usb / f"{usb.name}:1.0" / "video4linux" / node
     video.mkdir(parents=True)
     vendor, product = usb_id.split(":")
-    for name, text in (("idVendor", vendor), ("idProduct", product), ("serial", serial)):
+    for name, text in (("idVendor", vendor), ("idProduct", product), ("serial", serial), ("bcdDevice", "0200")):
         (usb / name).write_text(f"{text}\n", encoding="ascii")
     (video / "index").write_text(f"{index}\n", encoding="ascii")
     (video / "device").symlink_to(video.parent.parent)
@@ -31,7 +31,10 @@ def test_sensors_are_found_by_vendor_product_and_serial(tmp_path):
     plug(tmp_path, "video10", "2833:0209", "D20003")
     plug(tmp_path, "video2", "2833:0209", "D20966")
     listing = plug(tmp_path, "video3", "2833:0209", "D20966", index="1")
-    assert find_digits(listing) == [DigitDevice("D20966", "/dev/video2"), DigitDevice("D20003", "/dev/video10")]
+    assert find_digits(listing) == [
+        DigitDevice("D20966", "/dev/video2", "0200"),
+        DigitDevice("D20003", "/dev/video10", "0200"),
+    ]
     assert find_digits(tmp_path / "nowhere") == []
 
 
@@ -79,6 +82,18 @@ class FakeCapture:
         self.released = True
 
 
+def test_the_mode_is_asked_for_in_full_with_no_queue_of_old_frames():
+    capture = FakeCapture()
+    set_mode(capture, "D20966")
+    assert capture.properties == {
+        cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*"YUYV"),
+        cv2.CAP_PROP_FRAME_WIDTH: 640,
+        cv2.CAP_PROP_FRAME_HEIGHT: 480,
+        cv2.CAP_PROP_FPS: 30,
+        cv2.CAP_PROP_BUFFERSIZE: 1,
+    }
+
+
 def test_a_mode_other_than_asked_for_is_an_error():
     with pytest.raises(CameraError, match="asked for 640x480 at 30 frames/s, the driver gave 320x480 at 30"):
         set_mode(FakeCapture(width=320.0), "D20966")
@@ -96,11 +111,14 @@ def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_
         settings = CameraSettings(driver="digit", digit=DigitSettings(serial="D20966", green=9))
         camera = DigitCamera(settings, listing, opener)
         await camera.open()
+        assert camera.description.revision == "0200"
         while len(opened) < 2:
-            assert (await camera.frame(time.monotonic(), 5.0)).image.shape == (640, 480, 3)
+            assert (await camera.frame(time.monotonic(), 20.0)).image.shape == (640, 480, 3)
+        await camera.frame(time.monotonic(), 20.0)
+        assert opened[1][1].properties[cv2.CAP_PROP_ZOOM] == 0xF9F
         await camera.set_leds(Leds(1, 2, 3))
         for _ in range(2):
-            await camera.frame(time.monotonic(), 5.0)
+            await camera.frame(time.monotonic(), 20.0)
         await camera.close()
         await camera.close()
 
@@ -109,6 +127,34 @@ def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_
     assert all(capture.released for _, capture in opened)
     assert opened[0][1].properties[cv2.CAP_PROP_ZOOM] == 0xF9F
     assert opened[-1][1].properties[cv2.CAP_PROP_ZOOM] == 0x123
+
+
+class ThrowingCapture(FakeCapture):
+    """One whose reading ends in an exception of OpenCV's own."""
+
+    def read(self):
+        if not self.left:
+            raise cv2.error("select() failed")
+        return super().read()
+
+
+def test_an_exception_of_opencvs_costs_one_opening_and_not_the_thread(tmp_path):
+    listing = plug(tmp_path, "video4", "2833:0209", "D20966")
+    opened = []
+
+    def opener(_node):
+        opened.append(ThrowingCapture(frames=3))
+        return opened[-1]
+
+    async def play():
+        camera = DigitCamera(CameraSettings(driver="digit"), listing, opener)
+        await camera.open()
+        while len(opened) < 3:
+            assert (await camera.frame(time.monotonic(), 20.0)).image.shape == (640, 480, 3)
+        await camera.close()
+
+    asyncio.run(play())
+    assert all(capture.released for capture in opened)
 
 
 def test_no_such_sensor_is_said_with_those_that_are_there(tmp_path):

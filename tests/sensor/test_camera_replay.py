@@ -7,6 +7,7 @@ import pytest
 
 from station.devices.camera.interface import CameraError, NoCameraError, NoFrameError
 from station.devices.camera.open import camera_from
+from station.devices.camera.probe import probe_camera
 from station.devices.camera.replay import ReplayCamera, read_widths
 from station.settings.camera import CameraSettings, ReplaySettings
 
@@ -112,3 +113,13 @@ def test_bad_widths_are_refused(tmp_path, text):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(CameraError, match=r"widths\.csv"):
         read_widths(path)
+
+
+@pytest.mark.parametrize("left", [12, 1])
+def test_a_short_recording_is_no_faulty_camera(recording, left):
+    folder, _ = recording
+    for path in sorted(folder.glob("*.png"))[left:]:
+        path.unlink()
+    [finding] = asyncio.run(probe_camera(settings(folder, frames_per_s=None)))
+    assert (finding.verdict, finding.remedy) == ("ok", "")
+    assert "48x64" in finding.found

@@ -264,6 +264,29 @@ def test_a_peer_gone_mad_is_described(twin_settings, header, said):
     asyncio.run(play())
 
 
+def test_a_frame_that_is_older_than_the_one_before_it_is_never_given(twin_settings):
+    def message(sequence):
+        header = {"kind": "frame", "height": 2, "width": 2, "sequence": sequence, "age_s": 0, "bytes": 12}
+        text = json.dumps(header).encode()
+        return struct.pack(">I", len(text)) + text + bytes(12)
+
+    async def answer(reader, writer):
+        writer.write(message(5) + message(4))
+        await reader.read()
+        writer.close()
+
+    async def play():
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server:
+            camera = TwinCamera(twin_settings(server.sockets[0].getsockname()[1]))
+            await camera.open()
+            for _ in range(3):
+                assert (await camera.frame(time.monotonic(), 20.0)).sequence == 5
+            await camera.close()
+
+    asyncio.run(play())
+
+
 def test_a_bad_request_is_refused_with_words(bench):
     async def play():
         async with bench() as one:

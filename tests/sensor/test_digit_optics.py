@@ -106,6 +106,17 @@ def test_noise_is_new_in_each_frame_and_the_clean_image_is_not():
     assert np.array_equal(calm.frame(None, 0.0), calm.frame(None, 99.0))
 
 
+def test_pixels_columns_and_rows_have_each_their_fitted_noise():
+    sensor, levels = DigitSensor(2, drift=0.0), Fitted.load().noise
+    frames = [sensor.frame(None, 0.0) for _ in range(6)]
+    found = measure_noise(frames, [np.ones(SENSOR_SHAPE, np.bool_)] * len(frames))
+    both = np.sqrt(2)  # two frames make a change
+    assert found.pixel == pytest.approx(levels.pixel, rel=0.1)
+    assert found.column / both == pytest.approx(levels.column, rel=0.2)
+    # The blotchy pixels' own mean over a row is not nothing: alone it makes 0.9 of the rows' level.
+    assert 1.2 * levels.row.sum() < found.row.sum() / both < 1.6 * levels.row.sum()
+
+
 def test_units_differ_in_their_light():
     fitted = Fitted.load()
     images = [background(fitted, unit) for unit in (None, 0, 1, 2)]

@@ -5,6 +5,7 @@ Source of commands and answers: Universal Robots, "Dashboard Server e-Series".
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
@@ -91,7 +92,8 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         async with asyncio.timeout(LINE_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, PORT, limit=LONGEST_LINE)
     except (TimeoutError, OSError) as error:
-        raise ArmFault(ArmCause.LINK_LOST, f"no controller answers at {host}:{PORT}") from error
+        nameless = ": there is no machine of that name" if isinstance(error, socket.gaierror) else ""
+        raise ArmFault(ArmCause.LINK_LOST, f"no controller answers at {host}:{PORT}{nameless}") from error
     try:
         conversation = DashboardConversation(host, reader, writer)
         greeting = await conversation.hear()

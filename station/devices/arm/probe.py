@@ -19,6 +19,7 @@ CLAIM = b"input_int_register_23,input_double_register_23"
 """A fieldbus holds registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: to claim one of those, however
 shortly, would refuse a station that connects at that moment."""
 LONGEST_WORD = 120
+NOBODY_THERE = "Check arm.host in station.yaml, and that the controller is on and its network cable is in."
 FROZEN = (
     "Check the network between the station and the controller; if the pendant does not react either, "
     "restart the controller."
@@ -35,7 +36,7 @@ async def probe_arm(settings: ArmSettings) -> list[Finding]:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
     except ArmFault as fault:
-        return [Finding("arm", fault.detail[: 2 * LONGEST_WORD], "fault", fault.remedy)]
+        return [Finding("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
     return [_controller(settings.host, facts), await _rtde(settings.host), await _script(settings.host)]
 
 
@@ -74,9 +75,11 @@ def _short(words: str) -> str:
 
 async def _rtde(host: str) -> Finding:
     """Ask for protocol version 2, for what a fieldbus holds and for the clock; the claim ends with the connection."""
+    place, connected = f"{host}:{RTDE_PORT}", False
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, RTDE_PORT)
+            connected = True
             try:
                 accepted = await _exchange(reader, writer, b"V", struct.pack(">H", 2))
                 version = struct.unpack(">4I", await _exchange(reader, writer, b"v", b""))
@@ -85,10 +88,12 @@ async def _rtde(host: str) -> Finding:
                 fresh = await _advances(reader, writer)
             finally:
                 writer.transport.abort()
-    except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error):
-        remedy = REMEDIES[ArmCause.LINK_LOST]
-        return Finding("arm RTDE", f"nobody speaks RTDE at {host}:{RTDE_PORT}", "fault", remedy)
-    found = f"RTDE at {host}:{RTDE_PORT}, controller {'.'.join(map(str, version))}"
+    except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error) as error:
+        if not connected:
+            return Finding("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
+        how = f"answers later than {PORT_DEADLINE_S:g} s" if isinstance(error, TimeoutError) else "hangs up"
+        return Finding("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
+    found = f"RTDE at {place}, controller {'.'.join(map(str, version))}"
     if accepted[:1] != b"\x01":
         return Finding("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
     if not fresh:
@@ -133,6 +138,6 @@ async def _script(host: str) -> Finding:
             _, writer = await asyncio.open_connection(host, SCRIPT_PORT)
     except (TimeoutError, OSError):
         found = f"nobody takes programs at {host}:{SCRIPT_PORT}"
-        return Finding("arm programs", found, "fault", REMEDIES[ArmCause.LINK_LOST])
+        return Finding("arm programs", found, "fault", NOBODY_THERE)
     writer.transport.abort()
     return Finding("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")

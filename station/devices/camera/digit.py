@@ -53,6 +53,8 @@ class DigitDevice(NamedTuple):
     serial: str
     node: str
     """Such as /dev/video0."""
+    revision: str = ""
+    """Of the sensor and its firmware, as the USB descriptor has it: 0200 for 2.00."""
 
 
 def find_digits(sysfs: Path = SYSFS) -> list[DigitDevice]:
@@ -64,10 +66,10 @@ def find_digits(sysfs: Path = SYSFS) -> list[DigitDevice]:
     found = []
     for entry in sorted(sysfs.glob("video*"), key=lambda path: (len(path.name), path.name)):
         usb = (entry / "device").resolve().parent
-        identity = [_text(usb / name) for name in ("idVendor", "idProduct", "serial")]
+        identity = [_text(usb / name) for name in ("idVendor", "idProduct", "serial", "bcdDevice")]
         # Index 0 is the node that captures; a UVC device's others carry metadata.
         if identity[:2] == [_VENDOR, _PRODUCT] and _text(entry / "index") in {"0", ""}:
-            found.append(DigitDevice(identity[2], f"/dev/{entry.name}"))
+            found.append(DigitDevice(identity[2], f"/dev/{entry.name}", identity[3]))
     return found
 
 
@@ -155,6 +157,7 @@ class DigitCamera:
     ) -> None:
         self._settings, self._sysfs, self._opener = settings, sysfs, opener
         self._serial = settings.digit.serial
+        self._revision = ""
         width, height = _MODE[1], _MODE[0]
         self._feed = FrameFeed(f"DIGIT {self._serial}", FrameHealth(settings.oldest_s, (height, width)))
         self._leds = Leds(settings.digit.red, settings.digit.green, settings.digit.blue)
@@ -165,8 +168,8 @@ class DigitCamera:
     @property
     def description(self) -> CameraDescription:
         """Which camera it is; portrait."""
-        scale = self._settings.mm_per_px
-        return CameraDescription(f"DIGIT {self._serial}", _MODE[1], _MODE[0], scale, _MODE[2], self._serial)
+        scale, name = self._settings.mm_per_px, f"DIGIT {self._serial}"
+        return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision)
 
     async def open(self) -> None:
         """Find the sensor and wait for its first frame. Idempotent.
@@ -226,16 +229,19 @@ class DigitCamera:
                 self._capture(loop)
             except CameraError as error:
                 self._feed.trouble = str(error)
+            except Exception as error:  # noqa: BLE001 (whatever OpenCV throws, the sensor is looked for again)
+                self._feed.trouble = f"reading it failed: {error}"
             self._stopping.wait(_RETRY_S)
 
     def _capture(self, loop: asyncio.AbstractEventLoop) -> None:
         devices = find_digits(self._sysfs)
-        node = next((device.node for device in devices if device.serial == self._serial), None)
-        if node is None:
+        device = next((device for device in devices if device.serial == self._serial), None)
+        if device is None:
             others = ", ".join(device.serial for device in devices) or "none"
             raise NoCameraError(
                 f"no DIGIT {self._serial} is plugged in (found: {others}); check cable and serial number"
             )
+        node, self._revision = device.node, device.revision
         capture = self._opener(node)
         try:
             if not capture.isOpened():

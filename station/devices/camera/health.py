@@ -11,8 +11,8 @@ _SATURATED_LEVEL = 250
 _SATURATED_SHARE = 0.2
 _BLOCKS = 16
 _SEAM_HALF_PX = 2
-_SEAM_SHARE = 25
-"""Percentile over the blocks along a line: a seam may be weak in a quarter of them."""
+_SEAM_RANKS = (3, 4)
+"""Of the blocks along a line, between which the lowest quarter of 16 ends: a seam may be weak in those."""
 _SEAM_LEVELS = 6.0
 """Rendered frames of all fruit on many units stay below 3.6, torn and shifted ones above 8.8."""
 _BASELINE_SHAPE = (40, 30)
@@ -88,15 +88,16 @@ def find_seam(image: Image, axis: int) -> int | None:
     """
     height, width = image.shape[:2]
     size = (_BLOCKS, height) if axis == 0 else (width, _BLOCKS)
-    lines = np.moveaxis(cv2.resize(image, size, interpolation=cv2.INTER_AREA), axis, 0).astype(np.float32)
+    blocks = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    lines = np.asarray(blocks if axis == 0 else cv2.transpose(blocks), np.float32)
     half = _SEAM_HALF_PX
-    total = np.cumsum(np.concatenate([np.zeros_like(lines[:1]), lines]), axis=0)
-    means = (total[half:] - total[:-half]) / half
-    change = means[half:] - means[:-half]
+    sums = lines[1:] + lines[:-1]  # of so many lines
+    change = sums[half:] - sums[:-half]
     beside = (change[: -4 * half] + change[4 * half :]) / 2
     blue, green, red = np.moveaxis(np.abs(change[2 * half : -2 * half] - beside), 2, 0)
-    step = np.maximum(np.maximum(blue, green), red)
-    whole = np.percentile(step, _SEAM_SHARE, axis=1)
+    step = np.maximum(np.maximum(blue, green), red) / half
+    low, high = np.moveaxis(np.partition(step, _SEAM_RANKS, axis=1)[:, _SEAM_RANKS], 1, 0)
+    whole = (low + 3 * high) / 4
     place = int(np.argmax(whole))
     around = np.median(whole[max(0, place - 20) : place + 21])
     return place + 3 * half if whole[place] - around > _SEAM_LEVELS else None

@@ -59,6 +59,8 @@ class CameraDescription:
     """None where frames come as fast as they are asked for."""
     serial: str = ""
     """Of the sensor, by which its calibration is found; empty for a recording."""
+    revision: str = ""
+    """Of the sensor and its firmware, in its maker's digits; empty where none is told."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
 """What `station devices check` says of the camera."""
 
+import math
 import time
 
-from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault
+from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError
 from station.devices.camera.open import camera_from
 from station.devices.finding import Finding
 from station.settings.camera import CameraSettings
@@ -10,6 +11,8 @@ from station.settings.camera import CameraSettings
 _FRAMES = 15
 _FRAME_DEADLINE_S = 1.0
 _SLOW_SHARE = 0.8
+_SHORTEST_S = 1e-3
+"""For the rate of a recording that is played as fast as asked."""
 
 REMEDIES = {
     FrameFault.STALE: "the computer or the link is too slow: close other programs, use a USB port of its own",
@@ -31,31 +34,38 @@ async def probe_camera(settings: CameraSettings) -> list[Finding]:
     camera = camera_from(settings)
     try:
         await camera.open()
-        return [_judged(camera, await _some_frames(camera))]
+        return [_judged(camera, await _some_frames(camera, recorded=settings.driver == "replay"))]
     except CameraError as error:
         return [Finding("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
     finally:
         await camera.close()
 
 
-async def _some_frames(camera: Camera) -> list[Frame]:
+async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
+    """So many frames, or as many as a recording has."""
     frames: list[Frame] = []
-    while len(frames) < _FRAMES:
-        newest_s = frames[-1].captured_s if frames else time.monotonic()
-        frames.append(await camera.frame(newest_s, _FRAME_DEADLINE_S))
+    newest_s = -math.inf if recorded else time.monotonic()
+    try:
+        while len(frames) < _FRAMES:
+            frames.append(await camera.frame(newest_s, _FRAME_DEADLINE_S))
+            newest_s = frames[-1].captured_s
+    except NoFrameError:
+        if not (recorded and frames):
+            raise
     return frames
 
 
 def _judged(camera: Camera, frames: list[Frame]) -> Finding:
     description = camera.description
-    rate = (len(frames) - 1) / (frames[-1].captured_s - frames[0].captured_s)
+    rate = (len(frames) - 1) / max(_SHORTEST_S, frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
-    found = f"{description.name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
+    name = f"{description.name}, revision {description.revision}" if description.revision else description.name
+    found = f"{name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
     if faults:
         sick = sum(1 for frame in frames if frame.faults)
         remedy = "; ".join(REMEDIES[fault] for fault in faults)
         return Finding("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
-    if description.frames_per_s and rate < _SLOW_SHARE * description.frames_per_s:
+    if description.frames_per_s and len(frames) > 1 and rate < _SLOW_SHARE * description.frames_per_s:
         remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
         return Finding("camera", found, "warning", remedy)
     return Finding("camera", found, "ok", "")

@@ -33,6 +33,8 @@ from station.settings.camera import CameraSettings
 _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 _LONGEST_SIDE = 4096
+_BUFFER_BYTES = 2**20
+"""A frame: with asyncio's 64 KiB the reading is paused and resumed a dozen times in each."""
 _SILENCE_S = 2.0
 _OLDEST_S = 1e6
 _RETRY_S = 0.1
@@ -175,7 +177,8 @@ class TwinCamera:
             await _close(writer)
 
     async def _ask(self, request: dict[str, Any]) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-        reader, writer = await asyncio.open_connection(self._settings.twin.host, self._settings.twin.port)
+        host, port = self._settings.twin.host, self._settings.twin.port
+        reader, writer = await asyncio.open_connection(host, port, limit=_BUFFER_BYTES)
         header = json.dumps(request).encode()
         writer.write(_LENGTH.pack(len(header)) + header)
         return reader, writer
@@ -188,7 +191,7 @@ def _words(error: OSError | EOFError) -> str:
     if isinstance(error, TimeoutError):
         return f"nothing came for {_SILENCE_S:g} s"
     number = error.errno or 0
-    return f"the connection failed: {os.strerror(number) if number > 0 else error}"
+    return f"the connection failed: {os.strerror(number) if number > 0 else error.strerror or error}"
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:

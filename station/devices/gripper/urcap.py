@@ -4,6 +4,7 @@ The socket carries no motor current. Unverified on hardware.
 """
 
 import asyncio
+import os
 from contextlib import suppress
 from typing import NoReturn
 
@@ -134,10 +135,16 @@ class UrcapLink:
                     self._streams = await asyncio.open_connection(self._settings.host, self._settings.port)
             except OSError as error:
                 raise GripperUnreachableError(
-                    f"no connection to the {self.place} ({str(error) or 'no answer'})",
+                    f"no connection to the {self.place} ({_words(error)})",
                     "check the robot's address and network, and that the Robotiq URCap is installed and running",
                 ) from error
         return self._streams
+
+
+def _words(error: OSError) -> str:
+    """Why no connection was made, without what asyncio puts around it."""
+    number = error.errno or 0
+    return os.strerror(number) if number > 0 else error.strerror or "no answer"
 
 
 async def _piece(reader: asyncio.StreamReader) -> bytes:

@@ -125,5 +125,4 @@ class Optics:
         total = np.zeros((*size.shape, 3), np.float32)
         for table, place in zip(self._tables, places, strict=True):
             cv2.accumulateProduct(cv2.remap(table, map_x, map_y, cv2.INTER_LINEAR), place, total)
-        total[size <= SLOPE_KNOTS[0]] = 0.0
-        return total
+        return np.asarray(cv2.copyTo(total, (size > SLOPE_KNOTS[0]).astype(np.uint8)), np.float32)
