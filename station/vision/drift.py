@@ -26,7 +26,7 @@ _PRIOR_GAIN = 0.1
 _PRIOR_DISPLACEMENT_PX = 2.0
 _CELL_NOISE_LEVELS = 2.0
 _LEAST_SPREAD_LEVELS = 0.5
-_ITERATIONS = 5
+_ITERATIONS = 4
 _LEAST_BACKGROUND = 0.05
 _WELL_KNOWN, _LEAST_KNOWN, _KNOWN_POWER = 0.2, 0.05, 3
 """The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""
@@ -74,7 +74,11 @@ class DriftModel:
             for j in range(_HIGHEST_COSINE + 1)
             if i * i + j * j <= _HIGHEST_COSINE**2
         ]
-        self._orders = len(orders)
+        self._orders = np.array(orders).T
+        turns = np.pi * np.arange(_HIGHEST_COSINE + 1)
+        self._along, self._upward = (
+            np.cos(np.outer(turns, (np.arange(n) + 0.5) / n)).astype(np.float32) for n in self._half
+        )
         cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
         stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
         slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
@@ -127,17 +131,16 @@ class DriftModel:
         return Drift(levels, resized(certain, self._size), spread, strength)
 
     def _levels(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
-        """The drift at the reference's size: its smooth parts drawn smaller and enlarged, its gain exactly."""
-        end = 1 + self._orders
-        waves = (self._coarse[0, :, 1:end] @ coefficients[:, 1:end].T).astype(np.float32)
-        waves = waves.reshape(self._grid[1], self._grid[0], 3)
-        half = np.asarray(cv2.resize(waves, self._half, interpolation=cv2.INTER_CUBIC), np.float32)
-        lines = _rows(half)
+        """The drift at the reference's size: its smooth parts drawn at half of it and enlarged, its gain exactly."""
+        end = 1 + self._orders.shape[1]
+        waves = np.zeros((3, _HIGHEST_COSINE + 1, _HIGHEST_COSINE + 1), np.float32)
+        waves[:, self._orders[1], self._orders[0]] = coefficients[:, 1:end]
+        lines = self._upward.T @ _rows((waves @ self._along).transpose(1, 2, 0))
         for number, slope in enumerate(self._slopes):
             displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
             still, along, up = np.tile(displaced, self._half[0]).astype(np.float32)
             lines += slope * ((still + along * self._across) + up * self._down)
-        levels = resized(half, self._size)
+        levels = resized(lines.reshape(self._half[1], self._half[0], 3), self._size)
         _rows(levels)[:] += _rows(self._light) * np.tile(coefficients[:, 0], self._size[0]).astype(np.float32)
         return levels
 

@@ -176,6 +176,8 @@ class RobustMethod:
 
     def _mask(self, outlines: list[Outline]) -> Mask:
         height, width = self._shape[:2]
+        if len(outlines) == 1:
+            return outlines[0].drawn(height, width)
         mask = np.zeros((height, width), np.uint8)
         for outline in outlines:
             mask |= outline.drawn(height, width)
