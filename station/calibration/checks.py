@@ -66,7 +66,7 @@ def calibration_checks(
             passed=len(curve) >= _LEAST_STEPS,
             found=f"{len(curve)} steps show a whole contact",
             expected=f"at least {_LEAST_STEPS}",
-            remedy="lay the ball in the gel's middle",
+            remedy="lay the rubber ball in the gel's middle, and nothing else",
         ),
         Check(
             name="rising",

@@ -64,7 +64,7 @@ def test_one_place_gives_the_usual_scale_and_says_so(drawn_ball, calibrate_drawn
         ({"holder_mm": 24.0}, "touches the gel at the start"),
         ({"holder_mm": 14.5}, "contact begins at 3"),
         ({"holder_mm": 2.0}, "nothing touched the gel"),
-        ({"kind": Kind.STRAWBERRY, "holder_mm": 6.0}, "round"),
+        ({"kind": Kind.STRAWBERRY, "holder_mm": 6.0}, "rubber ball in.* and nothing else"),
         ({"condition": Condition(torn=True)}, "torn or cut"),
         ({"condition": Condition(dirt=6)}, "look like dirt"),
         ({"condition": Condition(dead_led="green")}, "LED is dead"),

@@ -92,8 +92,10 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         async with asyncio.timeout(LINE_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, PORT, limit=LONGEST_LINE)
     except (TimeoutError, OSError) as error:
-        nameless = ": there is no machine of that name" if isinstance(error, socket.gaierror) else ""
-        raise ArmFault(ArmCause.LINK_LOST, f"no controller answers at {host}:{PORT}{nameless}") from error
+        detail = f"no controller answers at {host}:{PORT}"
+        if isinstance(error, socket.gaierror):
+            detail = f"no controller answers at {host}:{PORT}: there is no machine of that name"
+        raise ArmFault(ArmCause.LINK_LOST, detail) from error
     try:
         conversation = DashboardConversation(host, reader, writer)
         greeting = await conversation.hear()
