@@ -41,7 +41,7 @@ _STIFFNESS = 0.05
 _WIDE_WINDOW_PX, _WIDE_SHARE, _FAR_LEVELS = 3.0, 0.3, 6.0
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_LEVEL = 1e-3
-_LEAST_BACKGROUND, _WELL_KNOWN, _LOWEST = 0.02, 0.1, 0.03
+_LEAST_BACKGROUND, _HARDLY_KNOWN, _WELL_KNOWN, _LOWEST = 0.02, 0.05, 0.1, 0.03
 
 _Floats = npt.NDArray[np.float64]
 
@@ -159,13 +159,18 @@ def _bent(moved: Movement, region: Mask, middle: tuple[float, float], radii: _Fl
 def _is_textured(moved: Movement, region: Mask) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
 
-    Without background the fit of the drift has bent the body's own slopes, and directions tell nothing: there skin is
-    what is finer than those slopes, times how much the strongest tenth bends.
+    Without background the fit of the drift has bent the body's own slopes, and directions tell little: there skin is
+    what is finer than those slopes, times how much the strongest tenth bends; and where some is left, both.
     """
-    if float(moved.background.mean()) < _WELL_KNOWN:
+    background = float(moved.background.mean())
+    if background < _WELL_KNOWN:
         strongest = quantile(moved.bend[region > 0], _STRONGEST)
-        return _fine_share(moved.change, region) * strongest > _FINE_ON_SKIN
+        fine = _fine_share(moved.change, region) * strongest > _FINE_ON_SKIN
+        if not fine or background < _HARDLY_KNOWN:
+            return fine
     skin = _coherence(moved, region, _SKIN_WINDOW_SHARE * _radius(region), _SKIN_LEFT_OUT)
+    if background < _WELL_KNOWN:
+        return skin < _SMOOTH_SMALL
     return skin < min(_SMOOTH_SMALL, _SMOOTH - _SMOOTH_PER_SIZE * np.log(_radius(region)))
 
 

@@ -26,7 +26,7 @@ _PRIOR_GAIN = 0.1
 _PRIOR_DISPLACEMENT_PX = 2.0
 _CELL_NOISE_LEVELS = 2.0
 _LEAST_SPREAD_LEVELS = 0.5
-_ITERATIONS = 4
+_ITERATIONS = 5
 _LEAST_BACKGROUND = 0.05
 _WELL_KNOWN, _LEAST_KNOWN, _KNOWN_POWER = 0.2, 0.05, 3
 """The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""

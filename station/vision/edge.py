@@ -24,7 +24,6 @@ _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
 _SIDE_SHARE = 0.15
 _REACH_STEP_PX = 2
-_FIRST_EVERY = 2
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -53,8 +52,8 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
     """
     radius = _smooth(_reach(region, middle))
-    found, _ = _steepest(length, middle, radius[::_FIRST_EVERY], _FIRST_SPAN, stiffness)
-    points = _points(middle, found)
+    radius, _ = _steepest(length, middle, radius, _FIRST_SPAN, stiffness)
+    points = _points(middle, radius)
     moments = cv2.moments(points.astype(np.float32))
     if moments["m00"] > 0:
         height, width = length.shape
@@ -75,8 +74,7 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
 
 
 def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
-    every = RAYS // len(radius)
-    return np.stack([middle[0] + COSINES[::every] * radius, middle[1] + SINES[::every] * radius], axis=1)
+    return np.stack([middle[0] + COSINES * radius, middle[1] + SINES * radius], axis=1)
 
 
 def _reach(region: Mask, middle: tuple[float, float]) -> _Floats:
@@ -104,13 +102,11 @@ def _smooth(radius: _Floats) -> _Floats:
 def _steepest(
     length: FloatImage, middle: tuple[float, float], radius: _Floats, span: tuple[float, float], stiffness: float
 ) -> tuple[_Floats, _Floats]:
-    """The radius of the steepest path and the drop across it, per ray; with fewer rays go as few steps along each."""
-    every = RAYS // len(radius)
-    steps = _STEPS // every
+    """The radius of the steepest path and the drop across it, per ray."""
     height, width = length.shape
-    shares = np.linspace(*span, steps)
+    shares = np.linspace(*span, _STEPS)
     away = radius[:, None] * shares
-    x, y = middle[0] + COSINES[::every, None] * away, middle[1] + SINES[::every, None] * away
+    x, y = middle[0] + COSINES[:, None] * away, middle[1] + SINES[:, None] * away
     profile = cv2.remap(
         length, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
     )
@@ -124,8 +120,8 @@ def _steepest(
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
-    rays = np.arange(len(path))
-    drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, steps - 1)]
+    rays = np.arange(RAYS)
+    drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, _STEPS - 1)]
     return radius * shares[path], drop.astype(np.float64)
 
 
