@@ -175,7 +175,12 @@ def test_a_contact_that_fills_the_field_is_a_lower_bound_and_not_sure():
 
 @pytest.mark.parametrize(
     ("kind", "number", "from_mm2", "rel"),
-    [("rubber_ball", 11, 85, 0.1), ("strawberry", 298, 120, 0.35), ("raspberry", 14, 110, 0.2)],
+    [
+        ("rubber_ball", 11, 85, 0.1),
+        ("strawberry", 298, 120, 0.35),
+        ("raspberry", 14, 110, 0.2),
+        ("blueberry", 27, 20, 0.1),
+    ],
 )
 def test_a_contact_that_leaves_hardly_any_background_ends_at_its_edge(kind, number, from_mm2, rel):
     press = member(kind, 2025, number).press()
