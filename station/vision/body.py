@@ -175,7 +175,7 @@ def _is_textured(moved: Movement, region: Mask) -> bool:
 
 
 def _fine_share(change: FloatImage, region: Mask) -> float:
-    """How much of a region's squared change is as fine as seeds are: the medians' ratio; 0 in a region of few pixels."""
+    """How much of a region's squared change is as fine as seeds are: the medians' ratio, or 0 in few pixels."""
     size = (change.shape[1] // 2, change.shape[0] // 2)
     change = resized(change, size)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma / 2), np.float32) for sigma in _FINE_PX)
