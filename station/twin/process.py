@@ -4,8 +4,10 @@ import asyncio
 import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Literal, Protocol
 
+import cv2
 import numpy as np
 
 from station.errors import BadInputError
@@ -30,7 +32,7 @@ from station.twin.robotiq.modbus import RtuOverTcpServer
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.urcap import UrcapServer
 from station.twin.ur.controller import UrController, arm_faults
-from station.twin.ur.kinematics import forward
+from station.twin.ur.kinematics import Joints, forward
 from station.twin.world import World
 
 LOOPBACK = "127.0.0.1"
@@ -176,7 +178,12 @@ class Twin:
 
 def _near_nest(arm: UrController, poses: ArmPoses) -> Callable[[], bool]:
     nest_m = forward(poses.nest)[:3, 3]
-    return lambda: bool(np.linalg.norm(1000 * (forward(arm.joints_rad)[:3, 3] - nest_m)) < _AT_NEST_MM)
+
+    @lru_cache(maxsize=1)  # asked many times a cycle, and mostly the arm stands
+    def near(joints_rad: Joints) -> bool:
+        return bool(np.linalg.norm(1000 * (forward(joints_rad)[:3, 3] - nest_m)) < _AT_NEST_MM)
+
+    return lambda: near(arm.joints_rad)
 
 
 async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
@@ -190,6 +197,7 @@ async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
         BadInputError: an address cannot be had.
     """
     keep_freed_memory()
+    cv2.setNumThreads(1)  # waking a second one for each part of a frame costs more than it does
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -7,16 +7,17 @@ import pytest
 
 from station.devices.camera.digit import DigitCamera, DigitDevice, find_digits, packed_leds, set_mode, to_portrait
 from station.devices.camera.interface import CameraError, Leds, NoCameraError
+from station.devices.camera.probe import probe_camera
 from station.settings.camera import CameraSettings, DigitSettings
 
 
-def plug(root, node, usb_id, serial, index="0"):
+def plug(root, node, usb_id, serial, index="0", revision="0200"):
     """Lay out sysfs as the kernel does: class entries are links into the device tree."""
     usb = root / "devices" / f"usb-{serial}"
     video = usb / f"{usb.name}:1.0" / "video4linux" / node
     video.mkdir(parents=True)
     vendor, product = usb_id.split(":")
-    for name, text in (("idVendor", vendor), ("idProduct", product), ("serial", serial), ("bcdDevice", "0200")):
+    for name, text in (("idVendor", vendor), ("idProduct", product), ("serial", serial), ("bcdDevice", revision)):
         (usb / name).write_text(f"{text}\n", encoding="ascii")
     (video / "index").write_text(f"{index}\n", encoding="ascii")
     (video / "device").symlink_to(video.parent.parent)
@@ -127,6 +128,34 @@ def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_
     assert all(capture.released for _, capture in opened)
     assert opened[0][1].properties[cv2.CAP_PROP_ZOOM] == 0xF9F
     assert opened[-1][1].properties[cv2.CAP_PROP_ZOOM] == 0x123
+
+
+class DarkCapture(FakeCapture):
+    """One that does not take its light's setting."""
+
+    def set(self, prop, value):
+        super().set(prop, value)
+        return prop != cv2.CAP_PROP_ZOOM
+
+
+@pytest.mark.parametrize(
+    ("revision", "capture", "notice"),
+    [
+        ("0200", FakeCapture, ""),
+        ("0110", FakeCapture, "its light cannot be set colour by colour: write firmware 0200 or newer to it"),
+        ("0200", DarkCapture, "it refused its light's setting: unplug it and plug it in again"),
+    ],
+)
+def test_a_light_that_cannot_be_set_is_told(tmp_path, monkeypatch, revision, capture, notice):
+    listing = plug(tmp_path, "video0", "2833:0209", "D20966", revision=revision)
+    monkeypatch.setattr(
+        "station.devices.camera.probe.camera_from", lambda one: DigitCamera(one, listing, lambda _: capture())
+    )
+    [finding] = asyncio.run(probe_camera(CameraSettings(driver="digit", digit=DigitSettings(serial="D20966"))))
+    if notice:
+        assert (finding.verdict, finding.remedy) == ("warning", notice)
+    else:
+        assert "light" not in finding.remedy
 
 
 class ThrowingCapture(FakeCapture):

@@ -32,6 +32,8 @@ from station.settings.camera import CameraSettings
 SYSFS = Path("/sys/class/video4linux")
 _VENDOR, _PRODUCT = "2833", "0209"
 _MODE = (640, 480, 30.0)
+_LIGHT_SINCE = "0200"
+"""`bcdDevice` of firmware 2.00, from which on each colour's light can be set."""
 _RETRY_S = 0.5
 _STOP_DEADLINE_S = 12.0
 """Longer than the 10 s for which OpenCV's V4L2 select may wait."""
@@ -157,7 +159,7 @@ class DigitCamera:
     ) -> None:
         self._settings, self._sysfs, self._opener = settings, sysfs, opener
         self._serial = settings.digit.serial
-        self._revision = ""
+        self._revision = self._notice = ""
         width, height = _MODE[1], _MODE[0]
         self._feed = FrameFeed(f"DIGIT {self._serial}", FrameHealth(settings.oldest_s, (height, width)))
         self._leds = Leds(settings.digit.red, settings.digit.green, settings.digit.blue)
@@ -169,7 +171,7 @@ class DigitCamera:
     def description(self) -> CameraDescription:
         """Which camera it is; portrait."""
         scale, name = self._settings.mm_per_px, f"DIGIT {self._serial}"
-        return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision)
+        return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision, self._notice)
 
     async def open(self) -> None:
         """Find the sensor and wait for its first frame. Idempotent.
@@ -223,6 +225,14 @@ class DigitCamera:
             self._stopping.set()
             await asyncio.to_thread(thread.join, _STOP_DEADLINE_S)
 
+    def _set_light(self, capture: Capture) -> None:
+        taken = capture.set(cv2.CAP_PROP_ZOOM, packed_leds(self._leds))
+        self._notice = ""
+        if self._revision and self._revision < _LIGHT_SINCE:
+            self._notice = f"its light cannot be set colour by colour: write firmware {_LIGHT_SINCE} or newer to it"
+        elif not taken:
+            self._notice = "it refused its light's setting: unplug it and plug it in again"
+
     def _capture_for_ever(self, loop: asyncio.AbstractEventLoop) -> None:
         while not self._stopping.is_set():
             try:
@@ -253,7 +263,7 @@ class DigitCamera:
             while not self._stopping.is_set():
                 if self._leds_wanted.is_set():
                     self._leds_wanted.clear()
-                    capture.set(cv2.CAP_PROP_ZOOM, packed_leds(self._leds))
+                    self._set_light(capture)
                 read, image = capture.read()
                 captured_s = time.monotonic()
                 if not read or image is None:

@@ -61,6 +61,8 @@ class CameraDescription:
     """Of the sensor, by which its calibration is found; empty for a recording."""
     revision: str = ""
     """Of the sensor and its firmware, in its maker's digits; empty where none is told."""
+    notice: str = ""
+    """What does not keep it from giving frames, and still wants a person; empty where there is nothing."""
 
 
 @dataclass(frozen=True, slots=True)

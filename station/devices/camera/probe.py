@@ -65,6 +65,8 @@ def _judged(camera: Camera, frames: list[Frame]) -> Finding:
         sick = sum(1 for frame in frames if frame.faults)
         remedy = "; ".join(REMEDIES[fault] for fault in faults)
         return Finding("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
+    if description.notice:
+        return Finding("camera", found, "warning", description.notice)
     if description.frames_per_s and len(frames) > 1 and rate < _SLOW_SHARE * description.frames_per_s:
         remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
         return Finding("camera", found, "warning", remedy)

@@ -276,7 +276,7 @@ class DigitCameraServer:
             image = np.ascontiguousarray(image[::2, ::2])
         return packed(
             "frame",
-            image.tobytes(),
+            image.data.cast("B"),
             sequence=captured.sequence,
             age_s=self._clock.now_s() - captured.captured_s,
             height=image.shape[0],

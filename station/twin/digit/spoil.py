@@ -19,6 +19,8 @@ def spoiled(image: Image, faults: FaultBoard, sequence: int) -> Image:
         faults: those of `station.twin.digit.server.digit_faults`.
         sequence: the frame's number, which decides where it tears.
     """
+    if not any(faults.active(fault) for fault in FRAME_FAULTS):
+        return image
     height, width = image.shape[:2]
     generator = np.random.default_rng([sequence, 6])
     if faults.active("frame_torn"):

@@ -21,7 +21,7 @@ _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 
 
-def packed(kind: str, payload: bytes = b"", **fields: float | str) -> bytes:
+def packed(kind: str, payload: bytes | memoryview = b"", **fields: float | str) -> bytes:
     """One message.
 
     Args:

@@ -1,0 +1,22 @@
+"""How often ur-rtde's threads may be woken, which is most of what its process costs."""
+
+import subprocess
+import sys
+
+PR_GET_TIMERSLACK = 30
+ASKS = f"""
+import ctypes, threading
+from station.devices.arm.process import TIMER_SLACK_NS, sleep_loosely
+ask = lambda: found.append(ctypes.CDLL(None).prctl({PR_GET_TIMERSLACK}))
+found = []
+sleep_loosely()
+for thread in [threading.Thread(target=ask)]:
+    thread.start()
+    thread.join()
+print(found == [TIMER_SLACK_NS], found)
+"""
+
+
+def test_threads_that_ur_rtde_starts_later_are_woken_loosely_too():
+    told = subprocess.run([sys.executable, "-c", ASKS], capture_output=True, text=True, check=True).stdout
+    assert told.startswith("True"), told
