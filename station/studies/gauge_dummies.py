@@ -1,0 +1,60 @@
+"""A gauge study of the gauge alone: firm balls in a jig, pressed down to a stop, in place of fruit.
+
+A fruit laid in anew shows another true area, and the gripper's counts meet it at another closing. Neither is the fault
+of what looks at the gel, so both are held as a metrologist would hold them: the jig keeps the ball's place, and a stop
+in it, on which the jaws come to rest, the width. Then an operator's habit and gripper zero change nothing; what is left
+of an operator is the sensor unit. Every repeat takes the ball out and lays it in again.
+"""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from station.settings.recipe import find_recipe
+from station.studies.gauge_grip import Grip, true_area_mm2
+from station.studies.gauge_table import Measurement
+from station.studies.gauge_twin import GaugeTask, Simulated, setup_of
+from station.twin.contact import Pose
+from station.twin.fruit import Fruit, Kind, draw_fruit
+from station.twin.gel import MM_PER_PX
+
+SMALLEST_MM, LARGEST_MM = 20.0, 40.0
+CLOSING_MM = 6.0
+"""Diameters of the balls, and how far the stop lets each be pressed: areas of 67 to 119 mm², from below a sound
+strawberry's to above its recipe's limit."""
+PLAY_MM, STOP_MM = 0.05, 0.02
+"""Standard deviations of the ball's place in the jig and of the width at the stop; our estimates."""
+DUMMY_TRUTHS = ("Jig and stop: true areas at the width as it was",)
+"""What the true areas vary with."""
+
+
+def ball_of(task: GaugeTask, parts: int) -> Fruit:
+    """The ball; sizes are evenly apart.
+
+    Args:
+        task: whose part.
+        parts: how many there are, at least 2.
+    """
+    across_mm = SMALLEST_MM + (LARGEST_MM - SMALLEST_MM) * task.part / (parts - 1)
+    return replace(draw_fruit(Kind.RUBBER_BALL, task.seed), width_mm=across_mm, length_mm=across_mm)
+
+
+def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
+    """Press a ball down to its stop and measure that one step as the fruit's recipe does.
+
+    Args:
+        task: which ball, who and how often; its fruit names the recipe.
+        parts: how many balls there are.
+
+    Returns:
+        The measurement with the truth of `DUMMY_TRUTHS`; a contact that was not found has 0 mm².
+    """
+    cv2.setNumThreads(1)
+    generator = np.random.default_rng([task.seed, 104, task.part, task.operator, task.repeat])
+    x_px, y_px = generator.normal(0.0, PLAY_MM / MM_PER_PX, 2)
+    closing_mm = CLOSING_MM + float(generator.normal(0.0, STOP_MM))
+    ball, pose = ball_of(task, parts), Pose(240.0 + x_px, 320.0 + y_px)
+    grip = Grip(find_recipe(task.fruit), ball, pose, setup_of(task).unit, int(generator.integers(2**31)))
+    area_mm2 = grip.held(closing_mm).area_px * MM_PER_PX**2
+    return Simulated(Measurement(*task.names, area_mm2), (true_area_mm2(ball, pose, closing_mm),))
