@@ -1,6 +1,6 @@
 """A gauge study on the twin: how many of what are measured how often, and what is told of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -70,7 +70,7 @@ def study_on_twin(design: TwinDesign, tolerance: float | None, on_done: Callable
             f"{tolerance:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the deciding closing, the same ones sound "
             f"{good:.1f} mm² (true areas, mean of 30)"
         )
-    facts = [*(_dummy_facts if design.dummies else _fruit_facts)(design), ("Tolerance", words)]
+    facts = [*(_dummy_facts(design, made) if design.dummies else _fruit_facts(design)), ("Tolerance", words)]
     title = "firm balls" if design.dummies else design.fruit
     study = analysed(f"{title} on the twin", facts, [one.measurement for one in made], tolerance)
     truths = np.array([one.truths_mm2 for one in made]).reshape(*study.table.areas_mm2.shape, -1)
@@ -98,7 +98,8 @@ def _fruit_facts(design: TwinDesign) -> list[tuple[str, str]]:
     ]
 
 
-def _dummy_facts(design: TwinDesign) -> list[tuple[str, str]]:
+def _dummy_facts(design: TwinDesign, made: Sequence[Simulated]) -> list[tuple[str, str]]:
+    refused = sum(one.refused for one in made)
     balls = f"{design.parts} firm balls of {SMALLEST_MM:g} to {LARGEST_MM:g} mm in a jig"
     laid_in = f"taken out and laid in again ({PLAY_MM:g} mm of play, {STOP_MM:g} mm at the stop, standard deviations)"
     return [
@@ -106,4 +107,5 @@ def _dummy_facts(design: TwinDesign) -> list[tuple[str, str]]:
         ("Operators", f"{design.operators}: another sensor unit each"),
         ("Repeats", f"{design.repeats}: {laid_in}, with the sensor's noise as measured on real ones"),
         ("Measured", f"the area of one step, by the shipped recipe of {design.fruit}"),
+        ("Refused", f"{refused} of {len(made) + refused} readings: flagged by the method itself, and made again"),
     ]

@@ -52,6 +52,8 @@ class Simulated(NamedTuple):
     measurement: Measurement
     truths_mm2: tuple[float, ...]
     """True areas, from the least of what varies to the most."""
+    refused: int = 0
+    """Readings before this one that were flagged and made again."""
 
 
 @dataclass(frozen=True, slots=True)

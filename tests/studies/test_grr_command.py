@@ -11,9 +11,10 @@ from click.testing import CliRunner, Result
 from station.commands.grr import grr
 from station.errors import BadInputError, StationError
 from station.settings.recipe import find_recipe
-from station.studies import gauge_design
+from station.studies import gauge_design, gauge_dummies
 from station.studies import grr as grr_room
 from station.studies.gauge_design import TwinDesign, study_on_twin
+from station.studies.gauge_dummies import measure_dummy
 from station.studies.gauge_grip import deciding_closing_mm
 from station.studies.gauge_report import render, tolerance_percents
 from station.studies.gauge_table import Measurement, read_measurements
@@ -26,6 +27,8 @@ from station.studies.gauge_twin import (
     pose_of,
     setup_of,
 )
+from station.twin.gel import MM_PER_PX
+from station.vision.contact import Contact, Flag
 
 
 def asked(*arguments: object) -> Result:
@@ -159,9 +162,34 @@ def test_the_gauge_alone_repeats(tmp_path: Path):
     assert summary["distinct_categories"] >= 5
     small, *_, large = read_measurements(out / "measurements.csv")
     good, damaged = good_and_damaged_mm2("strawberry", 0)
-    assert small.area_mm2 < good < large.area_mm2
-    assert find_recipe("strawberry").damage.area[-1].area_mm2 < large.area_mm2 < damaged
-    assert "firm balls of 20 to 40 mm" in (out / "report.html").read_text()
+    assert small.area_mm2 < good < large.area_mm2 < damaged
+    assert large.area_mm2 == pytest.approx(find_recipe("strawberry").damage.area[-1].area_mm2, rel=0.05)
+    page = (out / "report.html").read_text()
+    assert "firm balls of 20 to 38 mm" in page
+    assert "0 of 8 readings" in page
+
+
+def test_a_flagged_reading_is_made_again(monkeypatch: pytest.MonkeyPatch):
+    """The method flags the first two readings, then all of another ball's."""
+    pressed: list[float] = []
+
+    class Doubtful:
+        def __init__(self, *_what: object) -> None:
+            pass
+
+        def held(self, closing_mm: float) -> Contact:
+            pressed.append(closing_mm)
+            flags = frozenset[Flag]() if len(pressed) == 3 else frozenset({Flag.LOW_CONFIDENCE})
+            return Contact(np.zeros((640, 480), np.uint8), 1000 * len(pressed), None, flags)
+
+    monkeypatch.setattr(gauge_dummies, "Grip", Doubtful)
+    task = GaugeTask("strawberry", 3, 0, 0, 0)
+    found, hopeless = measure_dummy(task, 2), measure_dummy(task._replace(part=1), 2)
+    assert (found.refused, hopeless.refused) == (2, 4)
+    assert found.measurement.area_mm2 == pytest.approx(3000 * MM_PER_PX**2)
+    assert len(pressed) == 3 + 5
+    assert len(set(pressed)) == len(pressed)
+    assert pressed == pytest.approx([6.0] * len(pressed), abs=0.1)
 
 
 def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
