@@ -9,13 +9,13 @@ import numpy as np
 from station.settings.recipe import find_recipe
 from station.studies.gauge import analyse
 from station.studies.gauge_dummies import (
-    CLOSING_MM,
     DUMMY_TRUTHS,
     LARGEST_MM,
     PLAY_MM,
     SMALLEST_MM,
     STOP_MM,
     measure_dummy,
+    stop_mm,
 )
 from station.studies.gauge_grip import deciding_closing_mm
 from station.studies.gauge_twin import PART_TRUTHS, GaugeTask, Simulated, good_and_damaged_mm2, measure_part
@@ -99,13 +99,14 @@ def _fruit_facts(design: TwinDesign) -> list[tuple[str, str]]:
 
 
 def _dummy_facts(design: TwinDesign, made: Sequence[Simulated]) -> list[tuple[str, str]]:
-    refused = sum(one.refused for one in made)
+    refused, areas_mm2 = sum(one.refused for one in made), [one.measurement.area_mm2 for one in made]
+    spread = f"{min(areas_mm2):.0f} to {max(areas_mm2):.0f} mm²"
     balls = f"{design.parts} firm balls of {SMALLEST_MM:g} to {LARGEST_MM:g} mm in a jig"
     laid_in = f"taken out and laid in again ({PLAY_MM:g} mm of play, {STOP_MM:g} mm at the stop, standard deviations)"
     return [
-        ("Parts", f"{balls}, each pressed by {CLOSING_MM:g} mm, to a stop; seed {design.seed}"),
+        ("Parts", f"{balls}, each pressed by {stop_mm(design.fruit):g} mm, to a stop; seed {design.seed}"),
         ("Operators", f"{design.operators}: another sensor unit each"),
         ("Repeats", f"{design.repeats}: {laid_in}, with the sensor's noise as measured on real ones"),
-        ("Measured", f"the area of one step, by the shipped recipe of {design.fruit}"),
+        ("Measured", f"the area of one step, {spread}, by the shipped recipe of {design.fruit}"),
         ("Refused", f"{refused} of {len(made) + refused} readings: flagged by the method itself, and made again"),
     ]

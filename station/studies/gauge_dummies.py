@@ -7,6 +7,7 @@ of an operator is the sensor unit. Every repeat takes the ball out and lays it i
 """
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -20,14 +21,12 @@ from station.twin.fruit import Fruit, Kind, draw_fruit
 from station.twin.gel import MM_PER_PX
 
 SMALLEST_MM, LARGEST_MM = 20.0, 38.0
-CLOSING_MM = 6.0
-"""Diameters of the balls, and how far the stop lets each be pressed: areas of 67 to 114 mm², from below a sound
-strawberry's to its recipe's limit. Smooth balls of more leave no background and are measured less and less surely."""
 PLAY_MM, STOP_MM = 0.05, 0.02
 """Standard deviations of the ball's place in the jig and of the width at the stop; our estimates."""
 DUMMY_TRUTHS = ("Jig and stop: true areas at the width as it was",)
 """What the true areas vary with."""
 _MOST_READINGS = 5
+_CLOSINGS_MM = np.arange(0.5, 10.0, 0.5)
 
 
 def ball_of(task: GaugeTask, parts: int) -> Fruit:
@@ -37,8 +36,26 @@ def ball_of(task: GaugeTask, parts: int) -> Fruit:
         task: whose part.
         parts: how many there are, at least 2.
     """
-    across_mm = SMALLEST_MM + (LARGEST_MM - SMALLEST_MM) * task.part / (parts - 1)
-    return replace(draw_fruit(Kind.RUBBER_BALL, task.seed), width_mm=across_mm, length_mm=across_mm)
+    return _ball(SMALLEST_MM + (LARGEST_MM - SMALLEST_MM) * task.part / (parts - 1))
+
+
+def _ball(across_mm: float) -> Fruit:
+    return replace(draw_fruit(Kind.RUBBER_BALL, 0), width_mm=across_mm, length_mm=across_mm)
+
+
+@cache
+def stop_mm(fruit: str) -> float:
+    """How far the stop lets each ball be pressed, mm: until the largest shows the recipe's last area limit.
+
+    So the areas end where the decision falls. Beyond a strawberry's, a smooth body leaves the gel no background, and
+    the method flags more and more of them.
+
+    Args:
+        fruit: the recipe's name.
+    """
+    largest = _ball(LARGEST_MM)
+    areas = [true_area_mm2(largest, Pose(), closing_mm) for closing_mm in _CLOSINGS_MM]
+    return round(float(np.interp(find_recipe(fruit).damage.area[-1].area_mm2, areas, _CLOSINGS_MM)), 1)
 
 
 def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
@@ -60,7 +77,7 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
     refused = 0
     while True:
         x_px, y_px = generator.normal(0.0, PLAY_MM / MM_PER_PX, 2)
-        closing_mm = CLOSING_MM + float(generator.normal(0.0, STOP_MM))
+        closing_mm = stop_mm(task.fruit) + float(generator.normal(0.0, STOP_MM))
         pose = Pose(240.0 + x_px, 320.0 + y_px)
         contact = Grip(recipe, ball, pose, unit, int(generator.integers(2**31))).held(closing_mm)
         if not contact.flags or refused == _MOST_READINGS - 1:
