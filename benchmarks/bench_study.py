@@ -2,7 +2,8 @@
 
 Run with `./run bench study`, with the folder of real images beside the checkout or named by `--images`. Cohorts are
 kept below `state/study` and resumed; those that another version of the code measured are measured anew. Writes the
-tables of `docs/paper.md` and `docs/grr.md` and the pictures below `docs/paper`. `--only robust` measures no more.
+tables of `docs/paper.md` and `docs/grr.md` and the pictures below `docs/paper`. `--only robust` measures no more,
+`--only gauge` writes `docs/grr.md` alone.
 """
 
 import argparse
@@ -22,8 +23,10 @@ from station.studies import figures
 from station.studies.cohort import PAPER_FAILURES, member
 from station.studies.failure import interval
 from station.studies.folder import Identity, identity_of
+from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_figures import components_plot, measurements_plot
-from station.studies.grr import GaugeStudy, TwinDesign, analysed, measure_on_twin, truth_words, twin_tolerance
+from station.studies.gauge_report import tolerance_percents, verdict
+from station.studies.grr import GaugeStudy
 from station.studies.sample import Task
 from station.studies.study import Request, Study, judged, run_study, summary
 from station.twin.fruit import Kind
@@ -211,13 +214,10 @@ def denoising_table(images: Path) -> str:
     return table(["", "PSNR, dB", "MSE", "SSIM", "PSNR of single images"], rows)
 
 
-def gauge_study() -> GaugeStudy:
-    """The gauge study of strawberries on the twin."""
-    design = TwinDesign("strawberry", 10, 3, 3, SEED, os.cpu_count() or 1)
-    measured = measure_on_twin(design, lambda: print(".", end="", file=sys.stderr, flush=True))
-    tolerance, words = twin_tolerance(design)
-    facts = [("Tolerance", words), ("The truth", truth_words(design, tolerance))]
-    return analysed("strawberry on the twin", facts, measured, tolerance)
+def gauge_study(*, dummies: bool) -> GaugeStudy:
+    """A gauge study on the twin, of strawberries or of the dummies in their place."""
+    design = TwinDesign("strawberry", 10, 3, 3, SEED, os.cpu_count() or 1, dummies)
+    return study_on_twin(design, None, lambda: print(".", end="", file=sys.stderr, flush=True))
 
 
 def gauge_table(study: GaugeStudy) -> str:
@@ -228,12 +228,37 @@ def gauge_table(study: GaugeStudy) -> str:
         for one in gauge.components
     ]
     shown = table(["", "standard deviation, mm²", "% of the total variation", "6 of them, % of the tolerance"], rows)
+    facts = "\n".join(f"- {name}: {words}." for name, words in study.facts)
     return (
-        f"{len(study.table.parts)} strawberries, {len(study.table.operators)} operators, "
-        f"{study.table.areas_mm2.shape[2]} repeats. Tolerance: {study.facts[0][1]}.\n\n{shown}\n\n"
-        f"{gauge.distinct_categories} distinct categories; the interaction is "
-        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}. The truth: {study.facts[1][1]}."
+        f"{facts}\n\n{shown}\n\n{verdict(gauge)[1]} The interaction is "
+        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}."
     )
+
+
+def origin_table(study: GaugeStudy) -> str:
+    """Where the variation comes from."""
+    rows = [[one.name, *(f"{percent:.1f}" for percent in tolerance_percents(one.gauge))] for one in study.origins]
+    return table(["what varies, each row with all above it", "EV", "AV", "INT", "GRR"], rows)
+
+
+def write_gauge() -> None:
+    """Make both gauge studies and write their document."""
+    fruit, dummies = gauge_study(dummies=False), gauge_study(dummies=True)
+    (DOCS / "paper" / "grr-components.png").write_bytes(components_plot(fruit.gauge))
+    (DOCS / "paper" / "grr-measurements.png").write_bytes(measurements_plot(fruit.table))
+    plots = [
+        picture("Components of the variation", "grr-components.png"),
+        picture("Every measurement, the operators' means, and the ranges of the repeats", "grr-measurements.png"),
+    ]
+    tables = {
+        "dummies": gauge_table(dummies),
+        "dummies-origins": origin_table(dummies),
+        "grr": gauge_table(fruit),
+        "origins": origin_table(fruit),
+        "plots": "\n\n".join(plots),
+        "agreement": agreement_table(fruit),
+    }
+    write_tables(DOCS / "grr.md", tables)
 
 
 def agreement_table(study: GaugeStudy) -> str:
@@ -320,10 +345,17 @@ def main() -> None:
     """Measure everything and write it down."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--images", type=Path, default=ROOT.parent / "shared" / "data")
-    parser.add_argument("--only", choices=["robust", "paper"], help="measure that method's cohorts and write nothing")
+    parser.add_argument(
+        "--only",
+        choices=["robust", "paper", "gauge"],
+        help="measure that method's cohorts and write nothing; gauge: write docs/grr.md alone",
+    )
     parser.add_argument("--samples", type=int, default=300, help="of each fruit with the robust method, at least 30")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
+    if arguments.only == "gauge":
+        write_gauge()
+        return
     studies: dict[tuple[Kind, str], Study] = {}
     for method in [arguments.only] if arguments.only else ["robust", "paper"]:
         for kind in FRUITS:
@@ -340,15 +372,7 @@ def main() -> None:
         "denoising": lambda: denoising_table(arguments.images),
     }
     write_tables(DOCS / "paper.md", {**{name: make() for name, make in makers.items()}, **draw(studies)})
-    gauge = gauge_study()
-    (DOCS / "paper" / "grr-components.png").write_bytes(components_plot(gauge.gauge))
-    (DOCS / "paper" / "grr-measurements.png").write_bytes(measurements_plot(gauge.table))
-    plots = [
-        picture("Components of the variation", "grr-components.png"),
-        picture("Every measurement, the operators' means, and the ranges of the repeats", "grr-measurements.png"),
-    ]
-    tables = {"grr": gauge_table(gauge), "plots": "\n\n".join(plots), "agreement": agreement_table(gauge)}
-    write_tables(DOCS / "grr.md", tables)
+    write_gauge()
 
 
 if __name__ == "__main__":

@@ -6,20 +6,10 @@ from pathlib import Path
 
 import click
 
-from station.settings.recipe import find_recipe
+from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_report import render, verdict
 from station.studies.gauge_table import read_measurements
-from station.studies.gauge_twin import deciding_closing_mm
-from station.studies.grr import (
-    GaugeStudy,
-    TwinDesign,
-    analysed,
-    check_folder,
-    measure_on_twin,
-    store,
-    truth_words,
-    twin_tolerance,
-)
+from station.studies.grr import GaugeStudy, analysed, check_folder, store
 from station.studies.workers import stop_on_sigterm
 
 _FRUITS = ("strawberry", "blueberry", "raspberry")
@@ -29,6 +19,7 @@ _FRUITS = ("strawberry", "blueberry", "raspberry")
 @click.argument("measurements", required=False, type=click.Path(path_type=Path), metavar="[CSV]")
 @click.option("--twin", is_flag=True, help="Measure simulated fruit, half of them bruised, in place of a CSV file.")
 @click.option("--fruit", default="strawberry", show_default=True, type=click.Choice(_FRUITS), help="With --twin.")
+@click.option("--dummies", is_flag=True, help="With --twin: firm balls in a jig in place of fruit, the gauge alone.")
 @click.option("--parts", default=10, show_default=True, type=click.IntRange(2, 100), help="With --twin.")
 @click.option("--operators", default=3, show_default=True, type=click.IntRange(2, 26), help="With --twin.")
 @click.option("--repeats", default=3, show_default=True, type=click.IntRange(2, 20), help="With --twin.")
@@ -51,6 +42,7 @@ def grr(
     measurements: Path | None,
     twin: bool,  # noqa: FBT001 (click passes arguments by name)
     fruit: str,
+    dummies: bool,  # noqa: FBT001
     parts: int,
     operators: int,
     repeats: int,
@@ -66,6 +58,8 @@ def grr(
     """
     if twin == (measurements is not None):
         raise click.UsageError("expected either a CSV file of measurements or --twin")
+    if dummies and not twin:
+        raise click.UsageError("--dummies goes with --twin; of real ones give the CSV file alone")
     stop_on_sigterm()
     check_folder(out)
     if measurements is not None:
@@ -74,7 +68,7 @@ def grr(
             facts.append(("Tolerance", f"{tolerance:g} mm²"))
         study = analysed(str(measurements), facts, read_measurements(measurements), tolerance)
     else:
-        study = _on_twin(TwinDesign(fruit, parts, operators, repeats, seed, jobs), tolerance)
+        study = _on_twin(TwinDesign(fruit, parts, operators, repeats, seed, jobs, dummies), tolerance)
     store(study, render(study), out)
     click.echo(f"{verdict(study.gauge)[1]} Report: {out / 'report.html'}")
 
@@ -83,21 +77,4 @@ def _on_twin(design: TwinDesign, tolerance: float | None) -> GaugeStudy:
     with click.progressbar(
         length=len(design.tasks), label="gripping", file=sys.stderr, hidden=not sys.stderr.isatty()
     ) as bar:
-        made = measure_on_twin(design, lambda: bar.update(1))
-    if tolerance is None:
-        tolerance, words = twin_tolerance(design)
-    else:
-        words = f"{tolerance:g} mm²"
-    closing_mm = deciding_closing_mm(find_recipe(design.fruit))
-    facts = [
-        ("Parts", f"{design.parts} fruit of the twin: {design.fruit}, every second one bruised, seed {design.seed}"),
-        (
-            "Operators",
-            f"{design.operators}: another sensor unit, gripper zero and habit each; every fruit laid in anew",
-        ),
-        ("Repeats", f"{design.repeats}: gripped where it lies, with the sensor's noise as measured on real ones"),
-        ("Measured", f"the area that the station judges, at {closing_mm:g} mm of closing, by the shipped recipe"),
-        ("Tolerance", words),
-        ("The truth", truth_words(design, tolerance)),
-    ]
-    return analysed(f"{design.fruit} on the twin", facts, made, tolerance)
+        return study_on_twin(design, tolerance, lambda: bar.update(1))

@@ -62,6 +62,7 @@ def render(study: GaugeStudy) -> str:
         meanings=_MEANINGS,
         verdict=verdict(gauge),
         operators=operators,
+        origins=[(one.name, tolerance_percents(one.gauge)) for one in study.origins],
         between=[] if agreed is None else [(a, b, _kappa(kappa)) for a, b, kappa in agreed.between],
         all_alike="" if agreed is None else share(agreed.all_alike, agreed.parts),
         figures=[
@@ -69,6 +70,16 @@ def render(study: GaugeStudy) -> str:
             ("The measurements.", data_uri(measurements_plot(study.table))),
         ],
     )  # fmt: skip
+
+
+def tolerance_percents(gauge: Gauge) -> list[float]:
+    """EV, AV, INT and GRR in per cent of the tolerance; 0 for an interaction that is pooled.
+
+    Args:
+        gauge: analysed with a tolerance.
+    """
+    found = {one.name: one.tolerance_percent or 0.0 for one in gauge.components}
+    return [found.get(name, 0.0) for name in ("EV", "AV", "INT", "GRR")]
 
 
 def _kappa(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""One run of `station grr`: measurements of a file or of the twin, analysed, and the folder of results."""
+"""One run of `station grr`: measurements, analysed, and the folder of results."""
 
 import contextlib
 import errno
@@ -6,40 +6,22 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 from station.errors import BadInputError, StationError
 from station.studies.agreement import Agreement, agreement
 from station.studies.gauge import Gauge, analyse
 from station.studies.gauge_table import Crossed, Measurement, crossed, written
-from station.studies.gauge_twin import GaugeTask, good_and_damaged_mm2, measure_part, true_area_mm2
-from station.studies.workers import on_this_machine
 
 
-@dataclass(frozen=True, slots=True)
-class TwinDesign:
-    """A gauge study on the twin."""
+class Origin(NamedTuple):
+    """The same study, with a part of what varies in it."""
 
-    fruit: str
-    parts: int
-    operators: int
-    repeats: int
-    seed: int
-    jobs: int
-
-    @property
-    def tasks(self) -> list[GaugeTask]:
-        """All measurements, in the order of the table."""
-        return [
-            GaugeTask(self.fruit, self.seed, part, operator, repeat)
-            for part in range(self.parts)
-            for operator in range(self.operators)
-            for repeat in range(self.repeats)
-        ]
+    name: str
+    gauge: Gauge
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,50 +35,9 @@ class GaugeStudy:
     gauge: Gauge
     agreement: Agreement | None
     """None where outcomes were not recorded."""
-
-
-def measure_on_twin(design: TwinDesign, on_done: Callable[[], None]) -> list[Measurement]:
-    """Make all measurements; the same for any number of processes.
-
-    Args:
-        design: which.
-        on_done: called after each.
-
-    Raises:
-        StationError: a process was killed from outside.
-    """
-    found: dict[tuple[str, str, str], Measurement] = {}
-    for one in on_this_machine(measure_part, design.tasks, design.jobs):
-        found[one[:3]] = one
-        on_done()
-    return sorted(found.values(), key=lambda one: (int(one.part), one.operator, int(one.repeat)))
-
-
-def twin_tolerance(design: TwinDesign) -> tuple[float, str]:
-    """The difference of area between good and damaged fruit in mm², and in words where it comes from.
-
-    Args:
-        design: of which fruit.
-    """
-    good, damaged = good_and_damaged_mm2(design.fruit, design.seed)
-    words = f"{damaged - good:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the deciding closing, the same ones "
-    return damaged - good, f"{words}sound {good:.1f} mm² (true areas, mean of 30)"
-
-
-def truth_words(design: TwinDesign, tolerance: float) -> str:
-    """What a perfect gauge would find on the same fruit, laid in as they were.
-
-    Args:
-        design: which study.
-        tolerance: in mm².
-    """
-    areas = np.array([true_area_mm2(task) for task in design.tasks if not task.repeat])
-    table = areas.reshape(design.parts, design.operators, 1).repeat(2, axis=2)
-    sigma = analyse(table, tolerance).component("GRR")
-    return (
-        f"laying a fruit in anew changes its true area by {sigma.sigma:.2f} mm² (standard deviation): a perfect gauge "
-        f"has a GRR of {sigma.tolerance_percent:.0f} % of the tolerance"
-    )
+    origins: Sequence[Origin] = ()
+    """Where the variation comes from: true areas, of which more and more varies, and last the measured ones; empty
+    where no truth is known."""
 
 
 def analysed(
@@ -188,14 +129,19 @@ def summary(study: GaugeStudy) -> dict[str, object]:
         "tolerance_mm2": gauge.tolerance,
         "distinct_categories": gauge.distinct_categories,
         "interaction_pooled": gauge.pooled,
-        "components": {
-            one.name: {
-                "sigma_mm2": one.sigma,
-                "study_percent": one.study_percent,
-                "contribution_percent": one.contribution_percent,
-                "tolerance_percent": one.tolerance_percent,
-            }
-            for one in gauge.components
-        },
+        "components": _components(gauge),
+        "origins": [{"name": one.name, "components": _components(one.gauge)} for one in study.origins],
         "agreement": None if study.agreement is None else asdict(study.agreement),
+    }
+
+
+def _components(gauge: Gauge) -> dict[str, dict[str, float | None]]:
+    return {
+        one.name: {
+            "sigma_mm2": one.sigma,
+            "study_percent": one.study_percent,
+            "contribution_percent": one.contribution_percent,
+            "tolerance_percent": one.tolerance_percent,
+        }
+        for one in gauge.components
     }

@@ -4,22 +4,31 @@ import json
 import signal
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from station.commands.grr import grr
 from station.errors import BadInputError, StationError
 from station.settings.recipe import find_recipe
+from station.studies import gauge_design, gauge_dummies
 from station.studies import grr as grr_room
+from station.studies.gauge_design import TwinDesign, study_on_twin
+from station.studies.gauge_dummies import measure_dummy, stop_mm
+from station.studies.gauge_grip import deciding_closing_mm
+from station.studies.gauge_report import render, tolerance_percents
+from station.studies.gauge_table import Measurement, read_measurements
 from station.studies.gauge_twin import (
     GaugeTask,
-    deciding_closing_mm,
+    Simulated,
     good_and_damaged_mm2,
     measure_part,
     part_of,
     pose_of,
     setup_of,
 )
+from station.twin.gel import MM_PER_PX
+from station.vision.contact import Contact, Flag
 
 
 def asked(*arguments: object) -> Result:
@@ -59,6 +68,8 @@ def test_measurements_of_a_file_are_analysed(measurements: Path, tmp_path: Path)
     page = (out / "report.html").read_text()
     assert page.count("data:image/png") == 2
     assert "kappa" in page
+    assert "Where it comes from" not in page
+    assert summary["origins"] == []
     assert "http" not in page
     assert sorted(path.name for path in out.parent.iterdir()) == ["out"]
 
@@ -73,6 +84,7 @@ def test_without_a_tolerance_the_total_variation_judges(measurements: Path, tmp_
 def test_what_cannot_be_done_is_told(measurements: Path, tmp_path: Path):
     assert "either a CSV file of measurements or --twin" in asked("--out", tmp_path / "a").output
     assert "either a CSV file" in asked(measurements, "--twin", "--out", tmp_path / "a").output
+    assert "--dummies goes with --twin" in asked(measurements, "--dummies", "--out", tmp_path / "a").output
     assert "not in the range" in asked("--twin", "--parts", 1, "--out", tmp_path / "a").output
     assert "not in the range" in asked(measurements, "--tolerance", 0, "--out", tmp_path / "a").output
     for name, out in (("nothing.csv", tmp_path / "a"), (measurements.name, tmp_path)):
@@ -101,7 +113,7 @@ def test_interrupted_in_the_middle_it_leaves_nothing(tmp_path: Path, monkeypatch
         gripped.append(task)
         return measure_part(task)
 
-    monkeypatch.setattr(grr_room, "measure_part", interrupted)
+    monkeypatch.setattr(gauge_design, "measure_part", interrupted)
     found = asked("--twin", "--fruit", "blueberry", "--parts", 2, "--jobs", 1, "--out", tmp_path / "out")
     assert found.exit_code != 0
     assert "Aborted" in found.output
@@ -109,16 +121,94 @@ def test_interrupted_in_the_middle_it_leaves_nothing(tmp_path: Path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_varies_is_told_row_by_row(monkeypatch: pytest.MonkeyPatch):
+    """Truths of which the first varies by part alone, the second by repeat too, and areas that differ by operator."""
+
+    def gripped(task: GaugeTask) -> Simulated:
+        part, operator, repeat = 50.0 * task.part, 4.0 * task.operator, 1.0 * task.repeat
+        return Simulated(Measurement(*task.names, 10 + part + operator + repeat), (part, part + repeat))
+
+    monkeypatch.setattr(gauge_design, "measure_part", gripped)
+    done: list[None] = []
+    study = study_on_twin(TwinDesign("blueberry", 4, 3, 2, 0, 1), 60.0, lambda: done.append(None))
+    assert len(done) == 4 * 3 * 2
+    laid, counted, measured = (tolerance_percents(one.gauge) for one in study.origins)
+    repeats = 100 * 6 * np.sqrt(0.5) / 60
+    assert laid == pytest.approx([0, 0, 0, 0], abs=1e-6)
+    assert counted[3] == pytest.approx(counted[0])
+    assert counted[0] == pytest.approx(repeats * np.sqrt(12 / 18))  # nothing else: 12 of its degrees in 18, pooled
+    assert measured[1] == pytest.approx(100 * 6 * 4 / 60, rel=0.01)
+    assert study.origins[-1].gauge is study.gauge
+    stored = json.loads(json.dumps(grr_room.summary(study)))["origins"]
+    assert [row["name"] for row in stored] == [one.name for one in study.origins]
+    assert stored[1]["components"]["GRR"]["tolerance_percent"] == counted[3]
+    page = render(study)
+    for one in study.origins:
+        assert one.name.replace("'", "&#39;") in page
+
+
+def test_the_gauge_alone_repeats(tmp_path: Path):
+    """The smallest and the largest ball: both are told apart far beyond the gauge's own variation."""
+    out = tmp_path / "out"
+    found = asked("--twin", "--dummies", "--parts", 2, "--operators", 2, "--repeats", 2, "--jobs", 1, "--out", out)
+    assert found.exit_code == 0, found.output
+    summary = json.loads((out / "grr.json").read_text())
+    assert summary["agreement"] is None
+    assert summary["components"]["GRR"]["tolerance_percent"] < 25  # of eight measurements alone
+    held, measured = (row["components"] for row in summary["origins"])
+    assert measured == summary["components"]
+    assert 0 < held["EV"]["sigma_mm2"] < measured["EV"]["sigma_mm2"]
+    assert held["PV"]["sigma_mm2"] == pytest.approx(measured["PV"]["sigma_mm2"], rel=0.1)
+    assert summary["distinct_categories"] >= 5
+    small, *_, large = read_measurements(out / "measurements.csv")
+    limit_mm2 = find_recipe("strawberry").damage.area[-1].area_mm2
+    assert small.area_mm2 == pytest.approx(0.6 * limit_mm2, rel=0.1)
+    assert large.area_mm2 == pytest.approx(limit_mm2, rel=0.05)
+    page = (out / "report.html").read_text()
+    assert "firm balls of 20 to 38 mm" in page
+    assert "0 of 8 readings" in page
+
+
+def test_a_flagged_reading_is_made_again(monkeypatch: pytest.MonkeyPatch):
+    """The method flags the first two readings, then all of another ball's."""
+    pressed: list[float] = []
+
+    class Doubtful:
+        def __init__(self, *_what: object) -> None:
+            pass
+
+        def held(self, closing_mm: float) -> Contact:
+            pressed.append(closing_mm)
+            flags = frozenset[Flag]() if len(pressed) == 3 else frozenset({Flag.LOW_CONFIDENCE})
+            return Contact(np.zeros((640, 480), np.uint8), 1000 * len(pressed), None, flags)
+
+    monkeypatch.setattr(gauge_dummies, "Grip", Doubtful)
+    task = GaugeTask("strawberry", 3, 0, 0, 0)
+    found, hopeless = measure_dummy(task, 2), measure_dummy(task._replace(part=1), 2)
+    assert (found.refused, hopeless.refused) == (2, 4)
+    assert found.measurement.area_mm2 == pytest.approx(3000 * MM_PER_PX**2)
+    assert len(pressed) == 3 + 5
+    assert len(set(pressed)) == len(pressed)
+    assert pressed == pytest.approx([stop_mm("strawberry")] * len(pressed), abs=0.1)
+
+
 def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
     """One press of a smooth fruit: the area at the deciding closing is near its truth, and repeats to the digit."""
     task = GaugeTask("blueberry", 3, 0, 0, 0)
     once = measure_part(task)
     assert once == measure_part(task)
-    assert once != measure_part(task._replace(repeat=1))
-    assert (once.part, once.operator, once.repeat, once.reference) == ("1", "A", "1", "PASS")
+    again = measure_part(task._replace(repeat=1))
+    assert once != again
+    measured = once.measurement
+    assert (measured.part, measured.operator, measured.repeat, measured.reference) == ("1", "A", "1", "PASS")
     good, damaged = good_and_damaged_mm2("blueberry", 3)
     assert 1.2 * good < damaged < 2 * good
-    assert once.area_mm2 == pytest.approx(good, rel=0.35)
+    assert measured.area_mm2 == pytest.approx(good, rel=0.35)
+    (laid, counted), (laid_again, counted_again) = once.truths_mm2, again.truths_mm2
+    assert laid == laid_again == pytest.approx(good, rel=0.35)
+    assert counted != counted_again
+    assert min(counted, counted_again) > laid  # the first contact is seen late, so the fruit is pressed further
+    assert measured.area_mm2 == pytest.approx(counted, rel=0.15)
     assert deciding_closing_mm(find_recipe("blueberry")) == 3
 
 
