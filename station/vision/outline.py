@@ -10,10 +10,12 @@ from station.vision import elements
 from station.vision.body import Body
 from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import FloatImage, Mask
+from station.vision.drift import weighted_median
 from station.vision.edge import COSINES, RAYS, SINES, Edge, find_edge
 
 _SUBPIXEL_BITS = 4
 _WITHIN, _BEYOND = 0.8, 1.2
+_SURELY_SMOOTH, _LEAST_OF_REGION, _CLEAR_NOISES, _WELL_KNOWN = 0.66, 0.43, 15.0, 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +51,27 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
     if not body.textured:
         edge = find_edge(length, region, middle, stiffness)
-        confidence = edge_confidence(edge, background_spread(length, background))
-        return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
+        inside = filled(edge, (height, width))
+        if not _around_a_seed(inside, region, body, length, background):
+            confidence = edge_confidence(edge, background_spread(length, background))
+            return Outline(edge, inside, textured=False, confidence=confidence)
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
-    inside, sure = elements.union(length, region, elements.level(length, region, body))
+    inside, sure = elements.union(length, region, elements.levels(length, region, body, background))
     return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
+
+
+def _around_a_seed(inside: Mask, region: Mask, body: Body, length: FloatImage, background: FloatImage) -> bool:
+    """Whether the edge found leaves most of a weak body's region outside, and directions do not say it is smooth.
+
+    Then a seed's edge has outshone the body's. A clear body's edge is believed, whatever its skirt.
+    """
+    if body.coherence > _SURELY_SMOOTH or background.mean() < _WELL_KNOWN:
+        return False
+    if cv2.countNonZero(inside) > _LEAST_OF_REGION * cv2.countNonZero(region):
+        return False
+    return elements.strength(length, region) < _CLEAR_NOISES * weighted_median(length, background)
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
