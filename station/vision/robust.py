@@ -34,6 +34,7 @@ _COARSE_STEP, _FINE_STEP = 4, 2
 _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
+_LEAST_LIGHT = 0.25
 _GATE_OF_WIDE = 0.6
 """Of the gate's threshold, where so much has moved that the background's bending is the skirt's."""
 
@@ -70,7 +71,7 @@ class RobustMethod:
         self._drift = DriftModel(self._reference)
         sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
         self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
-        self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+        self._least_bend = _lit(self._light) * parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
         """Find the contact in an image.
@@ -225,6 +226,12 @@ class _Seen(NamedTuple):
     def gate(self) -> float:
         """The strongest bending over the gate's threshold."""
         return float(self.bend.max()) / self.threshold
+
+
+def _lit(light: FloatImage) -> float:
+    """The share of the colours that have light: one whose LED is dead adds nothing to what bends."""
+    means = np.asarray(cv2.mean(light)[:3])
+    return float(np.mean(means > _LEAST_LIGHT * means.max()))
 
 
 def _one_sided(change: FloatImage, outline: Outline) -> bool:
