@@ -58,7 +58,7 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
-    inside, sure = elements.union(length, region, elements.levels(length, region, body, background))
+    inside, sure = elements.union(length, region, body, background)
     return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
 
 
