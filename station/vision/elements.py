@@ -14,7 +14,7 @@ _LEVELS_TRIED = (0.7, 1.4)
 _HALF_SURE = 0.45
 _LEAST = 1e-6
 _ROOM_PX = 9
-_FINE_SIZES_PX, _COARSE_SIZES_PX, _WELL_KNOWN = (1.0, 7, 5), (2.0, 9, 7), 0.1
+_FINE_SIZES_PX, _COARSE_SIZES_PX, WELL_KNOWN = (1.0, 7, 5), (2.0, 9, 7), 0.1
 """Of the smoothing, of grooves and of specks, with the background that tells what is noise, and without."""
 _NOISES, _WEAK_NOISES = 1.7, 5.0
 _RISE, _WHERE_AS_IT_IS = 5.0, 0.8
@@ -34,7 +34,7 @@ def union(length: FloatImage, region: Mask, body: Body, background: FloatImage) 
         Shape of `length`, 0 or 255; and 0 to 1, the less the more the pressed place hangs on the level: one half
         where twice the level leaves two thirds of it.
     """
-    known = float(background.mean()) >= _WELL_KNOWN
+    known = float(background.mean()) >= WELL_KNOWN
     blur_px, groove_px, speck_px = _FINE_SIZES_PX if known else _COARSE_SIZES_PX
     groove, speck, room = (
         cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (groove_px, speck_px, _ROOM_PX)

@@ -15,7 +15,7 @@ from station.vision.edge import COSINES, RAYS, SINES, Edge, find_edge
 
 _SUBPIXEL_BITS = 4
 _WITHIN, _BEYOND = 0.8, 1.2
-_SURELY_SMOOTH, _LEAST_OF_REGION, _CLEAR_NOISES, _WELL_KNOWN = 0.66, 0.43, 15.0, 0.1
+_SURELY_SMOOTH, _CLEAR_NOISES = 0.62, 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +49,10 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     region = np.asarray(cv2.resize(body.region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
     scale = width / body.region.shape[1], height / body.region.shape[0]
     middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
-    if not body.textured:
+    if not body.textured and not _is_faint_skin(length, region, body, background):
         edge = find_edge(length, region, middle, stiffness)
-        inside = filled(edge, (height, width))
-        if not _around_a_seed(inside, region, body, length, background):
-            confidence = edge_confidence(edge, background_spread(length, background))
-            return Outline(edge, inside, textured=False, confidence=confidence)
+        confidence = edge_confidence(edge, background_spread(length, background))
+        return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
@@ -62,14 +60,12 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
 
 
-def _around_a_seed(inside: Mask, region: Mask, body: Body, length: FloatImage, background: FloatImage) -> bool:
-    """Whether the edge found leaves most of a weak body's region outside, and directions do not say it is smooth.
+def _is_faint_skin(length: FloatImage, region: Mask, body: Body, background: FloatImage) -> bool:
+    """Whether a body that passes for smooth stands so little out of the noise that its edge may well be a seed's.
 
-    Then a seed's edge has outshone the body's. A clear body's edge is believed, whatever its skirt.
+    Not where directions agree as they hardly do on skin, and not without background, where they tell little.
     """
-    if body.coherence > _SURELY_SMOOTH or background.mean() < _WELL_KNOWN:
-        return False
-    if cv2.countNonZero(inside) > _LEAST_OF_REGION * cv2.countNonZero(region):
+    if body.coherence > _SURELY_SMOOTH or float(background.mean()) < elements.WELL_KNOWN:
         return False
     return elements.strength(length, region) < _CLEAR_NOISES * weighted_median(length, background)
 
