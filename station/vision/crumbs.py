@@ -61,7 +61,8 @@ class Crumbs:
         told = np.maximum(self.clean, hidden < shown)
         half = np.where((hidden < shown)[..., None], given_back, half) * told[..., None]
         weight = np.maximum(cv2.GaussianBlur(told, (0, 0), _AROUND_PX), _LEAST_SEEN)
-        around = resized(cv2.GaussianBlur(half, (0, 0), _AROUND_PX) / weight[..., None], self._places.shape[::-1])
+        filled = np.asarray(cv2.GaussianBlur(half, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
+        around = resized(filled, self._places.shape[::-1])
         is_hidden = cv2.resize(told, self._places.shape[::-1], interpolation=cv2.INTER_NEAREST)[self._places] > 0
         change[self._places] = np.where(
             is_hidden[:, None], (change + self._pattern)[self._places], around[self._places]

@@ -41,7 +41,7 @@ def strength(length: FloatImage, region: Mask) -> float:
     return quantile(length[region > 0], _STRONG_QUANTILE)
 
 
-def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatImage | float:
+def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatImage:
     """The change from which on a place belongs to an element that is pressed in, grey levels.
 
     A lone element ends where half of its change is gone; the more there are, the less the outermost are pressed, and
@@ -55,7 +55,7 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
         noise: from `noise_of`.
 
     Returns:
-        Shape of `length`, or one for all places where the noise is not known.
+        Shape of `length`; one for all places where the noise is not known.
     """
     radius_px = float(np.sqrt(cv2.countNonZero(region) / np.pi))
     few = float(np.clip((_MANY_PX - radius_px) / (_MANY_PX - _FEW_PX), 0, 1))
@@ -63,13 +63,14 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
     strong = strength(length, region)
     least = max(share * strong, _NOISES * noise)
     if noise <= 0:
-        return least
+        return np.full_like(length, least)
     weak = (_WEAK_NOISES * noise) ** 2
     rise = _RISE * weak / (weak + strong**2)
-    return least * np.exp(rise * (_outwards(region, radius_px) - _WHERE_AS_IT_IS), dtype=np.float32)
+    outwards = _outwards(region, radius_px) - np.float32(_WHERE_AS_IT_IS)
+    return np.asarray(least * np.exp(rise * outwards), np.float32)
 
 
-def union(length: FloatImage, region: Mask, level: FloatImage | float, noise: float) -> tuple[Mask, float]:
+def union(length: FloatImage, region: Mask, level: FloatImage, noise: float) -> tuple[Mask, float]:
     """What is pressed in within a region and close to it, grooves bridged and holes filled, and how sure that is.
 
     Args:
