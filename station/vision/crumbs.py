@@ -16,6 +16,8 @@ _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
 _LEAST_LEVELS = 10.0
 """Of what is fine in the reference: without crumbs it reaches 6 on the twin and 8 on the real presses' reference."""
 _RING_PX, _SKIRT_PX = 9, 5
+_LONGEST_PX = 30
+"""At half the working size, about 3 mm: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
 _LEAST_SEEN = 1e-3
@@ -38,7 +40,10 @@ class Crumbs:
             fine -= np.median(fine, axis=axis, keepdims=True)
         length = cv2.GaussianBlur(cv2.sqrt(length_squared(fine)), (0, 0), _LENGTH_PX)
         ring, skirt = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_RING_PX, _SKIRT_PX))
-        seen = cv2.dilate(cv2.morphologyEx((length > _LEAST_LEVELS).astype(np.uint8), cv2.MORPH_CLOSE, ring), skirt)
+        seen = cv2.morphologyEx((length > _LEAST_LEVELS).astype(np.uint8), cv2.MORPH_CLOSE, ring)
+        _, labels, boxes, _ = cv2.connectedComponentsWithStats(cv2.dilate(seen, skirt))
+        longest = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+        seen = ((labels > 0) & (longest <= _LONGEST_PX)[labels]).astype(np.uint8)
         self.clean = np.asarray(1 - seen, np.float32)
         """Where there is none, at half the working size, 0 or 1."""
         self._places = cv2.resize(seen, (width, height), interpolation=cv2.INTER_NEAREST) > 0
