@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from station.settings.segmentation import RobustParameters
+from station.studies.cohort import member
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition
 from station.vision.crumbs import Crumbs
@@ -62,3 +63,9 @@ def test_with_a_dead_led_a_contact_over_most_of_the_field_is_not_taken_for_drift
     press = render_press("rubber_ball", 0, (7.0,), PressOptions(condition=Condition(dead_led="red")))
     contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
     assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.1)
+
+
+def test_a_blueberry_over_most_of_the_field_is_not_taken_for_drift():
+    press = member("blueberry", 2025, 93).press()
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[16])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[16]), rel=0.1)
