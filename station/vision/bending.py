@@ -54,7 +54,7 @@ def quiet(bend: FloatImage, least_bend: float) -> FloatImage:
         Shape of `bend`, 0 to 1.
     """
     calmest = float(np.partition(bend, bend.size // 20, axis=None)[bend.size // 20])
-    limit = min(_CALM_RATIO * calmest, 1.5 * least_bend) + 0.15 * least_bend
+    limit = min(_CALM_RATIO * calmest, 1.45 * least_bend) + 0.15 * least_bend
     outlines, _ = cv2.findContours((bend > limit).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     enclosed = cv2.drawContours(np.zeros(bend.shape, np.uint8), outlines, -1, 1, cv2.FILLED)
     fourth = np.square(np.square(bend * np.float32(1 / limit)))

@@ -3,58 +3,103 @@
 import cv2
 import numpy as np
 
-from station.vision.body import Body
+from station.vision.body import Body, quantile
 from station.vision.contact import FloatImage, Mask
+from station.vision.drift import weighted_median
 
-_BLUR_PX = 2.0
 _STRONG_QUANTILE = 0.8
 _SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.09, 0.45
 _SHARE_OF_FEW, _FEW_PX, _MANY_PX = 0.27, 34.0, 50.0
 _LEVELS_TRIED = (0.7, 1.4)
 _HALF_SURE = 0.45
-_GROOVE_PX, _SPECK_PX, _ROOM_PX = 9, 7, 9
+_ROOM_PX = 9
+_FINE_SIZES_PX, _COARSE_SIZES_PX = (1.0, 7, 5), (2.0, 9, 7)
+"""Of the smoothing, of grooves and of specks: where the noise is known, and where it is not."""
+_WELL_KNOWN = 0.1
+_NOISES, _WEAK_NOISES = 1.7, 5.0
+_RISE, _WHERE_AS_IT_IS = 5.0, 0.8
+"""Of the level, per radius outwards, where nothing stands out of the noise; and where it stays as it is, in radii."""
 
 
-def level(length: FloatImage, region: Mask, body: Body) -> float:
-    """The change from which on a place belongs to an element that is pressed in, grey levels.
-
-    A lone element ends where half of its change is gone; the more there are, the less the outermost are pressed, and
-    the less their directions agree.
+def noise_of(length: FloatImage, background: FloatImage) -> float:
+    """The change's median where nothing touches, or 0 where there is too little background to tell.
 
     Args:
         length: of the change, shape (height, width), grey levels.
-        region: the body's, shape of `length`, 0 or not.
-        body: its coherence is used.
+        background: how surely a place is background, shape of `length`, 0 to 1.
     """
-    radius_px = np.sqrt(cv2.countNonZero(region) / np.pi)
+    return weighted_median(length, background) if float(background.mean()) >= _WELL_KNOWN else 0.0
+
+
+def strength(length: FloatImage, region: Mask) -> float:
+    """What the strongest fifth of a region's change reaches, grey levels.
+
+    Args:
+        length: of the change, shape (height, width), grey levels.
+        region: shape of `length`, 0 or not, not empty.
+    """
+    return quantile(length[region > 0], _STRONG_QUANTILE)
+
+
+def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatImage:
+    """The change from which on a place belongs to an element that is pressed in, grey levels.
+
+    A lone element ends where half of its change is gone; the more there are, the less the outermost are pressed, and
+    the less their directions agree. Noise is no element. The less the body stands out of the noise, the more its
+    region decides: the level is lower within, where flesh is fainter than a seed, and rises outwards.
+
+    Args:
+        length: of the change, shape (height, width), grey levels.
+        region: the body's, shape of `length`, 0 or not, not empty.
+        body: its coherence is used.
+        noise: from `noise_of`.
+
+    Returns:
+        Shape of `length`; one for all places where the noise is not known.
+    """
+    radius_px = float(np.sqrt(cv2.countNonZero(region) / np.pi))
     few = float(np.clip((_MANY_PX - radius_px) / (_MANY_PX - _FEW_PX), 0, 1))
     share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * body.coherence + _SHARE_OF_FEW * few
-    strong = length[region > 0]
-    place = int(_STRONG_QUANTILE * (strong.size - 1))
-    return share * float(np.partition(strong, place)[place])
+    strong = strength(length, region)
+    least = max(share * strong, _NOISES * noise)
+    if noise <= 0:
+        return np.full_like(length, least)
+    weak = (_WEAK_NOISES * noise) ** 2
+    rise = _RISE * weak / (weak + strong**2)
+    outwards = _outwards(region, radius_px) - np.float32(_WHERE_AS_IT_IS)
+    return np.asarray(least * np.exp(rise * outwards), np.float32)
 
 
-def union(length: FloatImage, region: Mask, level_levels: float) -> tuple[Mask, float]:
+def union(length: FloatImage, region: Mask, level: FloatImage, noise: float) -> tuple[Mask, float]:
     """What is pressed in within a region and close to it, grooves bridged and holes filled, and how sure that is.
 
     Args:
         length: of the change, shape (height, width), grey levels.
         region: the body's, shape of `length`, 0 or not.
-        level_levels: from `level`.
+        level: from `level`.
+        noise: from `noise_of`; where it is known, less has to be smoothed and bridged.
 
     Returns:
         Shape of `length`, 0 or 255; and 0 to 1, the less the more the pressed place hangs on the level: one half
         where twice the level leaves two thirds of it.
     """
+    blur_px, groove_px, speck_px = _FINE_SIZES_PX if noise > 0 else _COARSE_SIZES_PX
     groove, speck, room = (
-        cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_GROOVE_PX, _SPECK_PX, _ROOM_PX)
+        cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (groove_px, speck_px, _ROOM_PX)
     )
-    smooth = cv2.GaussianBlur(length, (0, 0), _BLUR_PX)
+    smooth = cv2.GaussianBlur(length, (0, 0), blur_px)
     near = np.asarray(cv2.dilate(region, room), np.uint8)
-    pressed = (smooth > level_levels).astype(np.uint8) & near
-    low, high = (1 + np.count_nonzero((smooth > factor * level_levels) & (near > 0)) for factor in _LEVELS_TRIED)
+    pressed = (smooth > level).astype(np.uint8) & near
+    low, high = (1 + np.count_nonzero((smooth > factor * level) & (near > 0)) for factor in _LEVELS_TRIED)
     sure = 1 / (1 + (np.log(low / high) / _HALF_SURE) ** 2)
     bridged = cv2.morphologyEx(pressed, cv2.MORPH_CLOSE, groove)
     outlines, _ = cv2.findContours(bridged, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     filled = cv2.drawContours(np.zeros_like(pressed), outlines, -1, 255, cv2.FILLED)
     return np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, speck), np.uint8), float(sure)
+
+
+def _outwards(region: Mask, radius_px: float) -> FloatImage:
+    """How far out a place lies, in radii: 1 on the region's edge, less within and more beyond."""
+    framed = (cv2.copyMakeBorder(region, 1, 1, 1, 1, cv2.BORDER_REPLICATE) > 0).astype(np.uint8)
+    within, beyond = (cv2.distanceTransform(one, cv2.DIST_L2, cv2.DIST_MASK_5) for one in (framed, 1 - framed))
+    return np.asarray(1 + (beyond - within)[1:-1, 1:-1] * np.float32(1 / radius_px), np.float32)

@@ -14,6 +14,7 @@ from station.vision.edge import COSINES, RAYS, SINES, Edge, find_edge
 
 _SUBPIXEL_BITS = 4
 _WITHIN, _BEYOND = 0.8, 1.2
+_SURELY_SMOOTH, _CLEAR_NOISES = 0.62, 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +48,24 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     region = np.asarray(cv2.resize(body.region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
     scale = width / body.region.shape[1], height / body.region.shape[0]
     middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
-    if not body.textured:
+    noise = elements.noise_of(length, background)
+    if not body.textured and not _is_faint_skin(length, region, body, noise):
         edge = find_edge(length, region, middle, stiffness)
         confidence = edge_confidence(edge, background_spread(length, background))
         return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
-    inside, sure = elements.union(length, region, elements.level(length, region, body))
+    inside, sure = elements.union(length, region, elements.level(length, region, body, noise), noise)
     return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
+
+
+def _is_faint_skin(length: FloatImage, region: Mask, body: Body, noise: float) -> bool:
+    """Whether a body that passes for smooth stands so little out of the noise that the edge found may be a seed's.
+
+    Not where directions agree as they hardly do on skin. Where the noise is not known, directions tell little.
+    """
+    return body.coherence < _SURELY_SMOOTH and elements.strength(length, region) < _CLEAR_NOISES * noise
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:

@@ -17,6 +17,7 @@ from station.vision.bending import bending, noise_of, quiet
 from station.vision.body import Movement, evening, find_body, has_moved_widely, movement
 from station.vision.candidates import body_candidates, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
+from station.vision.crumbs import Crumbs
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge_signal import denoised, length_of
 from station.vision.outline import Outline, find_outline
@@ -34,6 +35,7 @@ _COARSE_STEP, _FINE_STEP = 4, 2
 _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
+_LEAST_LIGHT = 0.25
 _GATE_OF_WIDE = 0.6
 """Of the gate's threshold, where so much has moved that the background's bending is the skirt's."""
 
@@ -68,9 +70,10 @@ class RobustMethod:
         self._evening = evening(half)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
+        self._crumbs = Crumbs(self._light)
         sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
         self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
-        self._least_bend = parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+        self._least_bend = _lit(self._light) * parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
         """Find the contact in an image.
@@ -141,7 +144,8 @@ class RobustMethod:
         change *= self._sighted
         calm = quiet(bending(without_bands(quarter), _COARSE_STEP), self._least_bend)
         fits = resized(drift.background, (calm.shape[1], calm.shape[0]))
-        change = without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits))
+        calm *= resized(self._crumbs.clean, (calm.shape[1], calm.shape[0]))
+        change = self._crumbs.bridged(without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits)))
         half = resized(change, (-(-width // _FINE_STEP), -(-height // _FINE_STEP)))
         background = resized(drift.background, (half.shape[1], half.shape[0]))
         bend = bending(half, _FINE_STEP)
@@ -225,6 +229,12 @@ class _Seen(NamedTuple):
     def gate(self) -> float:
         """The strongest bending over the gate's threshold."""
         return float(self.bend.max()) / self.threshold
+
+
+def _lit(light: FloatImage) -> float:
+    """The share of the colours that have light: one whose LED is dead adds nothing to what bends."""
+    means = np.asarray(cv2.mean(light)[:3])
+    return float(np.mean(means > _LEAST_LIGHT * means.max()))
 
 
 def _one_sided(change: FloatImage, outline: Outline) -> bool:

@@ -7,7 +7,8 @@ from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
 from station.vision.body import Body
 from station.vision.drift import without_bands, without_streaks
-from station.vision.elements import level, union
+from station.vision.elements import level, noise_of, union
+from station.vision.outline import find_outline
 from station.vision.robust import RobustMethod
 
 SHAPE = (320, 240)
@@ -42,7 +43,7 @@ def test_few_drupelets_are_their_union_and_not_their_hull():
     length = np.max([hertz(16, 30, x, y) * (disc(16, x, y) > 0) for x, y in drupelets], axis=0).astype(np.float32)
     apart = np.max([disc(16, x, y) for x, y in drupelets], axis=0)
     hull = disc(55, 120.0, 152.0)
-    found, _ = union(length, hull, level(length, hull, textured(0.5)))
+    found, _ = union(length, hull, level(length, hull, textured(0.5), 0.0), 0.0)
     assert np.count_nonzero(found) == pytest.approx(np.count_nonzero(apart), rel=0.3)
     assert np.count_nonzero(found) < 0.4 * np.count_nonzero(hull)
     assert np.count_nonzero(found & apart) > 0.85 * np.count_nonzero(apart)
@@ -50,19 +51,54 @@ def test_few_drupelets_are_their_union_and_not_their_hull():
 
 def test_a_lone_element_ends_higher_than_the_outermost_of_many():
     length = np.full(SHAPE, 20.0, np.float32)
-    few, many = (level(length, disc(radius), textured(0.2)) for radius in (20, 75))
+    few, many = (level(length, disc(radius), textured(0.2), 0.0).max() for radius in (20, 75))
     assert few == pytest.approx(9.0)
     assert many == pytest.approx(3.6)
-    assert level(length, disc(75), textured(0.6)) > many
+    assert level(length, disc(75), textured(0.6), 0.0).min() > many
 
 
 def test_an_area_that_hangs_on_its_level_is_less_sure():
     steep = 20.0 * (disc(40) > 0).astype(np.float32)
     rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
     gentle = np.maximum(0, 20 - 0.3 * np.hypot(columns - 120, rows - 160)).astype(np.float32)
-    sure, unsure = (union(length, disc(70), 8.0)[1] for length in (steep, gentle))
+    sure, unsure = (union(length, disc(70), np.full(SHAPE, 8, np.float32), 0.0)[1] for length in (steep, gentle))
     assert sure > 0.9
     assert unsure < 0.6
+
+
+def test_the_fainter_a_body_the_more_its_region_says_where_it_ends():
+    region = disc(60)
+    faint, clear = (level(np.full(SHAPE, strong, np.float32), region, textured(0.3), 2.0) for strong in (6.0, 200.0))
+    middle, edge, beyond = ((160, column) for column in (120, 180, 195))
+    assert faint[middle] < 0.2 * faint[edge] < 0.2 * faint[beyond]
+    assert clear[middle] == pytest.approx(clear[beyond], rel=0.05)
+
+
+def test_noise_is_no_element():
+    found = level(np.full(SHAPE, 6.0, np.float32), disc(60), textured(0.3), 2.0)
+    assert found[160, 168] == pytest.approx(1.7 * 2.0, rel=0.1)
+
+
+def test_without_background_the_noise_is_not_known():
+    length = np.full(SHAPE, 5.0, np.float32)
+    assert noise_of(length, np.full(SHAPE, 0.09, np.float32)) == 0
+    assert noise_of(length, np.full(SHAPE, 0.11, np.float32)) == 5
+
+
+@pytest.mark.parametrize(("coherence", "levels", "taken"), [(0.55, 4.0, True), (0.7, 4.0, False), (0.55, 60.0, False)])
+def test_a_faint_body_that_hardly_passes_for_smooth_is_not_outlined_around_its_seed(coherence, levels, taken):
+    generator = np.random.default_rng(5)
+    noise = np.sqrt(np.square(generator.normal(size=(*SHAPE, 3))).sum(axis=2))
+    seed = 5 * levels * (disc(12, 110.0, 150.0) > 0)
+    length = np.maximum(noise, np.maximum(levels * (disc(50) > 0), seed)).astype(np.float32)
+    rows, columns = np.mgrid[: HALF[0], : HALF[1]]
+    region = (np.hypot(columns - 60, rows - 80) < 27).astype(np.uint8)
+    level_levels = np.where(region > 0, np.float32(levels), np.float32(0))
+    body = Body(region, (60.0, 80.0), np.full(64, 27.0), level_levels, 0.5, coherence, textured=False)
+    outline = find_outline(length, body, (disc(70) == 0).astype(np.float32), 0.1)
+    assert outline.textured is taken
+    if taken:
+        assert np.count_nonzero(outline.inside) == pytest.approx(np.count_nonzero(disc(50)), rel=0.15)
 
 
 def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():
@@ -93,3 +129,10 @@ def test_a_light_touch_of_textured_fruit_is_neither_a_seed_nor_a_hull(kind, clos
         contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
         ratios.append(contact.area_px / np.count_nonzero(press.true_masks[0]))
     assert np.median(ratios) == pytest.approx(1, abs=rel)
+
+
+@pytest.mark.parametrize("seed", [0, 900])
+def test_a_light_touch_of_a_strawberry_ends_where_its_flesh_does(seed):
+    press = render_press("strawberry", seed, (0.6,))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)

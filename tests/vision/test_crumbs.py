@@ -1,0 +1,71 @@
+"""Crumbs on the gel, and an LED that is dead: the gel and the light as they are in a working station."""
+
+import numpy as np
+import pytest
+
+from station.settings.segmentation import RobustParameters
+from station.studies.cohort import member
+from station.twin.digit.press import PressOptions, render_press
+from station.twin.digit.sensor import Condition
+from station.vision.crumbs import Crumbs
+from station.vision.robust import RobustMethod
+
+SHAPE = (320, 240)
+
+
+def bump(radius, levels, x=120.0, y=160.0):
+    """What a dent of that radius adds: a ring of slope, of one sign on either side."""
+    rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    away = np.hypot(columns - x, rows - y)
+    ring = np.exp(-np.square((away - radius) / 3.0)) * (columns - x) / np.maximum(away, 1)
+    return levels * ring[..., None] * np.array([1.0, -0.5, 0.7], np.float32)
+
+
+def light():
+    rows, columns = np.mgrid[0 : 1 : SHAPE[0] * 1j, 0 : 1 : SHAPE[1] * 1j]
+    return np.stack([70 + 40 * rows, 90 + 50 * columns, 120 - 50 * columns * rows], axis=-1).astype(np.float32)
+
+
+def test_a_gel_without_crumbs_is_left_as_it_is():
+    crumbs = Crumbs(light())
+    change = np.random.default_rng(1).normal(size=(*SHAPE, 3)).astype(np.float32)
+    assert crumbs.clean.all()
+    assert crumbs.bridged(change) is change
+
+
+def test_a_crumb_that_a_contact_hides_does_not_show_in_the_change():
+    crumb = bump(10, 45).astype(np.float32)
+    crumbs = Crumbs(light() + crumb)
+    contact = np.full((*SHAPE, 3), 3.0, np.float32)
+    seen = (contact - crumb).astype(np.float32)
+    assert (crumbs.clean == 0).any()
+    before = np.abs(seen - contact).max()
+    assert np.abs(crumbs.bridged(seen) - contact).max() < before / 3
+
+
+def test_a_crumb_that_still_stands_out_is_filled_from_around():
+    crumb = bump(10, 45).astype(np.float32)
+    crumbs = Crumbs(light() + crumb)
+    seen = np.full((*SHAPE, 3), 3.0, np.float32)
+    rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    seen[np.hypot(columns - 120, rows - 160) < 13] = 0
+    assert crumbs.bridged(seen)[160, 120] == pytest.approx(3.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("kind", "seed", "closing_mm"), [("blueberry", 1406, 0.4), ("strawberry", 1406, 0.8)])
+def test_a_contact_on_a_crumb_is_measured_without_it(kind, seed, closing_mm):
+    press = render_press(kind, seed, (closing_mm,), PressOptions(condition=Condition(dirt=3)))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)
+
+
+def test_with_a_dead_led_a_contact_over_most_of_the_field_is_not_taken_for_drift():
+    press = render_press("rubber_ball", 0, (7.0,), PressOptions(condition=Condition(dead_led="red")))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.1)
+
+
+def test_a_blueberry_over_most_of_the_field_is_not_taken_for_drift():
+    press = member("blueberry", 2025, 93).press()
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[16])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[16]), rel=0.1)
