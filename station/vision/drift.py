@@ -219,8 +219,9 @@ def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.flo
     """
     if values.ndim == 2:
         values, weight = thinned(values), thinned(weight)
-    order = np.argsort(values, axis=None)
-    cumulated = np.cumsum(weight.ravel()[order])
+    values = values.ravel()
+    order = values.argsort()
+    cumulated = weight.ravel()[order].cumsum()
     if cumulated[-1] <= 0:
         return 0.0
-    return float(values.ravel()[order[np.searchsorted(cumulated, cumulated[-1] / 2)]])
+    return float(values[order[cumulated.searchsorted(cumulated[-1] / 2)]])

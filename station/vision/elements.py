@@ -55,7 +55,7 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
         noise: from `noise_of`.
 
     Returns:
-        Shape of `length`; one for all places where the noise is not known.
+        Shape of `length`; one for all places where the noise is not known, and for those far from the region.
     """
     radius_px = float(np.sqrt(cv2.countNonZero(region) / np.pi))
     few = float(np.clip((_MANY_PX - radius_px) / (_MANY_PX - _FEW_PX), 0, 1))
@@ -66,8 +66,11 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
         return np.full_like(length, least)
     weak = (_WEAK_NOISES * noise) ** 2
     rise = _RISE * weak / (weak + strong**2)
-    outwards = _outwards(region, radius_px) - np.float32(_WHERE_AS_IT_IS)
-    return np.asarray(least * np.exp(rise * outwards), np.float32)
+    levels = np.full_like(length, least)
+    x, y, width, height = cv2.boundingRect(region)
+    near = np.s_[max(0, y - _ROOM_PX) : y + height + _ROOM_PX, max(0, x - _ROOM_PX) : x + width + _ROOM_PX]
+    levels[near] *= np.exp(rise * (_outwards(region[near], radius_px) - np.float32(_WHERE_AS_IT_IS)))
+    return levels
 
 
 def union(length: FloatImage, region: Mask, level: FloatImage, noise: float) -> tuple[Mask, float]:
