@@ -31,6 +31,18 @@ def noise_of(length: FloatImage, background: FloatImage) -> float:
     return weighted_median(length, background) if float(background.mean()) >= _WELL_KNOWN else 0.0
 
 
+def has_room_for_few(region: Mask) -> bool:
+    """Whether a region is small enough to hold few elements, where one of noise would count.
+
+    A large soft body's rim is as faint as noise, and belongs to it all the same: bruised strawberries lose a quarter of
+    their area to whatever is held against it.
+
+    Args:
+        region: at the working size, 0 or not.
+    """
+    return _radius(region) < _MANY_PX
+
+
 def strength(length: FloatImage, region: Mask) -> float:
     """What the strongest fifth of a region's change reaches, grey levels.
 
@@ -57,7 +69,7 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
     Returns:
         Shape of `length`; one for all places where the noise is not known, and for those far from the region.
     """
-    radius_px = float(np.sqrt(cv2.countNonZero(region) / np.pi))
+    radius_px = _radius(region)
     few = float(np.clip((_MANY_PX - radius_px) / (_MANY_PX - _FEW_PX), 0, 1))
     share = _SHARE_OF_RANDOM + _SHARE_OF_COHERENCE * body.coherence + _SHARE_OF_FEW * few
     strong = strength(length, region)
@@ -99,6 +111,10 @@ def union(length: FloatImage, region: Mask, level: FloatImage, noise: float) -> 
     outlines, _ = cv2.findContours(bridged, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     filled = cv2.drawContours(np.zeros_like(pressed), outlines, -1, 255, cv2.FILLED)
     return np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, speck), np.uint8), float(sure)
+
+
+def _radius(region: Mask) -> float:
+    return float(np.sqrt(cv2.countNonZero(region) / np.pi))
 
 
 def _outwards(region: Mask, radius_px: float) -> FloatImage:

@@ -48,7 +48,7 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     region = np.asarray(cv2.resize(body.region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
     scale = width / body.region.shape[1], height / body.region.shape[0]
     middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
-    noise = elements.noise_of(length, background)
+    noise = elements.noise_of(length, background) if elements.has_room_for_few(region) else 0.0
     if not body.textured and not _is_faint_skin(length, region, body, noise):
         edge = find_edge(length, region, middle, stiffness)
         confidence = edge_confidence(edge, background_spread(length, background))

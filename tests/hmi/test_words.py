@@ -58,6 +58,8 @@ NO_FAULTS = {
     "UR10e at {}",
     "is in remote control",
     "{} is {}; expected 0 to 15",
+    "its light cannot be set colour by colour: write firmware {} or newer to it",  # of `devices check` alone
+    "it refused its light's setting: unplug it and plug it in again",
     "Modbus RTU unit {} at {}",
     "Robotiq 2F-85 by {}",
     "watch of the {}",

@@ -1,10 +1,13 @@
 """The outline of textured skin, and streaks that must not take a contact with them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
+from station.twin.fruit import draw_fruit
 from station.vision.body import Body
 from station.vision.drift import without_bands, without_streaks
 from station.vision.elements import level, noise_of, union
@@ -90,15 +93,15 @@ def test_a_faint_body_that_hardly_passes_for_smooth_is_not_outlined_around_its_s
     generator = np.random.default_rng(5)
     noise = np.sqrt(np.square(generator.normal(size=(*SHAPE, 3))).sum(axis=2))
     seed = 5 * levels * (disc(12, 110.0, 150.0) > 0)
-    length = np.maximum(noise, np.maximum(levels * (disc(50) > 0), seed)).astype(np.float32)
+    length = np.maximum(noise, np.maximum(levels * (disc(36) > 0), seed)).astype(np.float32)
     rows, columns = np.mgrid[: HALF[0], : HALF[1]]
-    region = (np.hypot(columns - 60, rows - 80) < 27).astype(np.uint8)
+    region = (np.hypot(columns - 60, rows - 80) < 19.5).astype(np.uint8)
     level_levels = np.where(region > 0, np.float32(levels), np.float32(0))
-    body = Body(region, (60.0, 80.0), np.full(64, 27.0), level_levels, 0.5, coherence, textured=False)
-    outline = find_outline(length, body, (disc(70) == 0).astype(np.float32), 0.1)
+    body = Body(region, (60.0, 80.0), np.full(64, 19.5), level_levels, 0.5, coherence, textured=False)
+    outline = find_outline(length, body, (disc(56) == 0).astype(np.float32), 0.1)
     assert outline.textured is taken
     if taken:
-        assert np.count_nonzero(outline.inside) == pytest.approx(np.count_nonzero(disc(50)), rel=0.15)
+        assert np.count_nonzero(outline.inside) == pytest.approx(np.count_nonzero(disc(36)), rel=0.15)
 
 
 def test_a_strong_band_of_light_goes_and_a_contact_in_it_stays():
@@ -131,8 +134,15 @@ def test_a_light_touch_of_textured_fruit_is_neither_a_seed_nor_a_hull(kind, clos
     assert np.median(ratios) == pytest.approx(1, abs=rel)
 
 
-@pytest.mark.parametrize("seed", [0, 900])
-def test_a_light_touch_of_a_strawberry_ends_where_its_flesh_does(seed):
-    press = render_press("strawberry", seed, (0.6,))
+@pytest.mark.parametrize(("seed", "closing_mm"), [(0, 0.45), (900, 0.25)])
+def test_a_light_touch_of_a_strawberry_ends_where_its_flesh_does(seed, closing_mm):
+    press = render_press("strawberry", seed, (closing_mm,))
     contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
     assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [54, 58, 62])
+def test_a_bruised_strawberrys_faint_rim_belongs_to_it(seed):
+    press = render_press(replace(draw_fruit("strawberry", seed), bruised=True), seed, (3.3,))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.area_px > 0.8 * np.count_nonzero(press.true_masks[0])
