@@ -102,7 +102,7 @@ def play(wire: str, scenario: Scenario, **settings: Any) -> Any:
 
     async def whole() -> Any:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
-        rig = Rig(wire, GripperSettings(**{"answer_timeout_s": 0.2, "move_margin_s": 0.4, **settings}))
+        rig = Rig(wire, GripperSettings(**{"answer_timeout_s": 0.5, "move_margin_s": 0.4, **settings}))
         await rig.start()
         try:
             async with asyncio.timeout(SCENARIO_LIMIT_S):

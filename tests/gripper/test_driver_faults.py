@@ -172,7 +172,7 @@ def test_garbage_is_told_from_silence(on_wire: OnWire):
 
 def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
-        rig.faults.set("delayed", 0.3)
+        rig.faults.set("delayed", 0.75)
         with pytest.raises(GripperSilentError):
             await rig.driver.read()
         rig.faults.clear()

@@ -156,13 +156,15 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
 
 
 @pytest.mark.timeout(240)
-def test_the_station_is_killed_under_an_open_page(ready, panel):
+def test_the_station_hangs_and_is_killed_under_an_open_page(ready, panel):
     viewer = panel()
     viewer.open("/")
     viewer.until(".station-state", "Ready")
     page_made = viewer.page.evaluate("document.body.dataset.made = 'once'")
-    ready.process("service").kill()
+    hung = ready.process("service")
+    hung.suspend()
     viewer.page.locator("body.stale").wait_for()
+    hung.kill()
     assert re.search(r"No data for \d+ s", viewer.text(".stale-line"))
     assert viewer.page.evaluate("document.querySelector('[data-live]').inert")
     viewer.page.locator("body:not(.stale)").wait_for()
