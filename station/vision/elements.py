@@ -8,13 +8,12 @@ from station.vision.contact import FloatImage, Mask
 from station.vision.drift import weighted_median
 
 _STRONG_QUANTILE = 0.8
-_SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.09, 0.45
-_SHARE_OF_FEW, _FEW_PX, _MANY_PX = 0.27, 34.0, 50.0
+_SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.04, 0.65
+_SHARE_OF_FEW, _FEW_PX, _MANY_PX = 0.22, 34.0, 50.0
 _LEVELS_TRIED = (0.7, 1.4)
 _HALF_SURE = 0.45
-_ROOM_PX = 9
-_FINE_SIZES_PX, _COARSE_SIZES_PX = (1.0, 7, 5), (2.0, 9, 7)
-"""Of the smoothing, of grooves and of specks: where the noise is known, and where it is not."""
+_FINE_SIZES_PX, _COARSE_SIZES_PX = (1.0, 7, 5, 9), (2.0, 9, 7, 5)
+"""Of the smoothing, of grooves, of specks and of the room around a region: where the noise is known, and where not."""
 _WELL_KNOWN = 0.1
 _NOISES, _WEAK_NOISES = 1.7, 5.0
 _RISE, _WHERE_AS_IT_IS = 5.0, 0.8
@@ -80,7 +79,8 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
     rise = _RISE * weak / (weak + strong**2)
     levels = np.full_like(length, least)
     x, y, width, height = cv2.boundingRect(region)
-    near = np.s_[max(0, y - _ROOM_PX) : y + height + _ROOM_PX, max(0, x - _ROOM_PX) : x + width + _ROOM_PX]
+    room_px = max(_FINE_SIZES_PX[-1], _COARSE_SIZES_PX[-1])
+    near = np.s_[max(0, y - room_px) : y + height + room_px, max(0, x - room_px) : x + width + room_px]
     levels[near] *= np.exp(rise * (_outwards(region[near], radius_px) - np.float32(_WHERE_AS_IT_IS)))
     return levels
 
@@ -98,9 +98,9 @@ def union(length: FloatImage, region: Mask, level: FloatImage, noise: float) -> 
         Shape of `length`, 0 or 255; and 0 to 1, the less the more the pressed place hangs on the level: one half
         where twice the level leaves two thirds of it.
     """
-    blur_px, groove_px, speck_px = _FINE_SIZES_PX if noise > 0 else _COARSE_SIZES_PX
+    blur_px, groove_px, speck_px, room_px = _FINE_SIZES_PX if noise > 0 else _COARSE_SIZES_PX
     groove, speck, room = (
-        cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (groove_px, speck_px, _ROOM_PX)
+        cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (groove_px, speck_px, room_px)
     )
     smooth = cv2.GaussianBlur(length, (0, 0), blur_px)
     near = np.asarray(cv2.dilate(region, room), np.uint8)
