@@ -19,8 +19,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from measurement.light_touch import UNTOUCHED_RADII, Beside, detection_table
-from measurement.on_the_twin import FRAMES_PER_STEP, peers_table, twin_table
+from measurement.on_the_twin import FRAMES_PER_STEP, bruised_table, peers_table, twin_table
 from measurement.peers import methods
+from measurement.untouched import untouched_table
 
 from station.settings.segmentation import RobustParameters
 from station.vision.contact import Image, Mask
@@ -273,6 +274,15 @@ def main() -> None:
         "result. Half of the presses have seeds on which nothing was chosen.",
         "",
         *twin_table(),
+        "",
+        *untouched_table(),
+        "",
+        "## Bruised fruit on the twin",
+        "",
+        "The same conditions with bruises, which make fruit softer: they touch more of the gel, and less firmly. Half",
+        "of the presses have seeds on which nothing was chosen.",
+        "",
+        *bruised_table(),
         "",
         "## The three methods on the same images of the twin",
         "",

@@ -1,6 +1,7 @@
 """The robust method on presses of the twin, where the truth is exact."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ FRAMES_PER_STEP = 3
 FRAMES_PER_S = 30.0
 TWIN_SEEDS = (0, 2600)
 """Of the first press of each fruit; nothing was chosen on the second."""
+BRUISED_FRUITS = FRUITS[:3]
+BRUISED_SEEDS = (20000, 22800)
+"""As `TWIN_SEEDS`."""
 FIRM_MM2 = 20
 LARGE_ERROR = 0.25
 
@@ -62,9 +66,11 @@ class Press(NamedTuple):
     steps: list[Step]
 
 
-def squeezed(kind: str, seed: int, closings_mm: Sequence[float], options: PressOptions) -> Press:
+def squeezed(
+    kind: str, seed: int, closings_mm: Sequence[float], options: PressOptions, *, bruised: bool = False
+) -> Press:
     """A press as `render_press` draws it, with as many frames a step as a recipe takes."""
-    fruit, gel = draw_fruit(kind, seed), Gel()
+    fruit, gel = replace(draw_fruit(kind, seed), bruised=bruised), Gel()
     sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
     on_gel = FruitOnGel(fruit, options.pose, gel)
     press = Press([sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)], [])
@@ -77,11 +83,11 @@ def squeezed(kind: str, seed: int, closings_mm: Sequence[float], options: PressO
     return press
 
 
-def twin_presses(seed: int) -> Iterator[tuple[str, str, Press]]:
-    """Four bodies in seven conditions, from the first touch to a firm grip."""
-    for kind in FRUITS:
+def twin_presses(seed: int, kinds: Sequence[str], *, bruised: bool) -> Iterator[tuple[str, str, Press]]:
+    """Bodies in seven conditions, from the first touch to a firm grip."""
+    for kind in kinds:
         for number, (name, options) in enumerate(conditions().items()):
-            yield kind, name, squeezed(kind, seed + number, CLOSINGS_MM, options)
+            yield kind, name, squeezed(kind, seed + number, CLOSINGS_MM, options, bruised=bruised)
 
 
 class Measured(NamedTuple):
@@ -99,12 +105,12 @@ class Measured(NamedTuple):
     undecided: bool
 
 
-def measured_presses(seeds: Sequence[int]) -> list[Measured]:
+def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bruised: bool = False) -> list[Measured]:
     """Every step of the twin's presses with those seeds."""
     found: list[Measured] = []
     parameters = RobustParameters()
     for seed in seeds:
-        for number, (kind, name, press) in enumerate(twin_presses(seed)):
+        for number, (kind, name, press) in enumerate(twin_presses(seed, kinds, bruised=bruised)):
             method = RobustMethod(press.references, parameters)
             for step in press.steps:
                 contact = measure_step(method, step.frames, parameters.least_confidence)
@@ -131,21 +137,6 @@ def twin_table() -> list[str]:
     """The robust method on the twin, where the truth is exact."""
     found = measured_presses(TWIN_SEEDS)
     large = [one for one in found if one.true_mm2 > 2]
-    header = (
-        "| contacts over 2 mm² | steps | error of the area: median | p95 | judged | their median | their p95 "
-        "| Spearman with closing: median | 0.99 or more | of the judged |"
-    )
-    lines = [header, "|---|---|---|---|---|---|---|---|---|---|"]
-    for key in ("all", *FRUITS, *conditions()):
-        rows = [one for one in large if key == "all" or key in one.keys]
-        judged = [one for one in rows if one.judged]
-        errors = [one.error for one in judged]
-        ranks, sure = (ranks_of(some, {one.press for one in rows}) for some in (rows, judged))
-        lines.append(
-            f"| {key} | {len(rows)} | {median_and_p95([one.error for one in rows])} "
-            f"| {len(judged) / len(rows):.0%} | {median_and_p95(errors)} "
-            f"| {np.median(ranks):.3f} | {np.mean(ranks >= 0.99):.0%} | {np.mean(sure >= 0.99):.0%} |"
-        )
     light, firm = ([one.error for one in large if (one.true_mm2 > FIRM_MM2) == heavy] for heavy in (False, True))
     single = [one.single_error for one in large]
     before = [one for one in found if one.true_mm2 == 0]
@@ -153,7 +144,7 @@ def twin_table() -> list[str]:
     wrong, right = ([one for one in large if (one.error > LARGE_ERROR) == much] for much in (True, False))
     flagged = [np.mean([not one.judged for one in some]) for some in (wrong, right)]
     return [
-        *lines,
+        *errors_table(large, ("all", *FRUITS, *conditions())),
         "",
         f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
         f"over it: {median_and_p95(firm, ' and ')}.",
@@ -164,6 +155,40 @@ def twin_table() -> list[str]:
         f"Contacts over 2 mm² without an area: {len(missed)}, of which {sum(one.undecided for one in missed)} are",
         "flagged `undecided`.",
     ]
+
+
+def bruised_table() -> list[str]:
+    """As `twin_table`, of bruised fruit: softer, so that they touch more of the gel and less firmly."""
+    large = [one for one in measured_presses(BRUISED_SEEDS, BRUISED_FRUITS, bruised=True) if one.true_mm2 > 2]
+    wrong = [one for one in large if one.error > LARGE_ERROR]
+    light, firm = ([one.error for one in large if (one.true_mm2 > FIRM_MM2) == heavy] for heavy in (False, True))
+    flagged = np.mean([not one.judged for one in wrong])
+    return [
+        *errors_table(large, ("all", *BRUISED_FRUITS)),
+        "",
+        f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
+        f"over it: {median_and_p95(firm, ' and ')}.",
+        f"Of the {len(wrong)} areas that are wrong by more than {LARGE_ERROR:.0%}, {flagged:.0%} are flagged.",
+    ]
+
+
+def errors_table(large: Sequence[Measured], keys: Sequence[str]) -> list[str]:
+    """The errors of all that any of the keys names, and of what of it would be judged."""
+    header = (
+        "| contacts over 2 mm² | steps | error of the area: median | p95 | judged | their median | their p95 "
+        "| Spearman with closing: median | 0.99 or more | of the judged |"
+    )
+    lines = [header, "|---|---|---|---|---|---|---|---|---|---|"]
+    for key in keys:
+        rows = [one for one in large if key == "all" or key in one.keys]
+        judged = [one for one in rows if one.judged]
+        ranks, sure = (ranks_of(some, {one.press for one in rows}) for some in (rows, judged))
+        lines.append(
+            f"| {key} | {len(rows)} | {median_and_p95([one.error for one in rows])} "
+            f"| {len(judged) / len(rows):.0%} | {median_and_p95([one.error for one in judged])} "
+            f"| {np.median(ranks):.3f} | {np.mean(ranks >= 0.99):.0%} | {np.mean(sure >= 0.99):.0%} |"
+        )
+    return lines
 
 
 def peers_table() -> list[str]:

@@ -16,8 +16,8 @@ _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
 _LEAST_LEVELS = 10.0
 """Of what is fine in the reference: without crumbs it reaches 6 on the twin and 8 on the real presses' reference."""
 _RING_PX, _SKIRT_PX = 9, 5
-_LONGEST_PX = 30
-"""At half the working size, about 3 mm: what is longer is the edge of a beam of light."""
+_LONGEST_PX = 40
+"""At half the working size, about 4 mm, two crumbs side by side: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
 _LEAST_SEEN = 1e-3

@@ -52,6 +52,14 @@ def test_a_crumb_that_still_stands_out_is_filled_from_around():
     assert crumbs.bridged(seen)[160, 120] == pytest.approx(3.0, abs=1.0)
 
 
+def test_two_crumbs_side_by_side_are_no_edge_of_a_beam_of_light():
+    pair = bump(12, 45, x=104) + bump(12, 45, x=134)
+    clean = Crumbs((light() + pair).astype(np.float32)).clean
+    assert clean[80, 52] == clean[80, 67] == 0
+    beam = np.where(np.abs(np.indices(SHAPE)[1] - 120) < 2, np.float32(45), np.float32(0))[..., None]
+    assert Crumbs(light() + beam * (np.indices(SHAPE)[0] < 160)[..., None]).clean.all()
+
+
 @pytest.mark.parametrize(("kind", "seed", "closing_mm"), [("blueberry", 1406, 0.4), ("strawberry", 1407, 0.3)])
 def test_a_contact_on_a_crumb_is_measured_without_it(kind, seed, closing_mm):
     press = render_press(kind, seed, (closing_mm,), PressOptions(condition=Condition(dirt=3)))
