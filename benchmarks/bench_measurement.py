@@ -18,6 +18,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import numpy.typing as npt
+from measurement.at_the_border import border_table
 from measurement.light_touch import UNTOUCHED_RADII, Beside, detection_table
 from measurement.on_the_twin import FRAMES_PER_STEP, bruised_table, peers_table, twin_table
 from measurement.peers import methods
@@ -276,6 +277,12 @@ def main() -> None:
         *twin_table(),
         "",
         *untouched_table(),
+        "",
+        "## Contacts that the border cuts",
+        "",
+        "Four fruits at the places named, on units and with seeds on which nothing was chosen.",
+        "",
+        *border_table(),
         "",
         "## Bruised fruit on the twin",
         "",

@@ -57,6 +57,8 @@ class Step(NamedTuple):
     frames: list[Image]
     true_px: int
     true_mm2: float
+    is_cut: bool
+    """Whether the border cuts the contact."""
 
 
 class Press(NamedTuple):
@@ -79,7 +81,8 @@ def squeezed(
         began_s = options.references / FRAMES_PER_S + (number + 1) * options.step_s
         times_s = [began_s + k / FRAMES_PER_S for k in range(FRAMES_PER_STEP)]
         frames = [sensor.frame(seen.dent, now_s, options.condition) for now_s in times_s]
-        press.steps.append(Step(frames, seen.true_area_px, seen.true_area_mm2))
+        rim = (seen.true_mask[[0, -1]], seen.true_mask[:, [0, -1]])
+        press.steps.append(Step(frames, seen.true_area_px, seen.true_area_mm2, any(side.any() for side in rim)))
     return press
 
 

@@ -22,6 +22,10 @@ _HIGHEST_HARMONIC = 3.0
 _LONGEST_JUMP = 2
 _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
+_BEYOND_BORDER = 0.3
+"""What a path gains on each ray there: a fall that gains less is rather the flat centre of a contact that is cut."""
+_CHORD_SHARE, _CHORD_IN_CORNER = 0.7, 0.4
+"""Of a region's extent along the border, from which on its middle is near that border, or that corner."""
 _SIDE_SHARE = 0.15
 _REACH_STEP_PX = 2
 
@@ -51,15 +55,22 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
         middle: x and y from which the region is star-shaped, px.
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
     """
+    height, width = length.shape
+    left, top, right, bottom = _mirrored(region)
+    if left or top or right or bottom:
+        sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
+        length = np.asarray(cv2.copyMakeBorder(length, *sides), np.float32)
+        region = np.asarray(cv2.copyMakeBorder(region, *sides), np.uint8)
+        moments = cv2.moments(region, binaryImage=True)
+        middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
     radius = _smooth(_reach(region, middle))
     radius, _ = _steepest(length, middle, radius, _FIRST_SPAN, stiffness)
     points = _points(middle, radius)
     moments = cv2.moments(points.astype(np.float32))
     if moments["m00"] > 0:
-        height, width = length.shape
         centre = (
-            float(np.clip(moments["m10"] / moments["m00"], 0, width - 1)),
-            float(np.clip(moments["m01"] / moments["m00"], 0, height - 1)),
+            float(np.clip(moments["m10"] / moments["m00"], 0, length.shape[1] - 1)),
+            float(np.clip(moments["m01"] / moments["m00"], 0, length.shape[0] - 1)),
         )
         away = points - centre
         angle = np.arctan2(away[:, 1], away[:, 0])
@@ -67,10 +78,25 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
         again = np.interp(_ANGLES, angle[order], np.hypot(away[:, 0], away[:, 1])[order], period=2 * np.pi)
         middle, radius = centre, _smooth(again)
     radius, drop = _steepest(length, middle, radius, _SECOND_SPAN, stiffness)
-    points = _points(middle, radius)
-    height, width = length.shape
+    points = _points(middle, radius) - (left, top)
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     return Edge(points, seen, drop)
+
+
+def _mirrored(region: Mask) -> tuple[int, int, int, int]:
+    """By how much to continue the image beyond its left, upper, right and lower border with its mirror image, px.
+
+    A contact with its middle near the border or beyond it shows part of its edge only, and the way to its flat centre
+    falls like an edge. With its mirror image it is closed.
+    """
+    _, _, width, height = cv2.boundingRect(region)
+    sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
+    chords = np.array([np.count_nonzero(side) for _, side in sides]) / (height, width, height, width)
+    opposite = np.roll(chords, 2)
+    in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > _CHORD_IN_CORNER
+    near = (opposite == 0) & (chords > np.where(in_corner, _CHORD_IN_CORNER, _CHORD_SHARE))
+    left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
+    return left, top, right, bottom
 
 
 def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
@@ -113,11 +139,13 @@ def _steepest(
     profile = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
     fall = np.zeros_like(profile)
     np.subtract(profile[:, :-2], profile[:, 2:], out=fall[:, 1:-1])
-    fall[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
+    beyond = (x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)
+    fall[beyond] = 0
     steepest = np.sort(fall.max(axis=1))
     steepest = steepest[steepest > 0]
     strong = steepest[int(_STRONG_QUANTILE * (steepest.size - 1))] if steepest.size else 1.0
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
+    reward[beyond] = _BEYOND_BORDER
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
     rays = np.arange(RAYS)

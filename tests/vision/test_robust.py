@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
-from station.twin.digit.press import render_press
+from station.twin.contact import Pose
+from station.twin.digit.press import PressOptions, render_press
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX
 from station.vision.contact import Flag
@@ -111,6 +112,16 @@ def test_a_contact_cut_by_the_border_is_a_lower_bound(sphere_press, overlap):
     contact = measure(press.reference, press.image)
     assert Flag.CUT_BY_BORDER in contact.flags
     assert overlap(contact.mask, press.truth) > 0.75
+
+
+@pytest.mark.parametrize(("x_px", "y_px"), [(0, 320), (30, 320), (450, 320), (240, 40)])
+def test_of_a_large_contact_that_the_border_cuts_the_visible_part_is_measured(x_px, y_px):
+    press = render_press("blueberry", 2602, (5.0, 7.0), PressOptions(pose=Pose(x_px, y_px)))
+    method = RobustMethod(press.references, RobustParameters())
+    for frame, truth in zip(press.frames, press.true_masks, strict=True):
+        contact = method.measure(frame)
+        assert Flag.CUT_BY_BORDER in contact.flags
+        assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.12)
 
 
 def test_two_contacts_are_found_where_the_recipe_expects_several(sphere_press, overlap):
