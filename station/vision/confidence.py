@@ -10,6 +10,7 @@ from station.vision.edge import Edge
 
 _RELIABLE_RATIO = 4.0
 _VISIBLE_RATIO = 2.0
+_WELL_SEEN = 0.25
 LEAST_NOISE_LEVELS = 0.1
 _NORMAL_OF_MEDIAN = 1.4826
 
@@ -30,7 +31,8 @@ def edge_confidence(edge: Edge, noise_levels: float) -> float:
     """Signal to noise across the edge times the share of the edge that is seen to fall, 0 to 1.
 
     The first factor is q²/(q² + 4²) of the median drop q in units of the noise; the second is the share of the seen
-    rays on which the drop is at least twice the noise. Both rise with the contrast and fall with the noise.
+    rays on which the drop is at least twice the noise. Both rise with the contrast and fall with the noise. Where less
+    than a quarter of the rays is seen, it falls with their share.
 
     Args:
         edge: with its drops in grey levels.
@@ -41,7 +43,8 @@ def edge_confidence(edge: Edge, noise_levels: float) -> float:
     ratio = edge.drop_levels[edge.seen] / max(noise_levels, LEAST_NOISE_LEVELS)
     signal = max(0.0, float(np.median(ratio)))
     support = float(np.mean(ratio >= _VISIBLE_RATIO))
-    return support * signal**2 / (signal**2 + _RELIABLE_RATIO**2)
+    told = min(1.0, float(np.mean(edge.seen)) / _WELL_SEEN)
+    return told * support * signal**2 / (signal**2 + _RELIABLE_RATIO**2)
 
 
 def agreement(areas: Sequence[float]) -> float:

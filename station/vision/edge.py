@@ -22,8 +22,6 @@ _HIGHEST_HARMONIC = 3.0
 _LONGEST_JUMP = 2
 _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
-_BEYOND_BORDER = 0.3
-"""What a path gains on each ray there: a fall that gains less is rather the flat centre of a contact that is cut."""
 _CHORD_SHARE, _CHORD_IN_CORNER = 0.7, 0.4
 """Of a region's extent along the border, from which on its middle is near that border, or that corner."""
 _SIDE_SHARE = 0.15
@@ -139,13 +137,11 @@ def _steepest(
     profile = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
     fall = np.zeros_like(profile)
     np.subtract(profile[:, :-2], profile[:, 2:], out=fall[:, 1:-1])
-    beyond = (x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)
-    fall[beyond] = 0
+    fall[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
     steepest = np.sort(fall.max(axis=1))
     steepest = steepest[steepest > 0]
     strong = steepest[int(_STRONG_QUANTILE * (steepest.size - 1))] if steepest.size else 1.0
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
-    reward[beyond] = _BEYOND_BORDER
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
     rays = np.arange(RAYS)

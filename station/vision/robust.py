@@ -30,7 +30,8 @@ PRINTED_IMAGE_PX = 640 * 480
 _SATURATED_SHARE = 0.05
 _FOREIGN_DRIFT_SHARE = 0.35
 _ONE_SIDED = 0.85
-_LEAST_SUPPORT = 0.03
+_LEAST_SUPPORT, _LEAST_SUPPORT_CUT = 0.03, 0.25
+"""Of an outline, and of one that the border cuts, which drift at the border resembles."""
 _COARSE_STEP, _FINE_STEP = 4, 2
 _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
@@ -172,9 +173,10 @@ class RobustMethod:
             smooth = denoised(seen.change, seen.half, body.radius_px * width / candidate.shape[1])
             length = resized(length_of(smooth), (width, height))
             outline = find_outline(length, body, seen.drift.background, self._parameters.edge_stiffness)
-            if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline):
+            if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline, sure=sure):
                 continue
-            if sure or outline.confidence >= _LEAST_SUPPORT:
+            support = _LEAST_SUPPORT if outline.edge.seen.all() else _LEAST_SUPPORT_CUT
+            if sure or outline.confidence >= support:
                 found.append(outline)
         return found
 
@@ -237,12 +239,12 @@ def _lit(light: FloatImage) -> float:
     return float(np.mean(means > _LEAST_LIGHT * means.max()))
 
 
-def _one_sided(change: FloatImage, outline: Outline) -> bool:
+def _one_sided(change: FloatImage, outline: Outline, *, sure: bool) -> bool:
     """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
 
-    Not asked of a contact that the border cuts: its other slopes may lie outside.
+    Not asked of a sure contact that the border cuts: its other slopes may lie outside.
     """
-    if not outline.edge.seen.all():
+    if sure and not outline.edge.seen.all():
         return False
     size = (change.shape[1], change.shape[0])
     inside = cv2.resize(outline.inside, size, interpolation=cv2.INTER_NEAREST)
