@@ -280,7 +280,7 @@ def main() -> None:
         "",
         "## Contacts that the border cuts",
         "",
-        "Four fruits at the places named, on units and with seeds on which nothing was chosen.",
+        "Four fruits at the places named, on three units, with seeds on which nothing was chosen.",
         "",
         *border_table(),
         "",

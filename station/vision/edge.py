@@ -45,7 +45,7 @@ class Edge:
 
 
 def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
-    """Find the edge of the contact in a region.
+    """Find the edge of the contact in a region; a contact that the border cuts is completed by its mirror image.
 
     Args:
         length: length of the change over the channels, shape (height, width), grey levels.

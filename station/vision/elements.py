@@ -79,7 +79,7 @@ def level(length: FloatImage, region: Mask, body: Body, noise: float) -> FloatIm
     rise = _RISE * weak / (weak + strong**2)
     levels = np.full_like(length, least)
     x, y, width, height = cv2.boundingRect(region)
-    room_px = max(_FINE_SIZES_PX[-1], _COARSE_SIZES_PX[-1])
+    room_px = _FINE_SIZES_PX[-1]
     near = np.s_[max(0, y - room_px) : y + height + room_px, max(0, x - room_px) : x + width + room_px]
     levels[near] *= np.exp(rise * (_outwards(region[near], radius_px) - np.float32(_WHERE_AS_IT_IS)))
     return levels
