@@ -24,6 +24,8 @@ _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
 _CHORD_SHARE, _CHORD_IN_CORNER = 0.7, 0.4
 """Of a region's extent along the border, from which on its middle is near that border, or that corner."""
+_DEEPEST = 0.8
+"""Of that extent, up to which it reaches into the image from there."""
 _SIDE_SHARE = 0.15
 _REACH_STEP_PX = 2
 
@@ -85,14 +87,16 @@ def _mirrored(region: Mask) -> tuple[int, int, int, int]:
     """By how much to continue the image beyond its left, upper, right and lower border with its mirror image, px.
 
     A contact with its middle near the border or beyond it shows part of its edge only, and the way to its flat centre
-    falls like an edge. With its mirror image it is closed.
+    falls like an edge. With its mirror image it is closed. One that reaches opposite borders fills the field instead.
     """
     _, _, width, height = cv2.boundingRect(region)
     sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
     chords = np.array([np.count_nonzero(side) for _, side in sides]) / (height, width, height, width)
-    opposite = np.roll(chords, 2)
+    if (np.minimum(chords, np.roll(chords, 2)) > 0).any():
+        return 0, 0, 0, 0
     in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > _CHORD_IN_CORNER
-    near = (opposite == 0) & (chords > np.where(in_corner, _CHORD_IN_CORNER, _CHORD_SHARE))
+    shallow = np.array([across for across, _ in sides]) < _DEEPEST * np.array((height, width, height, width))
+    near = np.where(in_corner, chords > _CHORD_IN_CORNER, (chords > _CHORD_SHARE) & shallow)
     left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
     return left, top, right, bottom
 
