@@ -124,6 +124,12 @@ def test_of_a_large_contact_that_the_border_cuts_the_visible_part_is_measured(x_
         assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.12)
 
 
+def test_a_contact_as_wide_as_the_image_is_not_mirrored_at_its_upper_border():
+    press = render_press("blueberry", 50000, (6.0, 8.0, 10.0), PressOptions(pose=Pose(225, 295), unit=50000))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[-1])
+    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[-1]), rel=0.1)
+
+
 def test_two_contacts_are_found_where_the_recipe_expects_several(sphere_press, overlap):
     one = sphere_press(130, 180, 60)
     other = sphere_press(340, 460, 60, seed=2)
