@@ -22,10 +22,12 @@ _HIGHEST_HARMONIC = 3.0
 _LONGEST_JUMP = 2
 _STRONG_QUANTILE = 0.75
 _LEAST_STEEPNESS = 0.4
-_CHORD_SHARE, _CHORD_IN_CORNER = 0.7, 0.4
+_LEAST_FALL_LEVELS = 1e-3
+_CHORD_SHARE, _CHORD_IN_CORNER = 0.65, 0.4
 """Of a region's extent along the border, from which on its middle is near that border, or that corner."""
-_DEEPEST = 0.8
-"""Of that extent, up to which it reaches into the image from there."""
+_WHOLE_FALL, _WHOLE_AREA = 0.68, 0.55
+"""An edge that lies in the image is the contact's own when it falls on the mean by this share of a strong fall, and
+encloses more than this share of what the completed one does."""
 _SIDE_SHARE = 0.15
 _REACH_STEP_PX = 2
 
@@ -55,22 +57,32 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
         middle: x and y from which the region is star-shaped, px.
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
     """
-    height, width = length.shape
+    edge = _closed_edge(length, region, middle, stiffness)
     left, top, right, bottom = _mirrored(region)
-    if left or top or right or bottom:
-        sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
-        length = np.asarray(cv2.copyMakeBorder(length, *sides), np.float32)
-        region = np.asarray(cv2.copyMakeBorder(region, *sides), np.uint8)
-        moments = cv2.moments(region, binaryImage=True)
-        middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
+    if not (left or top or right or bottom):
+        return edge
+    height, width = length.shape
+    sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
+    length = np.asarray(cv2.copyMakeBorder(length, *sides), np.float32)
+    region = np.asarray(cv2.copyMakeBorder(region, *sides), np.uint8)
+    moments = cv2.moments(region, binaryImage=True)
+    middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
+    completed = _closed_edge(length, region, middle, stiffness)
+    points = completed.points - (left, top)
+    completed = Edge(points, _in_image(points, height, width), completed.drop_levels)
+    return edge if _is_whole(edge, completed, height, width) else completed
+
+
+def _closed_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
+    height, width = length.shape
     radius = _smooth(_reach(region, middle))
     radius, _ = _steepest(length, middle, radius, _FIRST_SPAN, stiffness)
     points = _points(middle, radius)
     moments = cv2.moments(points.astype(np.float32))
     if moments["m00"] > 0:
         centre = (
-            float(np.clip(moments["m10"] / moments["m00"], 0, length.shape[1] - 1)),
-            float(np.clip(moments["m01"] / moments["m00"], 0, length.shape[0] - 1)),
+            float(np.clip(moments["m10"] / moments["m00"], 0, width - 1)),
+            float(np.clip(moments["m01"] / moments["m00"], 0, height - 1)),
         )
         away = points - centre
         angle = np.arctan2(away[:, 1], away[:, 0])
@@ -78,9 +90,31 @@ def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], sti
         again = np.interp(_ANGLES, angle[order], np.hypot(away[:, 0], away[:, 1])[order], period=2 * np.pi)
         middle, radius = centre, _smooth(again)
     radius, drop = _steepest(length, middle, radius, _SECOND_SPAN, stiffness)
-    points = _points(middle, radius) - (left, top)
-    seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
-    return Edge(points, seen, drop)
+    points = _points(middle, radius)
+    return Edge(points, _in_image(points, height, width), drop)
+
+
+def _in_image(points: _Floats, height: int, width: int) -> npt.NDArray[np.bool_]:
+    return (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
+
+
+def _is_whole(edge: Edge, completed: Edge, height: int, width: int) -> bool:
+    """Whether an edge lies in the image and falls all around, so that the border cuts no more than the skirt.
+
+    On the way to a cut contact's flat centre the change falls by less, or what falls is a part of the contact.
+    """
+    if not edge.seen.all():
+        return False
+    drops = (edge.drop_levels, completed.drop_levels[completed.seen])
+    strong = float(np.quantile(np.concatenate(drops), _STRONG_QUANTILE))
+    if np.clip(edge.drop_levels / max(strong, _LEAST_FALL_LEVELS), 0, 1).mean() < _WHOLE_FALL:
+        return False
+    return _area(edge.points, height, width) > _WHOLE_AREA * _area(completed.points, height, width)
+
+
+def _area(points: _Floats, height: int, width: int) -> int:
+    mask = np.zeros((height, width), np.uint8)
+    return cv2.countNonZero(cv2.fillPoly(mask, [np.rint(points).astype(np.int32)], 1))
 
 
 def _mirrored(region: Mask) -> tuple[int, int, int, int]:
@@ -95,8 +129,7 @@ def _mirrored(region: Mask) -> tuple[int, int, int, int]:
     if (np.minimum(chords, np.roll(chords, 2)) > 0).any():
         return 0, 0, 0, 0
     in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > _CHORD_IN_CORNER
-    shallow = np.array([across for across, _ in sides]) < _DEEPEST * np.array((height, width, height, width))
-    near = np.where(in_corner, chords > _CHORD_IN_CORNER, (chords > _CHORD_SHARE) & shallow)
+    near = chords > np.where(in_corner, _CHORD_IN_CORNER, _CHORD_SHARE)
     left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
     return left, top, right, bottom
 

@@ -208,6 +208,8 @@ class RobustMethod:
             flags.add(Flag.UNDECIDED)
         untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
         confidence = min((outline.confidence for outline in found), default=untouched)
+        if not all(outline.edge.seen.all() for outline in found):
+            confidence *= min(1.0, (gate - 1) / (_SURE_GATE - 1))
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:

@@ -1,13 +1,12 @@
 """`station study --scheduler`: the same cohort on a cluster of processes."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from station.studies.sample import SampleResult, Task, measure_sample
 
 ARGUMENTS = ("--fruit", "raspberry", "--samples", "2", "--seed", "2", "--method", "robust")
 DEADLINE_S = 280
@@ -30,23 +29,31 @@ def scheduler() -> Iterator[str]:
         cluster.stdout.close()
 
 
-def study(out: Path, address: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "station", "study", *ARGUMENTS, "--out", str(out), "--scheduler", address]
+def study(out: Path, *where: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "station", "study", *ARGUMENTS, "--out", str(out), *where]
     return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
 
 
 def test_a_cluster_gives_the_same_samples(scheduler: str, tmp_path: Path):
-    out = tmp_path / "out"
-    found = study(out, scheduler)
-    assert found.returncode == 0, found.stderr
-    assert "of 2 samples failed" in found.stdout
-    for number in range(2):
-        stored = SampleResult.model_validate_json((out / "samples" / f"{number:05d}.json").read_bytes())
-        assert stored == measure_sample(Task("raspberry", "robust", 2, number))
+    there, here = tmp_path / "there", tmp_path / "here"
+    for found in (study(there, "--scheduler", scheduler), study(here, "--jobs", "1")):
+        assert found.returncode == 0, found.stderr
+        assert "of 2 samples failed" in found.stdout
+    for name in ("00000.json", "00001.json"):
+        assert (there / "samples" / name).read_bytes() == (here / "samples" / name).read_bytes()
 
 
 def test_an_address_where_nobody_answers_is_told(unused_port: int, tmp_path: Path):
-    found = study(tmp_path / "out", f"tcp://127.0.0.1:{unused_port}")
+    found = study(tmp_path / "out", "--scheduler", f"tcp://127.0.0.1:{unused_port}")
     assert found.returncode == 2
     assert "no Dask scheduler answers there" in found.stderr
     assert "Traceback" not in found.stderr
+
+
+def test_a_matrix_is_multiplied_on_one_thread_so_that_the_number_of_cores_changes_no_sum():
+    script = (
+        "import station, numpy, threadpoolctl; print([pool['num_threads'] for pool in threadpoolctl.threadpool_info()])"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
+    assert found.stdout.strip() == "[1]"

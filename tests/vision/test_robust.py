@@ -12,10 +12,12 @@ from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.contact import Pose
 from station.twin.digit.press import PressOptions, render_press
+from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX
 from station.vision.contact import Flag
 from station.vision.robust import RobustMethod
+from station.vision.step import mean_image
 
 FEW = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
@@ -207,6 +209,26 @@ def test_a_contact_that_leaves_hardly_any_background_ends_at_its_edge(kind, numb
     assert len(deep) >= 3
     ratios = [method.measure(press.frames[place]).area_px / truths[place] for place in deep]
     assert ratios == pytest.approx([1.0] * len(deep), abs=rel)
+
+
+@pytest.mark.parametrize(("number", "image"), [(91, 11), (148, 13), (262, 14)])
+def test_a_contact_of_which_the_border_cuts_only_the_skirt_is_not_mirrored(number, image):
+    press = member("blueberry", 1, number).press()
+    truth = np.count_nonzero(press.true_masks[image])
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[image])
+    assert contact.area_px == pytest.approx(truth, rel=0.1)
+
+
+@pytest.mark.parametrize(("unit", "drift", "after_s"), [(30017, 1.0, (1.0, 3.0)), (31009, 2.0, (1.0, 3.0, 5.0, 7.0))])
+def test_drift_at_the_border_that_opens_the_gate_a_little_is_not_sure(unit, drift, after_s):
+    sensor = DigitSensor(unit, unit, drift=drift)
+    references = [sensor.frame(None, frame / 30) for frame in range(5)]
+    images = [mean_image([sensor.frame(None, began_s + frame / 30) for frame in range(3)]) for began_s in after_s]
+    contact = RobustMethod(references, RobustParameters()).measure(images[-1])
+    assert contact.gate is not None
+    assert 1 < contact.gate < 2
+    assert Flag.CUT_BY_BORDER in contact.flags
+    assert Flag.LOW_CONFIDENCE in contact.flags
 
 
 def test_a_crown_is_not_taken_for_its_blueberry():
