@@ -207,9 +207,7 @@ class RobustMethod:
         if not found and gate > 1:
             flags.add(Flag.UNDECIDED)
         untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
-        confidence = min((outline.confidence for outline in found), default=untouched)
-        if not all(outline.edge.seen.all() for outline in found):
-            confidence *= min(1.0, (gate - 1) / (_SURE_GATE - 1))
+        confidence = min((_sureness(outline, gate) for outline in found), default=untouched)
         if Flag.REFERENCE_MISMATCH in flags:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
@@ -239,6 +237,13 @@ def _lit(light: FloatImage) -> float:
     """The share of the colours that have light: one whose LED is dead adds nothing to what bends."""
     means = np.asarray(cv2.mean(light)[:3])
     return float(np.mean(means > _LEAST_LIGHT * means.max()))
+
+
+def _sureness(outline: Outline, gate: float) -> float:
+    """An outline's confidence; drift at the border looks like a contact that it cuts, and opens the gate a little."""
+    if outline.edge.seen.all():
+        return outline.confidence
+    return outline.confidence * min(1.0, (gate - 1) / (_SURE_GATE - 1))
 
 
 def _one_sided(change: FloatImage, outline: Outline, *, sure: bool) -> bool:
