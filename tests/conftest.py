@@ -18,12 +18,16 @@ from typing import Any, NamedTuple
 import psutil
 import pytest
 from hypothesis import HealthCheck, settings
+from threadpoolctl import threadpool_limits
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 GRACE_S = 3.0
 
 settings.register_profile("busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy machine")
+
+# As `station/__init__.py` has it for every process of the station; pytest's plugins import numpy before.
+threadpool_limits(1, user_api="blas")
 
 _TASKS: set[weakref.ref[asyncio.Task[Any]]] = set()
 
