@@ -23,8 +23,8 @@ from station.vision.step import mean_image
 
 DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
 DETECTION_UNITS = (None, 7)
-LIGHT_AREAS_MM2 = (1, 2, 3, 5, 10)
 DETECTION_SEED = 500
+LIGHT_AREAS_MM2 = (1, 2, 3, 5, 10)
 BOUND_DRAWS = 24
 BOUND_COSINES = 6
 """What an observer's template leaves to drift: cosines up to this order, and each column's and row's mean."""
