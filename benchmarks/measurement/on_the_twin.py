@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from measurement.peers import methods
+from measurement.peers import PEER, contact_area_idea, methods
 from station.settings.segmentation import RobustParameters
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.press import PressOptions
@@ -69,9 +69,15 @@ class Press(NamedTuple):
 
 
 def squeezed(
-    kind: str, seed: int, closings_mm: Sequence[float], options: PressOptions, *, bruised: bool = False
+    kind: str,
+    seed: int,
+    closings_mm: Sequence[float],
+    options: PressOptions,
+    *,
+    bruised: bool = False,
+    frames_per_step: int = FRAMES_PER_STEP,
 ) -> Press:
-    """A press as `render_press` draws it, with as many frames a step as a recipe takes."""
+    """A press as `render_press` draws it, with as many frames a step as a recipe takes, or as wanted."""
     fruit, gel = replace(draw_fruit(kind, seed), bruised=bruised), Gel()
     sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
     on_gel = FruitOnGel(fruit, options.pose, gel)
@@ -79,7 +85,7 @@ def squeezed(
     for number, closing_mm in enumerate(closings_mm):
         seen = on_gel.pressed(Squeeze(fruit, gel, held_s=number * options.step_s).at(closing_mm))
         began_s = options.references / FRAMES_PER_S + (number + 1) * options.step_s
-        times_s = [began_s + k / FRAMES_PER_S for k in range(FRAMES_PER_STEP)]
+        times_s = [began_s + k / FRAMES_PER_S for k in range(frames_per_step)]
         frames = [sensor.frame(seen.dent, now_s, options.condition) for now_s in times_s]
         rim = (seen.true_mask[[0, -1]], seen.true_mask[:, [0, -1]])
         press.steps.append(Step(frames, seen.true_area_px, seen.true_area_mm2, any(side.any() for side in rim)))
@@ -103,6 +109,9 @@ class Measured(NamedTuple):
     single_error: float
     """Of the step's first frame alone."""
     area_px: int
+    peer_error: float
+    """Of the idea of PyTouch's contact area, on the mean image."""
+    peer_px: int
     judged: bool
     """Whether the station would judge it: sure enough, and decided."""
     undecided: bool
@@ -114,11 +123,13 @@ def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bru
     parameters = RobustParameters()
     for seed in seeds:
         for number, (kind, name, press) in enumerate(twin_presses(seed, kinds, bruised=bruised)):
-            method = RobustMethod(press.references, parameters)
+            method, peer = RobustMethod(press.references, parameters), contact_area_idea(median_image(press.references))
             for step in press.steps:
                 contact = measure_step(method, step.frames, parameters.least_confidence)
                 area_px, single_px = contact.area_px, method.measure(step.frames[0]).area_px
-                error, single_error = (abs(px / max(1, step.true_px) - 1) for px in (area_px, single_px))
+                peer_px = int(np.count_nonzero(peer(mean_image(step.frames))))
+                areas_px = (area_px, single_px, peer_px)
+                error, single_error, peer_error = (abs(px / max(1, step.true_px) - 1) for px in areas_px)
                 undecided = Flag.UNDECIDED in contact.flags
                 judged = not undecided and Flag.LOW_CONFIDENCE not in contact.flags
                 found.append(
@@ -129,6 +140,8 @@ def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bru
                         error,
                         single_error,
                         area_px,
+                        peer_error,
+                        peer_px,
                         judged,
                         undecided,
                     )
@@ -191,6 +204,11 @@ def errors_table(large: Sequence[Measured], keys: Sequence[str]) -> list[str]:
             f"| {len(judged) / len(rows):.0%} | {median_and_p95([one.error for one in judged])} "
             f"| {np.median(ranks):.3f} | {np.mean(ranks >= 0.99):.0%} | {np.mean(sure >= 0.99):.0%} |"
         )
+    ranks = ranks_of([one._replace(area_px=one.peer_px) for one in large], {one.press for one in large})
+    lines.append(
+        f"| {PEER}, all | {len(large)} | {median_and_p95([one.peer_error for one in large])} | | | "
+        f"| {np.median(ranks):.3f} | {np.mean(ranks >= 0.99):.0%} | |"
+    )
     return lines
 
 

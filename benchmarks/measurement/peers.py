@@ -13,6 +13,8 @@ from station.vision.robust import RobustMethod
 DARKER_COUNTS = 0.7
 """What PyTouch scales a difference below the reference by before it takes the size."""
 
+PEER = "PyTouch's contact area"
+
 Measure = Callable[[Image], Mask]
 
 
@@ -41,6 +43,6 @@ def methods(reference: Image) -> dict[str, Measure]:
     robust = RobustMethod([reference], RobustParameters())
     return {
         "`paper`, as printed": lambda image: paper.measure(image).mask,
-        "PyTouch's contact area": contact_area_idea(reference),
+        PEER: contact_area_idea(reference),
         "`robust`": lambda image: robust.measure(image).mask,
     }

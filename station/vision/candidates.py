@@ -20,6 +20,7 @@ _OVER_SPREAD = 3.0
 _BRIDGE_PX = 9
 _OWN_SHARE = 0.35
 _LEAST = 0.01
+_LIGHT_RADIUS_PX = 7
 _NECKS = (0.4, 0.55, 0.7, 0.8)
 _NECK_DEPTH = 0.12
 
@@ -60,6 +61,30 @@ def body_candidates(moved: Movement, bend: FloatImage, threshold: float) -> Cand
     bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
     found = [part for part in _parts(np.asarray(bridged, np.uint8)) if bend[part > 0].max() > threshold]
     return Candidates(_heaviest_first(level, found), level, levels)
+
+
+def around(place: tuple[int, int], moved: Movement) -> Candidates:
+    """Where a touch that is too light to bend the gel clear of the noise may lie: a small disc around its place.
+
+    Args:
+        place: x and y, px of the movement.
+        moved: from `body.movement`.
+    """
+    level, spread = level_of(moved, _WINDOW_PX)
+    shape = (level.shape[0], level.shape[1])
+    return Candidates([disc(shape, place, _LIGHT_RADIUS_PX)], level, _levels(level, max(spread, _LEAST)))
+
+
+def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask:
+    """A filled circle, 1 in 0.
+
+    Args:
+        shape: height and width.
+        place: its middle, x and y.
+        radius_px: its radius.
+    """
+    empty = np.zeros(shape, np.uint8)
+    return np.asarray(cv2.circle(empty, place, radius_px, color=1, thickness=cv2.FILLED), np.uint8)
 
 
 def separate_candidates(bend: FloatImage, threshold: float) -> Candidates:

@@ -1,8 +1,8 @@
 """The station's own method: the contact's edge, under drift, streaks and weak light.
 
 Stages: signed difference to the reference; drift and streaks taken off; bending and the gate; clusters of the bending,
-as many as the data ask for; for each region the edge where the change falls off most steeply. `docs/robust.md`
-explains each with its reasons.
+as many as the data ask for; for each region the edge where the change falls off most steeply. Where the gate stays
+shut, touches lighter than drift are looked for. `docs/robust.md` explains each with its reasons.
 """
 
 from collections.abc import Sequence
@@ -10,16 +10,18 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from station.settings.segmentation import RobustParameters
-from station.vision import pictures
+from station.vision import light_touch, pictures
 from station.vision.bending import bending, noise_of, quiet
-from station.vision.body import Movement, evening, find_body, has_moved_widely, movement
-from station.vision.candidates import body_candidates, separate_candidates
+from station.vision.body import Body, Movement, evening, find_body, has_moved_widely, movement
+from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.crumbs import Crumbs
 from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.edge_signal import denoised, length_of
+from station.vision.light_touch import LightTouch
 from station.vision.outline import Outline, find_outline
 from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
 
@@ -37,6 +39,12 @@ _LEAST_TRUST = 0.25
 """In a calm place that the drift does not fit: it may be a band of light or a skirt."""
 _SURE_GATE = 2.0
 _LEAST_LIGHT = 0.25
+_FIRM_GATE = 10.0
+"""Drift has not been seen to open the gate so far."""
+_LIGHT_LEAST_BEND = 0.3
+"""Of the gate's threshold, at a light touch too: what misleads one of the two seldom misleads the other."""
+_LIGHT_REACHES_PX, _REACHED = (18, 36, 72), 0.9
+"""How far a light touch may reach, at half the working size; the next where its body fills the one before."""
 _GATE_OF_WIDE = 0.6
 """Of the gate's threshold, where so much has moved that the background's bending is the skirt's."""
 
@@ -71,10 +79,15 @@ class RobustMethod:
         self._evening = evening(half)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._drift = DriftModel(self._reference)
+        self._lit = _lit(self._light)
         self._crumbs = Crumbs(self._light)
+        halves = [resized(capped(working_image(one)), (half.shape[1], half.shape[0])) for one in references]
+        mean = np.asarray(np.mean(halves, axis=0), np.float32)
+        self._touch = LightTouch(mean, self._lit, self._crumbs.clean)
         sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
         self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
-        self._least_bend = _lit(self._light) * parameters.least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+        least_bend = float(np.mean(self._lit)) * parameters.least_bend
+        self._least_bend = least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
         """Find the contact in an image.
@@ -92,7 +105,14 @@ class RobustMethod:
             candidates = separate_candidates(seen.bend, seen.threshold)
         else:
             candidates = body_candidates(seen.moved, seen.bend, seen.threshold)
-        found = self._outlines(seen, candidates.regions, sure=sure)
+        found = self._outlines(seen, candidates, sure=sure)
+        are_sure = [_sureness(one, seen.gate) >= self._parameters.least_confidence for one in found]
+        if not found or (seen.gate < _FIRM_GATE and not all(are_sure)):
+            response = self._response(seen.work)
+            found = [one for one, is_sure in zip(found, are_sure, strict=True) if is_sure or self._shows(one, response)]
+            if not found and (place := self._touched_at(seen, response)):
+                seen, candidates = seen._replace(touched_at=place), around(place, seen.moved)
+                found = self._outlines(seen, candidates, sure=sure)
         mask = self._mask(found)
         if on_stage:
             pictures.emit(
@@ -106,7 +126,7 @@ class RobustMethod:
                 edges=[outline.edge for outline in found],
                 mask=mask,
             )
-        flags, confidence = self._judge(seen.work, seen.drift, mask, found, seen.gate)
+        flags, confidence = self._judge(seen, mask, found)
         return contact_from_mask(
             mask,
             flags,
@@ -129,6 +149,21 @@ class RobustMethod:
         """
         seen = self._look(image)
         return seen.bend, seen.threshold
+
+    def light_touch(self, image: Image) -> tuple[FloatImage, float]:
+        """How far the gel's slopes stand out of the frame's noise, and from how much on a light touch is looked for.
+
+        Args:
+            image: as for `measure`.
+
+        Returns:
+            Shape (height, width) at half the working size, as `LightTouch.response`, and the gate's threshold.
+        """
+        return self._response(working_image(image)), light_touch.gate(self._parameters.gate_ratio)
+
+    def _response(self, work: Image) -> FloatImage:
+        height, width = self._crumbs.clean.shape
+        return self._touch.response(resized(capped(work), (width, height)))
 
     def _look(self, image: Image) -> "_Seen":
         if image.shape != self._shape or image.dtype != np.uint8:
@@ -157,17 +192,29 @@ class RobustMethod:
             threshold *= _GATE_OF_WIDE
         return _Seen(work, drift, change, half, moved, bend, threshold)
 
-    def _outlines(self, seen: "_Seen", candidates: list[Mask], *, sure: bool) -> list[Outline]:
-        """The outlines that the image supports, or any where contact is sure."""
+    def _touched_at(self, seen: "_Seen", response: FloatImage) -> tuple[int, int] | None:
+        """Where a touch too light for the gate lies, or one that drift hides: x and y at half the working size."""
+        place = self._touch.place(response, self._parameters.gate_ratio)
+        if place and seen.bend[self._touch.near(place)].max() > _LIGHT_LEAST_BEND * seen.threshold:
+            return place
+        return None
+
+    def _shows(self, outline: Outline, response: FloatImage) -> bool:
+        """Whether the place of an outline shows more than drift."""
+        size = (response.shape[1], response.shape[0])
+        place = cv2.resize(outline.inside, size, interpolation=cv2.INTER_NEAREST)
+        return self._touch.shows(np.asarray(place, np.uint8), response, self._parameters.gate_ratio)
+
+    def _outlines(self, seen: "_Seen", candidates: Candidates, *, sure: bool) -> list[Outline]:
+        """The outlines that the image supports, or any where contact is sure or a light touch was seen."""
         found: list[Outline] = []
         one = self._parameters.contacts == "one"
         height, width = seen.change.shape[:2]
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
-        for candidate in candidates:
+        for candidate in candidates.regions:
             if found and one:
                 break
-            others = None if one else sum((other for other in candidates if other is not candidate), 0 * candidate)
-            body = find_body(seen.moved, candidate, others)
+            body = _body(seen, candidate, None if one else candidates.regions)
             if body is None:
                 continue
             smooth = denoised(seen.change, seen.half, body.radius_px * width / candidate.shape[1])
@@ -176,7 +223,7 @@ class RobustMethod:
             if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline, sure=sure):
                 continue
             support = _LEAST_SUPPORT if outline.edge.seen.all() else _LEAST_SUPPORT_CUT
-            if sure or outline.confidence >= support:
+            if sure or seen.touched_at or outline.confidence >= support:
                 found.append(outline)
         return found
 
@@ -189,11 +236,10 @@ class RobustMethod:
             mask |= outline.drawn(height, width)
         return mask
 
-    def _judge(
-        self, work: Image, drift: Drift, mask: Mask, found: list[Outline], gate: float
-    ) -> tuple[frozenset[Flag], float]:
+    def _judge(self, seen: "_Seen", mask: Mask, found: list[Outline]) -> tuple[frozenset[Flag], float]:
         """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
         flags: set[Flag] = set()
+        work, drift = seen.work, seen.drift
         if (
             drift.strength_levels > _FOREIGN_DRIFT_SHARE * self._light_levels
             or drift.spread_levels >= SPREAD_CAP_LEVELS
@@ -204,11 +250,11 @@ class RobustMethod:
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
             flags.add(Flag.SATURATED)
-        if not found and gate > 1:
+        if not found and (seen.gate > 1 or seen.touched_at):
             flags.add(Flag.UNDECIDED)
-        untouched = min(1.0, _SURE_GATE * max(0.0, 1.0 - gate))
-        confidence = min((_sureness(outline, gate) for outline in found), default=untouched)
-        if Flag.REFERENCE_MISMATCH in flags:
+        untouched = 0.0 if seen.touched_at else min(1.0, _SURE_GATE * max(0.0, 1.0 - seen.gate))
+        confidence = min((_sureness(outline, seen.gate) for outline in found), default=untouched)
+        if Flag.REFERENCE_MISMATCH in flags or seen.touched_at:
             confidence *= 0.5
         if confidence < self._parameters.least_confidence:
             flags.add(Flag.LOW_CONFIDENCE)
@@ -226,6 +272,8 @@ class _Seen(NamedTuple):
     moved: Movement
     bend: FloatImage
     threshold: float
+    touched_at: tuple[int, int] | None = None
+    """Where a touch lies that is too light for the gate: x and y at the change's half size."""
 
     @property
     def gate(self) -> float:
@@ -233,17 +281,37 @@ class _Seen(NamedTuple):
         return float(self.bend.max()) / self.threshold
 
 
-def _lit(light: FloatImage) -> float:
-    """The share of the colours that have light: one whose LED is dead adds nothing to what bends."""
+def _lit(light: FloatImage) -> npt.NDArray[np.bool_]:
+    """Which colours have light, shape (3,): one whose LED is dead adds nothing to what bends."""
     means = np.asarray(cv2.mean(light)[:3])
-    return float(np.mean(means > _LEAST_LIGHT * means.max()))
+    return np.asarray(means > _LEAST_LIGHT * means.max())
 
 
 def _sureness(outline: Outline, gate: float) -> float:
     """An outline's confidence; drift at the border looks like a contact that it cuts, and opens the gate a little."""
     if outline.edge.seen.all():
         return outline.confidence
-    return outline.confidence * min(1.0, (gate - 1) / (_SURE_GATE - 1))
+    return outline.confidence * float(np.clip((gate - 1) / (_SURE_GATE - 1), 0, 1))
+
+
+def _body(seen: _Seen, candidate: Mask, several: list[Mask] | None) -> Body | None:
+    """The body that a candidate belongs to.
+
+    Args:
+        seen: the frame.
+        candidate: where the body has been seen.
+        several: all candidates, where each may be a body of its own.
+    """
+    if seen.touched_at is None:
+        others = None if several is None else sum((one for one in several if one is not candidate), 0 * candidate)
+        return find_body(seen.moved, candidate, others)
+    body = None
+    for reach_px in _LIGHT_REACHES_PX:
+        beyond = 1 - disc(candidate.shape, seen.touched_at, reach_px)
+        body = find_body(seen.moved, candidate, beyond)
+        if body is None or body.radii_px.max() < _REACHED * reach_px:
+            break
+    return body
 
 
 def _one_sided(change: FloatImage, outline: Outline, *, sure: bool) -> bool:

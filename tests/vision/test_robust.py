@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
-from station.twin.contact import Pose
+from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.press import PressOptions, render_press
-from station.twin.digit.sensor import DigitSensor
+from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import draw_fruit
-from station.twin.gel import MM_PER_PX
+from station.twin.gel import MM_PER_PX, Gel
+from station.twin.squeeze import Squeeze
 from station.vision.contact import Flag
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
@@ -219,15 +220,56 @@ def test_a_contact_of_which_the_border_cuts_only_the_skirt_is_not_mirrored(numbe
     assert contact.area_px == pytest.approx(truth, rel=0.1)
 
 
-@pytest.mark.parametrize(("unit", "drift", "after_s"), [(30017, 1.0, (1.0, 3.0)), (31009, 2.0, (1.0, 3.0, 5.0, 7.0))])
-def test_drift_at_the_border_that_opens_the_gate_a_little_is_not_sure(unit, drift, after_s):
+def untouched(unit, drift, after_s, dead_led=None):
+    """A method prepared for a unit of the twin, and its last mean image of those times, with nothing touching."""
+    condition = Condition(dead_led=dead_led)
     sensor = DigitSensor(unit, unit, drift=drift)
-    references = [sensor.frame(None, frame / 30) for frame in range(5)]
-    images = [mean_image([sensor.frame(None, began_s + frame / 30) for frame in range(3)]) for began_s in after_s]
-    contact = RobustMethod(references, RobustParameters()).measure(images[-1])
+    references = [sensor.frame(None, frame / 30, condition) for frame in range(5)]
+    means = [
+        mean_image([sensor.frame(None, began_s + frame / 30, condition) for frame in range(3)]) for began_s in after_s
+    ]
+    return RobustMethod(references, RobustParameters()), means[-1]
+
+
+def test_drift_in_a_corner_without_light_that_opens_the_gate_a_little_is_not_sure():
+    method, image = untouched(30017, 1.0, (1.0, 3.0))
+    contact = method.measure(image)
     assert contact.gate is not None
     assert 1 < contact.gate < 2
     assert Flag.CUT_BY_BORDER in contact.flags
+    assert Flag.LOW_CONFIDENCE in contact.flags
+
+
+@pytest.mark.parametrize(
+    ("unit", "drift", "dead_led", "after_s"),
+    [
+        (31009, 2.0, None, (1.0, 3.0, 5.0)),
+        (31021, 2.0, None, (1.0, 3.0, 5.0)),
+        (30020, 1.0, "red", (1.0, 3.0, 5.0)),
+    ],
+)
+def test_drift_that_opens_the_gate_is_no_contact_where_the_gel_shows_no_slopes(unit, drift, dead_led, after_s):
+    method, image = untouched(unit, drift, after_s, dead_led)
+    contact = method.measure(image)
+    assert contact.gate is not None
+    assert contact.gate > 1
+    assert contact.area_px == 0
+    assert Flag.UNDECIDED in contact.flags
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("blueberry", 502), ("blueberry", 508), ("raspberry", 506)])
+def test_a_touch_lighter_than_the_gate_is_found_and_not_sure(kind, seed):
+    fruit, gel = draw_fruit(kind, seed), Gel()
+    on_gel, squeeze = FruitOnGel(fruit, Pose(), gel), Squeeze(fruit, gel)
+    closings = np.geomspace(0.002, 1.0, 40)
+    seen = min((on_gel.pressed(squeeze.at(float(one))) for one in closings), key=lambda one: abs(one.true_area_mm2 - 1))
+    sensor = DigitSensor(seed)
+    references = [sensor.frame(None, frame / 30) for frame in range(5)]
+    image = mean_image([sensor.frame(seen.dent, 1.0 + frame / 30) for frame in range(3)])
+    contact = RobustMethod(references, RobustParameters()).measure(image)
+    assert contact.gate is not None
+    assert contact.gate < 1
+    assert 0.5 < contact.area_px / seen.true_area_px < 2
     assert Flag.LOW_CONFIDENCE in contact.flags
 
 

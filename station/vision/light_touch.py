@@ -1,0 +1,141 @@
+"""Touches too light for the bending's gate: where the gel's slopes stand out of the frame's own noise.
+
+A light touch tilts the gel by a grey level or two over a millimetre, less than the light drifts. But the light drifts
+in bands along the columns and slowly down them, so each column less its lowest cosines is left with the touch and
+noise. What is left is correlated with the slopes of a small round dent, in both directions and each colour, and what
+that gives is counted in units of its own spread over the frame, the colours' common noise taken apart (a matched
+filter; S. M. Kay, Fundamentals of Statistical Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root
+of the sum of the six squares follows the chi distribution with six degrees of freedom, whatever the sensor's noise.
+"""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import FloatImage, Mask
+
+_DENT_SIGMA_PX = 2.5
+"""Of the dent at half the working size, about 0.27 mm."""
+_REACH = 3.5
+_COSINES_DOWN = 8
+_LEVELS = (12.0, 236.0)
+"""Beyond these noise and drift reach the ends of the scale, where drift has edges."""
+_NORMAL_OF_MEDIAN = 1.4826
+_LEAST_NOISE_LEVELS = 1e-3
+_WINSORISED, _RIDGE = 2.0, 0.05
+_EVERY = 2
+_LONG_SIDE_PX = 160
+_GATE, _LEAST_SHOWN, _GATE_RATIO = 7.2, 6.3, 3.0
+"""What a touch stands out by, and less than contacts show; a `gate_ratio` above the default raises both."""
+_LEAST_TOLD, _RIM_PX = 0.5, 9
+
+
+class LightTouch:
+    """Looks for light touches, prepared for a reference.
+
+    Args:
+        reference: mean of the untouched gel's frames at half the working size, shape (height, width, 3),
+            grey levels.
+        lit: which colours have light, shape (3,); the others are not asked.
+        clean: where there is no crumb, shape (height, width), 0 or 1.
+    """
+
+    def __init__(self, reference: FloatImage, lit: npt.NDArray[np.bool_], clean: FloatImage) -> None:
+        height, width = clean.shape
+        self._reference, self._lit = reference, lit.astype(np.float32)
+        sigma_px = _DENT_SIGMA_PX * min(1.0, max(height, width) / _LONG_SIDE_PX)
+        self._reach_px = int(np.ceil(_REACH * sigma_px))
+        x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
+        dent = np.exp(-np.square(x / sigma_px) / 2)
+        self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
+        cut_off = ((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit
+        blind = (cut_off.any(axis=2) | (clean == 0)).astype(np.uint8)
+        side = 2 * self._reach_px + 1
+        around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+        self._told = (cv2.dilate(blind, around) == 0).astype(np.float32)
+        down = (np.arange(height) + 0.5) / height
+        orders = np.arange(min(_COSINES_DOWN, max(1, height // 4)))
+        self._slow = np.linalg.qr(np.cos(np.pi * down[:, None] * orders))[0].astype(np.float32)
+
+    def response(self, frame: FloatImage) -> FloatImage:
+        """How far the slopes stand out of the noise.
+
+        Args:
+            frame: at half the working size, shape (height, width, 3), grey levels.
+
+        Returns:
+            Shape (height, width): the chi distribution's six degrees of freedom are two of each lit colour. 0 where the
+            reference says nothing, since it is at an end of the scale or a crumb lies there.
+        """
+        difference = (frame - self._reference) * self._lit
+        height, width = difference.shape[:2]
+        lines = difference.reshape(height, -1)
+        left = (lines - self._slow @ (self._slow.T @ lines)).reshape(difference.shape)
+        left -= cv2.reduce(left, 1, cv2.REDUCE_AVG)
+        total = np.zeros((height, width), np.float32)
+        for across, down in ((self._slope, self._dent), (self._dent, self._slope)):
+            slopes = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
+            total += _in_units_of_noise(np.asarray(slopes, np.float32))
+        return np.sqrt(total) * self._told
+
+    def place(self, response: FloatImage, gate_ratio: float) -> tuple[int, int] | None:
+        """Where a touch lies, x and y, or None where nothing stands out.
+
+        Args:
+            response: from `response`.
+            gate_ratio: the recipe's.
+        """
+        _, strongest, _, (x, y) = cv2.minMaxLoc(response)
+        return (x, y) if strongest > gate(gate_ratio) else None
+
+    def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
+        """Rows and columns within the dent's reach of a place.
+
+        Args:
+            place: x and y, px.
+        """
+        x, y = place
+        reach_px = self._reach_px
+        return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
+
+    def shows(self, region: Mask, response: FloatImage, gate_ratio: float) -> bool:
+        """Whether a region's slopes are more than noise and drift; True where the reference does not let it be told.
+
+        Args:
+            region: shape (height, width), 0 or not.
+            response: from `response`.
+            gate_ratio: the recipe's.
+        """
+        if np.mean(self._told[region > 0]) < _LEAST_TOLD:
+            return True
+        with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
+        return float(response[with_rim].max()) > _LEAST_SHOWN * _strictness(gate_ratio)
+
+
+def gate(gate_ratio: float) -> float:
+    """What the response has to reach. A lower ratio than the default does not lower it: noise would open it.
+
+    Args:
+        gate_ratio: the recipe's.
+    """
+    return _GATE * _strictness(gate_ratio)
+
+
+def _strictness(gate_ratio: float) -> float:
+    return max(1.0, gate_ratio / _GATE_RATIO)
+
+
+def _in_units_of_noise(slopes: FloatImage) -> FloatImage:
+    """The squared length of what the colours show, once their noise has the spread 1 and nothing in common.
+
+    A contact takes little of the frame, and is cut off before the noise is counted.
+    """
+    few = np.abs(slopes[::_EVERY, ::_EVERY])
+    spread = np.maximum(_NORMAL_OF_MEDIAN * np.median(few, axis=(0, 1)), _LEAST_NOISE_LEVELS)
+    noise = np.clip(slopes[::_EVERY, ::_EVERY].reshape(-1, 3) / spread, -_WINSORISED, _WINSORISED)
+    common = noise.T @ noise
+    size = np.sqrt(np.maximum(common.diagonal(), _LEAST_NOISE_LEVELS))
+    common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)
+    apart = np.linalg.inv(np.linalg.cholesky(common)) / spread
+    alone = cv2.transform(slopes, apart.astype(np.float32))
+    return np.asarray(cv2.transform(cv2.multiply(alone, alone), np.ones((1, 3), np.float32)), np.float32)

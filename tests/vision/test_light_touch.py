@@ -1,0 +1,109 @@
+"""The matched filter for touches lighter than drift: what noise, drift, dents, dead LEDs and blind places give."""
+
+import cv2
+import numpy as np
+import pytest
+
+from station.vision.light_touch import LightTouch, gate
+
+SHAPE = (160, 120)
+GATE_RATIO = 3.0
+COLOURS = np.array([[1.0, -0.3, 0.1], [-0.3, 1.0, -0.3], [0.1, -0.3, 1.0]])
+PLACE = (70, 90)
+
+
+def reference(level=100.0):
+    return np.full((*SHAPE, 3), level, np.float32)
+
+
+def looking(level=100.0, lit=(True, True, True), clean=None):
+    clean = np.ones(SHAPE, np.float32) if clean is None else clean
+    return LightTouch(reference(level), np.array(lit), clean)
+
+
+def noise(generator, levels=(1.0, 1.0, 1.0), blur_px=0.8):
+    white = generator.standard_normal((*SHAPE, 3)) @ np.linalg.cholesky(COLOURS).T
+    field = cv2.GaussianBlur(white, (0, 0), blur_px)
+    return (field / field.std(axis=(0, 1)) * levels).astype(np.float32)
+
+
+def drift(generator, levels):
+    """Bands along the columns that fall off slowly down them."""
+    down = (np.arange(SHAPE[0]) + 0.5) / SHAPE[0]
+    slow = np.cos(np.pi * down[:, None] * np.arange(6))
+    return np.einsum("yk,kxc->yxc", slow, levels * generator.standard_normal((6, SHAPE[1], 3))).astype(np.float32)
+
+
+def dent(levels, place=PLACE, sigma_px=3.0):
+    """What a small round dent shows: each colour the slope along its own light."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float32)
+    x, y = (x - place[0]) / sigma_px, (y - place[1]) / sigma_px
+    depth = np.exp((1 - x * x - y * y) / 2)
+    lights = np.deg2rad([0, 120, 240])
+    slopes = [depth * (x * np.cos(one) + y * np.sin(one)) for one in lights]
+    return (levels * np.stack(slopes, axis=2)).astype(np.float32)
+
+
+@pytest.mark.parametrize("levels", [(1.0, 1.0, 1.0), (0.2, 3.0, 1.0)])
+def test_noise_follows_the_chi_distribution_whatever_its_levels_and_common_parts(levels):
+    touch = looking()
+    responses = [
+        touch.response(reference() + noise(np.random.default_rng(seed), levels))[12:-12, 12:-12] for seed in range(6)
+    ]
+    assert np.mean(np.square(responses)) == pytest.approx(6.0, rel=0.12)
+    assert all(touch.place(response, GATE_RATIO) is None for response in responses)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_faint_dent_is_found_under_drift_that_hides_it(seed):
+    generator = np.random.default_rng(seed)
+    frame = reference() + noise(generator) + drift(generator, levels=8.0)
+    touch = looking()
+    assert touch.place(touch.response(frame), GATE_RATIO) is None
+    place = touch.place(touch.response(frame + dent(levels=2.5)), GATE_RATIO)
+    assert place == pytest.approx(PLACE, abs=3)
+
+
+def test_a_higher_gate_asks_for_a_stronger_touch():
+    touch = looking()
+    response = touch.response(reference() + noise(np.random.default_rng(0)) + dent(levels=2.5))
+    assert touch.place(response, GATE_RATIO) is not None
+    assert touch.place(response, 2 * GATE_RATIO) is None
+
+
+def test_a_lower_gate_does_not_let_noise_through():
+    assert gate(GATE_RATIO / 2) == gate(GATE_RATIO)
+
+
+def test_a_colour_without_light_is_not_asked():
+    touch = looking(lit=(True, True, False))
+    flicker = dent(levels=40.0) * np.array([0, 0, 1], np.float32)
+    response = touch.response(reference() + noise(np.random.default_rng(1)) + flicker)
+    assert touch.place(response, GATE_RATIO) is None
+
+
+@pytest.mark.parametrize("level", [3.0, 250.0])
+def test_a_reference_at_an_end_of_the_scale_says_nothing(level):
+    touch = looking(level)
+    response = touch.response(reference(level) + noise(np.random.default_rng(2)) + dent(levels=20.0))
+    assert response.max() == 0
+    region = np.zeros(SHAPE, np.uint8)
+    region[80:100, 60:80] = 1
+    assert touch.shows(region, response, GATE_RATIO)
+
+
+def test_nothing_is_seen_where_a_crumb_lies():
+    clean = np.ones(SHAPE, np.float32)
+    clean[PLACE[1] - 2 : PLACE[1] + 3, PLACE[0] - 2 : PLACE[0] + 3] = 0
+    touch = looking(clean=clean)
+    assert touch.response(reference() + dent(levels=20.0))[PLACE[1], PLACE[0]] == 0
+
+
+def test_a_region_shows_where_the_gel_is_dented_and_not_where_light_drifts():
+    generator = np.random.default_rng(3)
+    touch = looking()
+    response = touch.response(reference() + noise(generator) + drift(generator, levels=8.0) + dent(levels=2.0))
+    for x, shown in ((PLACE[0], True), (PLACE[0] - 45, False)):
+        region = np.zeros(SHAPE, np.uint8)
+        cv2.circle(region, (x, PLACE[1]), 8, 1, cv2.FILLED)
+        assert touch.shows(region, response, GATE_RATIO) == shown
