@@ -20,8 +20,10 @@ def emit(
     difference: FloatImage,
     change: FloatImage,
     bend: FloatImage,
-    candidates: Candidates,
     threshold: float,
+    response: FloatImage,
+    response_gate: float,
+    candidates: Candidates,
     edges: list[Edge],
     mask: Mask,
 ) -> None:
@@ -29,12 +31,14 @@ def emit(
 
     Args:
         on_stage: takes name and picture.
-        names: seven, in the order of the stages.
+        names: eight, in the order of the stages.
         difference: frame minus reference, shape (height, width, 3), grey levels.
         change: the same without drift and streaks.
         bend: shape (height, width), grey levels per pixel.
-        candidates: with the clusters that they come from.
         threshold: the gate's.
+        response: from `LightTouch.response`, shape of `bend`.
+        response_gate: from how much of it on a light touch is looked for.
+        candidates: with the clusters that they come from.
         edges: of the contacts found, in pixels of `change`.
         mask: 0 or 255, at the input's size.
     """
@@ -45,14 +49,14 @@ def emit(
         cv2.polylines(
             outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
         )
-    strength = np.clip(bend * (255 / max(float(bend.max()), 2 * threshold)), 0, 255).astype(np.uint8)
     levels = candidates.levels
     clusters = (np.digitize(candidates.clustered, levels) * (255 // (len(levels) + 1))).astype(np.uint8)
     pictures = (
         _signed(difference, 1),
         _signed(change, _AMPLIFICATION),
         _signed(denoised, _AMPLIFICATION),
-        cv2.applyColorMap(strength, cv2.COLORMAP_VIRIDIS),
+        _strength(bend, threshold),
+        _strength(response, response_gate),
         clusters,
         outlined,
     )
@@ -65,3 +69,9 @@ def emit(
 def _signed(change: FloatImage, amplification: float) -> Image:
     """No change as middle grey."""
     return np.clip(_GREY + amplification * change, 0, 255).astype(np.uint8)
+
+
+def _strength(field: FloatImage, gate: float) -> Image:
+    """What opens the gate is bright; twice the gate, or the strongest place beyond it, is brightest."""
+    grey = np.clip(field * (255 / max(float(field.max()), 2 * gate)), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS), np.uint8)

@@ -52,7 +52,16 @@ _GATE_OF_WIDE = 0.6
 class RobustMethod:
     """The robust measurement against one or several reference images."""
 
-    stages: tuple[str, ...] = ("difference", "amplified", "denoised", "bending", "clustered", "edge", "segmented")
+    stages: tuple[str, ...] = (
+        "difference",
+        "amplified",
+        "denoised",
+        "bending",
+        "slopes",
+        "clustered",
+        "edge",
+        "segmented",
+    )
 
     def __init__(self, references: Sequence[Image], parameters: RobustParameters) -> None:
         """Prepare the reference, which is the median of the references.
@@ -121,8 +130,10 @@ class RobustMethod:
                 difference=capped(seen.work) - self._light,
                 change=seen.change,
                 bend=seen.bend,
-                candidates=candidates,
                 threshold=seen.threshold,
+                response=self._response(seen.work),
+                response_gate=light_touch.gate(self._parameters.gate_ratio),
+                candidates=candidates,
                 edges=[outline.edge for outline in found],
                 mask=mask,
             )
