@@ -1,11 +1,12 @@
 """Touches too light for the bending's gate: where the gel's slopes stand out of the frame's own noise.
 
-A light touch tilts the gel by a grey level or two over a millimetre, less than the light drifts. But the light drifts
-in bands along the columns and slowly down them, so each column less its lowest cosines is left with the touch and
-noise. What is left is correlated with the slopes of a small round dent, in both directions and each colour, and what
-that gives is counted in units of its own spread over the frame, the colours' common noise taken apart (a matched
-filter; S. M. Kay, Fundamentals of Statistical Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root
-of the sum of the six squares follows the chi distribution with six degrees of freedom, whatever the sensor's noise.
+A light touch changes the light by a grey level or two over a millimetre, less than it drifts. But the light drifts in
+bands along the columns and slowly down them, gains, and moves its pattern: each column less its lowest cosines and a
+parabola, and less what the reference turns into with a gain or a shift, is left with the touch and noise. What is left
+is correlated with the slopes of a small round dent, in both directions and each colour, and counted in units of its own
+spread over the frame, the colours' common noise taken apart (a matched filter; S. M. Kay, Fundamentals of Statistical
+Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root of the sum of the six squares nearly follows the chi
+distribution with six degrees of freedom, whatever the sensor's noise.
 """
 
 import cv2
@@ -18,8 +19,10 @@ _DENT_SIGMA_PX = 2.5
 """Of the dent at half the working size, about 0.27 mm."""
 _REACH = 3.5
 _COSINES_DOWN = 8
-_LEVELS = (12.0, 236.0)
-"""Beyond these noise and drift reach the ends of the scale, where drift has edges."""
+"""With a parabola, since drift may slope at the border where cosines are level."""
+_LEVELS, _MOST_CUT_OFF = (12.0, 224.0), 0.05
+"""Beyond these noise and drift reach the ends of the scale, where drift has edges; and how much of a column may be."""
+_PATTERN_SIGMA_PX = 1.0
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_NOISE_LEVELS = 1e-3
 _WINSORISED, _RIDGE = 2.0, 0.05
@@ -48,14 +51,40 @@ class LightTouch:
         x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
         self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
-        cut_off = ((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit
-        blind = (cut_off.any(axis=2) | (clean == 0)).astype(np.uint8)
+        cut_off = (((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit).any(axis=2)
+        blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
         side = 2 * self._reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
         self._told = (cv2.dilate(blind, around) == 0).astype(np.float32)
-        down = (np.arange(height) + 0.5) / height
+        down = ((np.arange(height) + 0.5) / height - 0.5)[:, None]
         orders = np.arange(min(_COSINES_DOWN, max(1, height // 4)))
-        self._slow = np.linalg.qr(np.cos(np.pi * down[:, None] * orders))[0].astype(np.float32)
+        slow = [np.cos(np.pi * (down + 0.5) * orders), down, down**2]
+        self._slow = np.linalg.qr(np.concatenate(slow, axis=1))[0].astype(np.float32)
+        self._known = self._drifts_of(reference)
+
+    def _drifts_of(self, reference: FloatImage) -> FloatImage:
+        """What the reference turns into as its light gains or its pattern moves, per colour orthonormal.
+
+        Returns:
+            Shape (3, height x width, 5).
+        """
+        pattern = cv2.GaussianBlur(reference, (0, 0), _PATTERN_SIGMA_PX)
+        across, down = (np.linspace(-1, 1, side, dtype=np.float32) for side in reference.shape[1::-1])
+        moved = (cv2.Sobel(pattern, cv2.CV_32F, dx, dy) for dx, dy in ((1, 0), (0, 1)))
+        known = [pattern, pattern * across[:, None], pattern * down[:, None, None], *moved]
+        left = np.stack([self._without_slow(np.asarray(one, np.float32)) for one in known], axis=-1)
+        columns = left.reshape(-1, 3, len(known)).transpose(1, 0, 2)
+        return np.asarray(np.linalg.qr(columns)[0], np.float32)
+
+    def _without_slow(self, difference: FloatImage) -> FloatImage:
+        lines = difference.reshape(len(difference), -1)
+        left = (lines - self._slow @ (self._slow.T @ lines)).reshape(difference.shape)
+        return np.asarray(left - cv2.reduce(left, 1, cv2.REDUCE_AVG), np.float32)
+
+    def _without_known(self, left: FloatImage) -> FloatImage:
+        colours = np.ascontiguousarray(left.reshape(-1, 3).T)[..., None]
+        colours -= self._known @ (self._known.transpose(0, 2, 1) @ colours)
+        return np.ascontiguousarray(colours[..., 0].T).reshape(left.shape)
 
     def response(self, frame: FloatImage) -> FloatImage:
         """How far the slopes stand out of the noise.
@@ -67,12 +96,8 @@ class LightTouch:
             Shape (height, width): the chi distribution's six degrees of freedom are two of each lit colour. 0 where the
             reference says nothing, since it is at an end of the scale or a crumb lies there.
         """
-        difference = (frame - self._reference) * self._lit
-        height, width = difference.shape[:2]
-        lines = difference.reshape(height, -1)
-        left = (lines - self._slow @ (self._slow.T @ lines)).reshape(difference.shape)
-        left -= cv2.reduce(left, 1, cv2.REDUCE_AVG)
-        total = np.zeros((height, width), np.float32)
+        left = self._without_known(self._without_slow((frame - self._reference) * self._lit))
+        total = np.zeros(left.shape[:2], np.float32)
         for across, down in ((self._slope, self._dent), (self._dent, self._slope)):
             slopes = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
             total += _in_units_of_noise(np.asarray(slopes, np.float32))
