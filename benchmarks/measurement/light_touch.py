@@ -18,6 +18,7 @@ from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Image
+from station.vision.light_touch import gate as light_touch_gate
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
@@ -32,7 +33,8 @@ BOUND_COSINES = 6
 
 AVERAGED = ((FRAMES_PER_STEP, 5), (6, 15), (12, 31))
 """Frames a step and reference frames: the recipes', and more."""
-GATES = (6.3, 6.75, 7.2, 8.0, 9.0)
+GATE = light_touch_gate(RobustParameters().gate_ratio)
+GATES = (6.0, 6.5, 6.9, 7.5, 8.5)
 """Of the light touches' response that are tried."""
 UNTOUCHED_RADII = 2.5
 
@@ -116,7 +118,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
     return [
         *lines,
         "",
-        "The gate is at 7.2. The untouched twin is that of the plain units above. Beside a real press is beyond",
+        f"The gate is at {GATE:g}. The untouched twin is that of the plain units above. Beside a real press is beyond",
         f"{UNTOUCHED_RADII:g} radii of its annotated outline, in a single frame against a single reference: what",
         "stands out there may be the gel that the ball draws down, which does touch, or a real drift.",
     ]
@@ -176,7 +178,7 @@ def detection_table(presses: list[Beside]) -> list[str]:
     return [
         *lines,
         "",
-        "A light touch is looked for where the response is over 7.2. The observer",
+        f"A light touch is looked for where the response is over {GATE:g}. The observer",
         "knows the contact's place, shape and colours beforehand and asks only whether it is there: one known template",
         "against the twin's own noise and drift, beyond columns' and rows' means and slow cosines. The method knows",
         "none of these. The last column is of the fruit that have a contact of 1 mm²: by how much later than there the",

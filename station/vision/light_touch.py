@@ -5,8 +5,8 @@ bands along the columns and slowly down them, gains, and moves its pattern: each
 parabola, and less what the reference turns into with a gain or a shift, is left with the touch and noise. What is left
 is correlated with the slopes of a small round dent, in both directions and each colour, and counted in units of its own
 spread over the frame, the colours' common noise taken apart (a matched filter; S. M. Kay, Fundamentals of Statistical
-Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root of the sum of the six squares nearly follows the chi
-distribution with six degrees of freedom, whatever the sensor's noise.
+Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root of the sum of the six squares nearly follows the
+chi distribution with six degrees of freedom, whatever the sensor's noise.
 """
 
 import cv2
@@ -18,17 +18,19 @@ from station.vision.contact import FloatImage, Mask
 _DENT_SIGMA_PX = 2.5
 """Of the dent at half the working size, about 0.27 mm."""
 _REACH = 3.5
-_COSINES_DOWN = 8
+_COSINES_DOWN = 7
 """With a parabola, since drift may slope at the border where cosines are level."""
 _LEVELS, _MOST_CUT_OFF = (12.0, 224.0), 0.05
 """Beyond these noise and drift reach the ends of the scale, where drift has edges; and how much of a column may be."""
-_PATTERN_SIGMA_PX = 1.0
+_PATTERN_SIGMA_PX = 2.0
+"""The reference's own noise must not pass for its pattern: the change has the same noise."""
 _NORMAL_OF_MEDIAN = 1.4826
 _LEAST_NOISE_LEVELS = 1e-3
 _WINSORISED, _RIDGE = 2.0, 0.05
-_EVERY = 2
+_EVERY, _BORDER_PX = 2, 8
+"""Noise is counted at every second place, away from the border, where there is less of it."""
 _LONG_SIDE_PX = 160
-_GATE, _LEAST_SHOWN, _GATE_RATIO = 7.2, 6.3, 3.0
+_GATE, _LEAST_SHOWN, _GATE_RATIO = 6.9, 6.0, 3.0
 """What a touch stands out by, and less than contacts show; a `gate_ratio` above the default raises both."""
 _LEAST_TOLD, _RIM_PX = 0.5, 9
 
@@ -155,9 +157,11 @@ def _in_units_of_noise(slopes: FloatImage) -> FloatImage:
 
     A contact takes little of the frame, and is cut off before the noise is counted.
     """
-    few = np.abs(slopes[::_EVERY, ::_EVERY])
-    spread = np.maximum(_NORMAL_OF_MEDIAN * np.median(few, axis=(0, 1)), _LEAST_NOISE_LEVELS)
-    noise = np.clip(slopes[::_EVERY, ::_EVERY].reshape(-1, 3) / spread, -_WINSORISED, _WINSORISED)
+    border_px = min(_BORDER_PX, min(slopes.shape[:2]) // 4)
+    inner = slice(border_px, -border_px or None, _EVERY)
+    few = slopes[inner, inner].reshape(-1, 3)
+    spread = np.maximum(_NORMAL_OF_MEDIAN * np.median(np.abs(few), axis=0), _LEAST_NOISE_LEVELS)
+    noise = np.clip(few / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
     size = np.sqrt(np.maximum(common.diagonal(), _LEAST_NOISE_LEVELS))
     common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)
