@@ -34,7 +34,7 @@ BOUND_COSINES = 6
 AVERAGED = ((FRAMES_PER_STEP, 5), (6, 15), (12, 31))
 """Frames a step and reference frames: the recipes', and more."""
 GATE = light_touch_gate(RobustParameters().gate_ratio)
-GATES = (6.0, 6.6, 7.2, 8.0, 9.0)
+GATES = (6.0, 6.5, 6.9, 7.5, 8.5)
 """Of the light touches' response that are tried."""
 UNTOUCHED_RADII = 2.5
 

@@ -30,7 +30,7 @@ _WINSORISED, _RIDGE = 2.0, 0.05
 _EVERY, _BORDER_PX = 2, 8
 """Noise is counted at every second place, away from the border, where there is less of it."""
 _LONG_SIDE_PX = 160
-_GATE, _LEAST_SHOWN, _GATE_RATIO = 7.2, 6.0, 3.0
+_GATE, _LEAST_SHOWN, _GATE_RATIO = 6.9, 6.0, 3.0
 """What a touch stands out by, and less than contacts show; a `gate_ratio` above the default raises both."""
 _LEAST_TOLD, _RIM_PX = 0.5, 9
 

@@ -146,21 +146,6 @@ class RobustMethod:
             drift_levels=seen.drift.strength_levels,
         )
 
-    def bending(self, image: Image) -> tuple[FloatImage, float]:
-        """How much the gel bends at half the working size, and from how much on contact is looked for.
-
-        Args:
-            image: as for `measure`.
-
-        Returns:
-            Shape (height, width) and the gate's threshold, grey levels per pixel of the working image.
-
-        Raises:
-            ValueError: as `measure`.
-        """
-        seen = self._look(image)
-        return seen.bend, seen.threshold
-
     def light_touch(self, image: Image) -> tuple[FloatImage, float]:
         """How far the gel's slopes stand out of the frame's noise, and from how much on a light touch is looked for.
 
@@ -169,8 +154,11 @@ class RobustMethod:
 
         Returns:
             Shape (height, width) at half the working size, as `LightTouch.response`, and the gate's threshold.
+
+        Raises:
+            ValueError: as `measure`.
         """
-        return self._response(working_image(image)), light_touch.gate(self._parameters.gate_ratio)
+        return self._response(self._look(image).work), light_touch.gate(self._parameters.gate_ratio)
 
     def _response(self, work: Image) -> FloatImage:
         height, width = self._crumbs.clean.shape
