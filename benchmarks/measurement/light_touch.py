@@ -186,7 +186,7 @@ def detection_table(presses: list[Beside]) -> list[str]:
         "",
         *more_frames_table(contacts),
         "",
-        "Noise is what hides the others: more frames find them.",
+        "Noise is what hides the others: more frames find most of them.",
         "",
         *gate_table(contacts, presses),
     ]

@@ -87,7 +87,7 @@ def analyze_command(
     for item in outcome.refused:
         click.echo(f"station: {item.reason}", err=True)
     if request.widths_mm is not None and outcome.measured and not outcome.touched:
-        click.echo("station: no contact was found in any image, so there is no onset and no area curve", err=True)
+        click.echo("station: no image shows more than a light touch, so there is no onset and no area curve", err=True)
     if outcome.measured:
         click.echo(f"{outcome.measured} images measured; report: {out / 'report.html'}")
     if outcome.refused:

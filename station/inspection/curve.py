@@ -12,6 +12,8 @@ class Reading:
     """The measured width, never the commanded one."""
     area_px: int
     area_mm2: float
+    counts: bool
+    """Whether closing may be counted from it: not from a light touch, nor where nothing touches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,7 @@ def area_curve(readings: Iterable[Reading]) -> AreaCurve:
         (2025) 110397).
     """
     closing_order = sorted(readings, key=lambda reading: -reading.width_mm)
-    onset_mm = next((reading.width_mm for reading in closing_order if reading.area_px > 0), None)
+    onset_mm = next((reading.width_mm for reading in closing_order if reading.counts), None)
     if onset_mm is None:
         return AreaCurve(None, ())
     return AreaCurve(onset_mm, tuple(CurvePoint(onset_mm - reading.width_mm, reading) for reading in closing_order))

@@ -60,6 +60,14 @@ class Contact:
         """Whether anything touches the gel."""
         return self.area_px > 0
 
+    @property
+    def opens_gate(self) -> bool:
+        """Whether it is more than a light touch: closing is counted from such contacts.
+
+        A light touch, found although the gate is shut, may be a place of the gel that was another in the reference.
+        """
+        return self.found and (self.gate is None or self.gate > 1)
+
 
 class Method(Protocol):
     """A measurement method, made once for a reference and used for many images of its size."""

@@ -270,6 +270,8 @@ def test_a_touch_lighter_than_the_gate_is_found_and_not_sure(kind, seed):
     assert contact.gate is not None
     assert contact.gate < 1
     assert 0.5 < contact.area_px / seen.true_area_px < 2
+    assert contact.found
+    assert not contact.opens_gate
     assert Flag.LOW_CONFIDENCE in contact.flags
 
 
