@@ -143,7 +143,7 @@ def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dic
     area = "area unknown" if unknown else f"{area_mm2:.2f} mm2"
     gathered.thumbnails.append((f"{name}\n{area}", [picture]))
     if width_mm is not None and not unknown:
-        gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2, item.contact.opens_gate)))
+        gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2, item.contact.is_firm)))
     if item.stages:
         gathered.stage_names = tuple(item.stages)
         gathered.stages.append((name, [thumbnail(stage, _STAGE_PX) for stage in item.stages.values()]))

@@ -146,7 +146,7 @@ class Calibrating:
             raise RefusedError("the frames do not differ at all: a live sensor's do; see `station devices check`")
         untouched = [await self._press.measure([frame]) for frame in frames[:: max(1, len(frames) // 6)]]
         steps = await self._press_through()
-        first = next(step for step in steps if step.contact.opens_gate)
+        first = next(step for step in steps if step.contact.is_firm)
         before = [step for step in steps if step.width_mm > first.width_mm]
         self._say("onset", 1, 1, f"between {before[-1].width_mm:.1f} and {first.width_mm:.1f} mm")
         onset_mm = await self._press.fine_onset(before[-1].width_mm, first.width_mm)
@@ -163,14 +163,14 @@ class Calibrating:
             self._pressed.append(step)
             area = f"{step.contact.area_px} px" if step.contact.found else "no contact"
             self._say("press", number + 1, plan.number + 1, f"{step.width_mm:.2f} mm: {area}")
-            if number == 0 and step.contact.opens_gate:
+            if number == 0 and step.contact.is_firm:
                 met_mm = self._settings.ball_mm + self._settings.holder_mm
                 raise RefusedError(
                     f"something touches the gel at the start, {step.width_mm:.1f} mm, and a "
                     f"{self._settings.ball_mm:g} mm ball is met at {met_mm:.1f} mm: take it out, look for the "
                     "right ball and what holds it"
                 )
-        if not any(step.contact.opens_gate for step in steps):
+        if not any(step.contact.is_firm for step in steps):
             raise RefusedError(
                 f"nothing touched the gel down to {steps[-1].width_mm:.1f} mm: is the ball between the fingers? "
                 "A smaller one is never met"

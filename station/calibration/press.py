@@ -105,7 +105,7 @@ class BallPress:
         width_mm = untouched_mm - FINEST_STEP_MM
         while width_mm > touched_mm + FINEST_STEP_MM / 2:
             step = await self.step(width_mm)
-            if step.contact.opens_gate:
+            if step.contact.is_firm:
                 return step.width_mm
             width_mm -= FINEST_STEP_MM
         return touched_mm

@@ -129,7 +129,7 @@ class Verifying:
             area = f"{steps[-1].contact.area_px} px" if steps[-1].contact.found else "no contact"
             detail = f"{steps[-1].width_mm:.2f} mm: {area}"
             self._tell(Progress(number, len(widths), "the ball, step by step", detail))
-        touched = next((step for step in steps if step.contact.opens_gate), None)
+        touched = next((step for step in steps if step.contact.is_firm), None)
         if touched is None or touched is steps[0]:
             return steps, None if touched is None else touched.width_mm
         before = max(step.width_mm for step in steps if step.width_mm > touched.width_mm)

@@ -74,7 +74,7 @@ class BareGrip:
             method = await asyncio.to_thread(self._make_method, references)
 
             async def touches(step: GripStep) -> bool:
-                return (await asyncio.to_thread(method.measure, step.image)).opens_gate
+                return (await asyncio.to_thread(method.measure, step.image)).is_firm
 
             before, start = await self._grip.approach(touches)
             if before is not None:

@@ -59,7 +59,7 @@ class Inspection:
     @property
     def onset_mm(self) -> float | None:
         """The measured width of the first contact; None before it."""
-        return next((seen.step.move.width_mm for seen in self.seen if seen.contact.opens_gate), None)
+        return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
 
     def interrupt(self, reason: Reason, why: str) -> None:
         """Something from outside the measurement ended or spoilt it.

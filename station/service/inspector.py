@@ -216,4 +216,4 @@ class Inspector:
         self._crew.watches[CAMERA].heard()
         self._crew.watches[GRIPPER].heard()
         self._glanced = await self._eye.measure(step)
-        return self._glanced.contact.opens_gate
+        return self._glanced.contact.is_firm

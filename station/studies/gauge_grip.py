@@ -114,10 +114,10 @@ class Grip:
     def _touched(self, width_mm: float) -> Contact | None:
         """One frame; where it shows a contact, a full step at the same width has to confirm it."""
         self._now_s += _FRAME_S
-        if not self._method.measure(self._frames(width_mm, 1)[0]).opens_gate:
+        if not self._method.measure(self._frames(width_mm, 1)[0]).is_firm:
             return None
         contact = self._measured(width_mm)
-        return contact if contact.opens_gate else None
+        return contact if contact.is_firm else None
 
     def _measured(self, width_mm: float) -> Contact:
         self._now_s += _STEP_S

@@ -54,6 +54,8 @@ class Contact:
     """The gate's statistic over its threshold: contact is looked for from 1 on; None where there is no gate."""
     drift_levels: float | None = None
     """Root mean square of the drift against the reference, grey levels; None where it is not measured."""
+    is_light: bool = False
+    """Found by its slopes only, as a touch lighter than drift: its area is rough."""
 
     @property
     def found(self) -> bool:
@@ -61,12 +63,12 @@ class Contact:
         return self.area_px > 0
 
     @property
-    def opens_gate(self) -> bool:
+    def is_firm(self) -> bool:
         """Whether it is more than a light touch: closing is counted from such contacts.
 
-        A light touch, found although the gate is shut, may be a place of the gel that was another in the reference.
+        A light touch may be a place of the gel that was another in the reference.
         """
-        return self.found and (self.gate is None or self.gate > 1)
+        return self.found and not self.is_light
 
 
 class Method(Protocol):
@@ -95,6 +97,7 @@ def contact_from_mask(
     confidence: float | None = None,
     gate: float | None = None,
     drift_levels: float | None = None,
+    is_light: bool = False,
 ) -> Contact:
     """Measure a mask: its area and centroid, with the flags that follow from it added.
 
@@ -104,15 +107,15 @@ def contact_from_mask(
         confidence: as in `Contact`.
         gate: as in `Contact`.
         drift_levels: as in `Contact`.
+        is_light: as in `Contact`.
     """
-    known = {"confidence": confidence, "gate": gate, "drift_levels": drift_levels}
     area_px = cv2.countNonZero(mask)
     if area_px == 0:
         nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
-        return Contact(mask, 0, None, flags | nothing, **known)
+        return Contact(mask, 0, None, flags | nothing, confidence, gate, drift_levels)
     left, top, width, height = cv2.boundingRect(mask)
     moments = cv2.moments(mask[top : top + height, left : left + width], binaryImage=True)
     centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)
     if left == 0 or top == 0 or left + width == mask.shape[1] or top + height == mask.shape[0]:
         flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, centroid_px, flags, **known)
+    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light)

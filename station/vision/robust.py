@@ -144,6 +144,7 @@ class RobustMethod:
             confidence=confidence,
             gate=seen.gate,
             drift_levels=seen.drift.strength_levels,
+            is_light=seen.touched_at is not None,
         )
 
     def light_touch(self, image: Image) -> tuple[FloatImage, float]:

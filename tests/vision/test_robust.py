@@ -271,7 +271,7 @@ def test_a_touch_lighter_than_the_gate_is_found_and_not_sure(kind, seed):
     assert contact.gate < 1
     assert 0.5 < contact.area_px / seen.true_area_px < 2
     assert contact.found
-    assert not contact.opens_gate
+    assert not contact.is_firm
     assert Flag.LOW_CONFIDENCE in contact.flags
 
 
@@ -281,6 +281,9 @@ def test_an_area_that_only_the_slopes_support_is_not_judged():
     contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[-1])
     assert 0 < contact.area_px < 0.75 * np.count_nonzero(press.true_masks[-1])
     assert {Flag.LOW_CONFIDENCE, Flag.CUT_BY_BORDER} <= contact.flags
+    assert contact.gate is not None
+    assert contact.gate > 1
+    assert not contact.is_firm
 
 
 def test_a_crown_is_not_taken_for_its_blueberry():
