@@ -18,10 +18,10 @@ from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Image
-from station.vision.light_touch import gate as light_touch_gate
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
+from station.vision.weak_contact import gate as light_touch_gate
 
 DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
 DETECTION_UNITS = (None, 7)

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision.body import Movement, level_of, quantile
 from station.vision.clusters import boundaries
 from station.vision.contact import FloatImage, Mask
+from station.vision.region import Movement, level_of, quantile
 
 _FOOT_SHARE = 0.5
 _WINDOW_PX = 3.0

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from station.vision.background import thinned, weighted_median
 from station.vision.contact import FloatImage
-from station.vision.drift import thinned, weighted_median
-from station.vision.edge import Edge
+from station.vision.contour import Edge
 
 _RELIABLE_RATIO = 4.0
 _VISIBLE_RATIO = 2.0

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision import elements
-from station.vision.body import Body
+from station.vision import texture
 from station.vision.confidence import background_spread, edge_confidence
 from station.vision.contact import FloatImage, Mask
-from station.vision.edge import COSINES, RAYS, SINES, Edge, find_edge
+from station.vision.contour import COSINES, RAYS, SINES, Edge, find_edge
+from station.vision.region import Body
 
 _SUBPIXEL_BITS = 4
 _WITHIN, _BEYOND = 0.8, 1.2
@@ -48,7 +48,7 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     region = np.asarray(cv2.resize(body.region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
     scale = width / body.region.shape[1], height / body.region.shape[0]
     middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
-    noise = elements.noise_of(length, background) if elements.has_room_for_few(region) else 0.0
+    noise = texture.noise_of(length, background) if texture.has_room_for_few(region) else 0.0
     if not body.textured and not _is_faint_skin(length, region, body, noise):
         edge = find_edge(length, region, middle, stiffness)
         confidence = edge_confidence(edge, background_spread(length, background))
@@ -56,7 +56,7 @@ def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffne
     points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
     seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
     edge = Edge(points, seen, _fall(body))
-    inside, sure = elements.union(length, region, elements.level(length, region, body, noise), noise)
+    inside, sure = texture.union(length, region, texture.level(length, region, body, noise), noise)
     return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
 
 
@@ -65,7 +65,7 @@ def _is_faint_skin(length: FloatImage, region: Mask, body: Body, noise: float) -
 
     Not where directions agree as they hardly do on skin. Where the noise is not known, directions tell little.
     """
-    return body.coherence < _SURELY_SMOOTH and elements.strength(length, region) < _CLEAR_NOISES * noise
+    return body.coherence < _SURELY_SMOOTH and texture.strength(length, region) < _CLEAR_NOISES * noise
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:

@@ -5,7 +5,7 @@ import numpy as np
 
 from station.vision.candidates import Candidates
 from station.vision.contact import FloatImage, Image, Mask, StageSink
-from station.vision.edge import Edge
+from station.vision.contour import Edge
 
 _GREY = 128.0
 _AMPLIFICATION = 4.0

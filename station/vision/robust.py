@@ -13,16 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from station.settings.segmentation import RobustParameters
-from station.vision import light_touch, pictures
-from station.vision.bending import bending, noise_of, quiet
-from station.vision.body import Body, Movement, evening, find_body, has_moved_widely, movement
+from station.vision import pictures, weak_contact
+from station.vision.background import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
 from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.crumbs import Crumbs
-from station.vision.drift import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
+from station.vision.curvature import bending, noise_of, quiet
+from station.vision.debris import Crumbs
 from station.vision.edge_signal import denoised, length_of
-from station.vision.light_touch import LightTouch
 from station.vision.outline import Outline, find_outline
+from station.vision.region import Body, Movement, evening, find_body, has_moved_widely, movement
+from station.vision.weak_contact import LightTouch
 from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
@@ -132,7 +132,7 @@ class RobustMethod:
                 bend=seen.bend,
                 threshold=seen.threshold,
                 response=self._response(seen.work),
-                response_gate=light_touch.gate(self._parameters.gate_ratio),
+                response_gate=weak_contact.gate(self._parameters.gate_ratio),
                 candidates=candidates,
                 edges=[outline.edge for outline in found],
                 mask=mask,
@@ -159,7 +159,7 @@ class RobustMethod:
         Raises:
             ValueError: as `measure`.
         """
-        return self._response(self._look(image).work), light_touch.gate(self._parameters.gate_ratio)
+        return self._response(self._look(image).work), weak_contact.gate(self._parameters.gate_ratio)
 
     def _response(self, work: Image) -> FloatImage:
         height, width = self._crumbs.clean.shape

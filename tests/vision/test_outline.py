@@ -8,11 +8,11 @@ import pytest
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.press import render_press
 from station.twin.fruit import draw_fruit
-from station.vision.body import Body
-from station.vision.drift import without_bands, without_streaks
-from station.vision.elements import level, noise_of, union
+from station.vision.background import without_bands, without_streaks
 from station.vision.outline import find_outline
+from station.vision.region import Body
 from station.vision.robust import RobustMethod
+from station.vision.texture import level, noise_of, union
 
 SHAPE = (320, 240)
 HALF = (160, 120)

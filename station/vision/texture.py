@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 
-from station.vision.body import Body, quantile
+from station.vision.background import weighted_median
 from station.vision.contact import FloatImage, Mask
-from station.vision.drift import weighted_median
+from station.vision.region import Body, quantile
 
 _STRONG_QUANTILE = 0.8
 _SHARE_OF_RANDOM, _SHARE_OF_COHERENCE = 0.04, 0.65

@@ -7,7 +7,7 @@ from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition
-from station.vision.crumbs import Crumbs
+from station.vision.debris import Crumbs
 from station.vision.robust import RobustMethod
 
 SHAPE = (320, 240)

@@ -9,8 +9,8 @@ eigenvalues of the local structure tensor, summed over the channels, whose root 
 import cv2
 import numpy as np
 
+from station.vision.background import weighted_median
 from station.vision.contact import FloatImage
-from station.vision.drift import weighted_median
 
 _SIGMA_PX = 5.0
 _WINDOW_SIGMA_PX = 7.5

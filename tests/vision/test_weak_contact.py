@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from station.vision.light_touch import LightTouch, gate
+from station.vision.weak_contact import LightTouch, gate
 
 SHAPE = (160, 120)
 GATE_RATIO = 3.0

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from station.vision.bending import bending
-from station.vision.body import evening, find_body, has_moved_widely, level_of, movement
+from station.vision.curvature import bending
+from station.vision.region import evening, find_body, has_moved_widely, level_of, movement
 
 SHAPE = (160, 120)
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]]

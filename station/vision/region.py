@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.vision.background import thinned, weighted_median
 from station.vision.contact import FloatImage, Mask
-from station.vision.drift import thinned, weighted_median
-from station.vision.edge import COSINES, SINES, closed_path
+from station.vision.contour import COSINES, SINES, closed_path
 from station.vision.working import length_squared, resized
 
 _BLUR_PX = 1.0

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from station.vision.edge import closed_path
+from station.vision.contour import closed_path
 
 RAYS, STEPS = 12, 9
 
