@@ -47,10 +47,10 @@ class _Begun:
     def __init__(self, method: Method, known: dict[int, tuple[Image, Future[Contact]]]) -> None:
         self.stages, self._method, self._known = method.stages, method, known
 
-    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
         """See `Method.measure`."""
         begun = self._known.pop(id(image), None)
-        return self._method.measure(image, on_stage) if begun is None else begun[1].result()
+        return self._method.measure(image, on_stage, previous) if begun is None else begun[1].result()
 
 
 class Eye:

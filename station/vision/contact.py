@@ -31,6 +31,8 @@ class Flag(StrEnum):
     """Something bends the gel, but no edge was found: the area is given as 0 and is unknown."""
     CUT_BY_BORDER = "cut_by_border"
     """The contact reaches the image's border: the area is a lower bound."""
+    LOWER_BOUND = "lower_bound"
+    """The edge was lost where the press so far had it: the contact is at least as large as this area."""
     SATURATED = "saturated"
     """Much of the contact is at the end of the grey scale: its edge may lie elsewhere."""
     LOW_CONFIDENCE = "low_confidence"
@@ -56,6 +58,8 @@ class Contact:
     """Root mean square of the drift against the reference, grey levels; None where it is not measured."""
     is_light: bool = False
     """Found by its slopes only, as a touch lighter than drift: its area is rough."""
+    changed_area_px: int | None = None
+    """The second witness: how much of the image has changed, px; None where the method does not say."""
 
     @property
     def found(self) -> bool:
@@ -77,12 +81,13 @@ class Method(Protocol):
     stages: tuple[str, ...]
     """The names of the stages' pictures in the order in which they come."""
 
-    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+    def measure(self, image: Image, on_stage: StageSink | None = None, previous: "Contact | None" = None) -> Contact:
         """Find the contact in an image.
 
         Args:
             image: shape and channels as the reference's.
             on_stage: gets each stage's picture; nothing is drawn for it where it is None.
+            previous: the same contact at the last step of less compression; a single image is measured without.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.
@@ -98,6 +103,7 @@ def contact_from_mask(
     gate: float | None = None,
     drift_levels: float | None = None,
     is_light: bool = False,
+    changed_area_px: int | None = None,
 ) -> Contact:
     """Measure a mask: its area and centroid, with the flags that follow from it added.
 
@@ -108,14 +114,15 @@ def contact_from_mask(
         gate: as in `Contact`.
         drift_levels: as in `Contact`.
         is_light: as in `Contact`.
+        changed_area_px: as in `Contact`.
     """
     area_px = cv2.countNonZero(mask)
     if area_px == 0:
         nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
-        return Contact(mask, 0, None, flags | nothing, confidence, gate, drift_levels)
+        return Contact(mask, 0, None, flags | nothing, confidence, gate, drift_levels, changed_area_px=changed_area_px)
     left, top, width, height = cv2.boundingRect(mask)
     moments = cv2.moments(mask[top : top + height, left : left + width], binaryImage=True)
     centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)
     if left == 0 or top == 0 or left + width == mask.shape[1] or top + height == mask.shape[0]:
         flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light)
+    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light, changed_area_px)

@@ -28,7 +28,7 @@ class PaperMethod:
         self._reference = reference
         self._parameters = parameters
 
-    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
         """Find the contact in an image as the paper prints it.
 
         Args:

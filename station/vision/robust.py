@@ -98,7 +98,7 @@ class RobustMethod:
         least_bend = float(np.mean(self._lit)) * parameters.least_bend
         self._least_bend = least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
-    def measure(self, image: Image, on_stage: StageSink | None = None) -> Contact:
+    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
         """Find the contact in an image.
 
         Args:

@@ -1,6 +1,6 @@
 """The contact of one width step, from all of its frames."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +9,13 @@ from station.vision.confidence import agreement
 from station.vision.contact import Contact, Flag, Image, Method
 
 
-def measure_step(method: Method, frames: Sequence[Image], least_confidence: float) -> Contact:
+def measure_step(
+    method: Method,
+    frames: Sequence[Image],
+    least_confidence: float,
+    previous: Contact | None = None,
+    known: Mapping[int, Contact] | None = None,
+) -> Contact:
     """Measure the mean of a step's frames, and doubt it as far as the frames measured one by one disagree.
 
     It takes one measurement more than there are frames, or one for a single frame.
@@ -18,6 +24,8 @@ def measure_step(method: Method, frames: Sequence[Image], least_confidence: floa
         method: prepared for the reference.
         frames: one or more of one shape (height, width, 3), dtype uint8, in which nothing has moved.
         least_confidence: the recipe's; below it the contact is flagged.
+        previous: the contact of the press's step before; None where the step is measured by itself.
+        known: contacts of frames that are measured already, by the frame's `id`.
 
     Returns:
         The mean image's contact. A confidence that the method gives is multiplied by the frames' `agreement`.
@@ -28,9 +36,10 @@ def measure_step(method: Method, frames: Sequence[Image], least_confidence: floa
     if not frames:
         raise ValueError("no frame to measure: a step needs at least one")
     if len(frames) == 1:
-        return method.measure(frames[0])
-    alone = [method.measure(frame) for frame in frames]
-    contact = method.measure(mean_image(frames))
+        return method.measure(frames[0], previous=previous)
+    known = known or {}
+    alone = [known.get(id(frame)) or method.measure(frame, previous=previous) for frame in frames]
+    contact = method.measure(mean_image(frames), previous=previous)
     if contact.confidence is None:
         return contact
     confidence = contact.confidence * agreement([one.area_px for one in alone])
