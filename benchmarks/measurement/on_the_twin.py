@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -19,6 +20,7 @@ from station.vision.contact import Flag, Image
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
+from station.vision.working import working_image
 
 CLOSINGS_MM = (0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.8, 2.5, 3.5, 5.0, 7.0)
 PEER_CLOSINGS_MM = (0.0, 0.4, 1.2, 2.5, 5.0)
@@ -90,6 +92,29 @@ def squeezed(
         rim = (seen.true_mask[[0, -1]], seen.true_mask[:, [0, -1]])
         press.steps.append(Step(frames, seen.true_area_px, seen.true_area_mm2, any(side.any() for side in rim)))
     return press
+
+
+def squeezed_with_masks(
+    kind: str, seed: int, options: PressOptions, *, bruised: bool = False
+) -> tuple[list[Image], list[Image], list[npt.NDArray[np.bool_]]]:
+    """The references, the steps' mean images and the true masks of a press, all at the working size."""
+    fruit, gel = replace(draw_fruit(kind, seed), bruised=bruised), Gel()
+    sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
+    on_gel = FruitOnGel(fruit, options.pose, gel)
+    references = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]
+    images: list[Image] = []
+    truths: list[npt.NDArray[np.bool_]] = []
+    for number, closing_mm in enumerate(CLOSINGS_MM):
+        seen = on_gel.pressed(Squeeze(fruit, gel, held_s=number * options.step_s).at(closing_mm))
+        began_s = options.references / FRAMES_PER_S + (number + 1) * options.step_s
+        frames = [
+            sensor.frame(seen.dent, began_s + k / FRAMES_PER_S, options.condition) for k in range(FRAMES_PER_STEP)
+        ]
+        images.append(working_image(mean_image(frames)))
+        shape = images[-1].shape
+        small = cv2.resize(np.asarray(seen.true_mask, np.uint8), (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+        truths.append(small > 127)
+    return [working_image(one) for one in references], images, truths
 
 
 def twin_presses(seed: int, kinds: Sequence[str], *, bruised: bool) -> Iterator[tuple[str, str, Press]]:

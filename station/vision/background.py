@@ -1,10 +1,10 @@
-"""What a frame differs from its reference by although nothing touches: light, exposure, warmth, streaks.
+"""Background model: what a frame differs from its reference by although nothing touches the gel.
 
-A drift is described by few numbers per channel: low cosines over the frame (LEDs and exposure drift smoothly), a
-gain on the reference, and a displacement of the reference's own pattern of light, which wanders as the gel warms and
-shears and leaves streaks along the beams' edges. They are fitted by iterated re-weighting (Tukey's biweight), so that
-a contact, which follows none of these, does not pull them; a prior on each keeps them from explaining a contact that
-covers the whole frame.
+Per colour the model is a sum of low cosines over the frame (LEDs and exposure drift smoothly), bands along the four
+borders (the gel as a whole is pushed towards its LEDs), a gain on the reference, and a displacement of the reference's
+own pattern of light. It is fitted by iterated re-weighting with Tukey's biweight (P. J. Huber, Robust Statistics,
+section 7.8), so that a contact, which follows none of these shapes, does not pull it. A normal prior on each
+coefficient keeps the model from explaining a contact; within a press the prior's mean is the last step's model.
 """
 
 from dataclasses import dataclass
@@ -13,128 +13,143 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Image
-from station.vision.working import capped, length_squared, resized
-
-SPREAD_CAP_LEVELS = 8.0
-"""A residual beyond this is no sensor's noise: either a contact or a frame that does not belong to the reference."""
+from station.vision.working import clipped, length_squared, resized
 
 _GRID_LONG_SIDE = 32
 _HIGHEST_COSINE = 4
-_PRIOR_COSINE_LEVELS = 10.0
-_PRIOR_GAIN = 0.1
-_PRIOR_DISPLACEMENT_PX = 2.0
-_CELL_NOISE_LEVELS = 2.0
-_LEAST_SPREAD_LEVELS = 0.5
 _ITERATIONS = 5
-_LEAST_BACKGROUND = 0.05
-_WELL_KNOWN, _LEAST_KNOWN, _KNOWN_POWER = 0.2, 0.05, 3
-"""The share of the frame that has to be background for the priors to hold as they are; with less they are drawn in."""
-_LATER_SHARE = 0.02
-"""What a place counts that the first guess took for contact, once the fit has reached it."""
+_LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
-_PATTERN_SIGMA_PX = 4.0
-_STREAK_PRIOR_SHARES, _STREAKS_WELL_KNOWN = (0.03, 0.1), 0.3
-"""Of a line's cells: a skirt must not pass for the offset of a line that a large contact leaves little of."""
 _STRIP_PX = 10
-_NO_PRIOR = 1e-3
 _MEDIAN_SIDE = 28
+_NO_PRIOR = 1e-3
+
+Coefficients = npt.NDArray[np.float32]
+"""A fitted model, shape (3, shapes, 1), dtype float32, one row for each colour."""
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
-    """The drift found in one frame."""
+class Background:
+    """The background found in one frame."""
 
     levels: FloatImage
     """What to take off the difference, shape (height, width, 3), grey levels."""
-    background: FloatImage
+    weight: FloatImage
     """How surely a place is background, shape (height, width), 0 to 1."""
+    share: float
+    """Mean of the weight: how much of the frame is background, 0 to 1. The one measure of that for every stage."""
     spread_levels: float
     """Median length over the channels of what the background still differs by."""
     strength_levels: float
-    """Root mean square of the drift over places and channels."""
+    """Root mean square of the model over places and channels."""
+    coefficients: Coefficients
+    """For the press's next step."""
+    load_levels: float
+    """Root mean square of what the frame differs by from the expected model: contact, and all that load changes."""
 
 
-class DriftModel:
-    """The drifts that a reference can undergo, prepared once."""
+class BackgroundModel:
+    """The changes of light that a reference can undergo, prepared once.
 
-    def __init__(self, reference: Image) -> None:
+    Args:
+        reference: at the working size, shape (height, width, 3), dtype uint8.
+        constants: priors and weights.
+        bands: whether bands along the borders are modelled.
+    """
+
+    def __init__(self, reference: Image, constants: Constants, *, bands: bool = True) -> None:
+        self._constants = constants
         height, width = reference.shape[:2]
         cell = max(height, width) / _GRID_LONG_SIDE
         self._size = (width, height)
         self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
         self._half = ((width + 1) // 2, (height + 1) // 2)
-        self._light = capped(reference)
-        pattern = cv2.GaussianBlur(self._light, (0, 0), _PATTERN_SIGMA_PX)
-        x = (np.arange(width, dtype=np.float32) + 0.5) / width
-        y = (np.arange(height, dtype=np.float32)[:, None] + 0.5) / height
+        self._light = clipped(reference)
+        pattern = cv2.GaussianBlur(self._light, (0, 0), constants.pattern_blur)
+        # Cosines and bands are products of a function of x and one of y: each is drawn as two short matrices.
         orders = [
             (i, j)
             for i in range(_HIGHEST_COSINE + 1)
             for j in range(_HIGHEST_COSINE + 1)
             if i * i + j * j <= _HIGHEST_COSINE**2
         ]
-        self._orders = np.array(orders).T
-        turns = np.pi * np.arange(_HIGHEST_COSINE + 1)
-        self._along, self._upward = (
-            np.cos(np.outer(turns, (np.arange(n) + 0.5) / n)).astype(np.float32) for n in self._half
-        )
-        cosines = [np.cos(np.pi * i * x) * np.cos(np.pi * j * y) for i, j in orders]
-        stretches = [np.broadcast_to(field, (height, width)) for field in (np.float32(1), 2 * x - 1, 2 * y - 1)]
+        count = _HIGHEST_COSINE + 1
+        places = [(i, j) for i, j in orders]
+        if bands:  # the functions after the cosines are a band at either end
+            places += [(count, 0), (count + 1, 0), (0, count), (0, count + 1)]
+        self._places = np.array(places).T
+        along, upward = (_profiles(side, constants.band_reach) for side in (width, height))
+        self._along, self._upward = (_profiles(side, constants.band_reach) for side in self._half)
+        separable = [np.outer(upward[j], along[i]) for i, j in places]
+        x, y = np.linspace(-1, 1, width, dtype=np.float32), np.linspace(-1, 1, height, dtype=np.float32)[:, None]
+        stretches = [np.broadcast_to(one, (height, width)) for one in (np.float32(1), x, y)]
         slopes = [cv2.Sobel(pattern, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
+        shared = [resized(shape, self._grid).ravel() for shape in separable]
         grids: list[FloatImage] = []
         for channel in range(3):
-            shapes = cosines + [slope[..., channel] * stretch for slope in slopes for stretch in stretches]
-            gained = resized(self._light[..., channel], self._grid)
-            coarse = [resized(shape, self._grid) for shape in shapes]
-            grids.append(np.stack([gained.ravel(), *(c.ravel() for c in coarse)], axis=1).astype(np.float32))
+            gained = resized(self._light[..., channel], self._grid).ravel()
+            moved = [
+                resized(slope[..., channel] * stretch, self._grid).ravel() for slope in slopes for stretch in stretches
+            ]
+            grids.append(np.stack([gained, *shared, *moved], axis=1).astype(np.float32))
         self._coarse: FloatImage = np.stack(grids)
         self._transposed: FloatImage = np.ascontiguousarray(self._coarse.transpose(0, 2, 1))
         self._slopes = [_rows(resized(np.asarray(slope, np.float32), self._half)) for slope in slopes]
         self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
         self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
         prior = [
-            _PRIOR_GAIN,
-            *(_PRIOR_COSINE_LEVELS / (1 + i * i + j * j) for i, j in orders),
-            *([_PRIOR_DISPLACEMENT_PX] * (len(slopes) * len(stretches))),
+            constants.gain_prior,
+            *(constants.cosine_prior / (1 + i * i + j * j) for i, j in orders),
+            *([constants.band_prior] * (len(places) - len(orders))),
+            *([constants.displacement_prior] * (len(slopes) * len(stretches))),
         ]
-        self._ridge = np.diag((_CELL_NOISE_LEVELS / np.array(prior)) ** 2)
+        self._ridge = np.diag((constants.cell_noise / np.array(prior)) ** 2).astype(np.float32)
 
-    def fit(self, difference: FloatImage, background: FloatImage) -> Drift:
-        """Find the drift in a frame.
+    def fit(self, difference: FloatImage, first_guess: FloatImage, before: Coefficients | None = None) -> Background:
+        """Find the background of a frame.
 
         Args:
             difference: frame minus reference, shape (height, width, 3), float32, grey levels.
-            background: a first guess of where nothing touches, any size, float32, 0 to 1.
+            first_guess: where nothing touches, any size, float32, 0 to 1.
+            before: the press's last step; the model is then expected to have changed little.
         """
+        p = self._constants
         samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
-        weight = resized(background, self._grid).ravel()
-        trust = _LATER_SHARE + (1 - _LATER_SHARE) * weight
-        known = float(np.clip(weight.mean() / _WELL_KNOWN, _LEAST_KNOWN, 1))
-        ridge = self._ridge / known**_KNOWN_POWER
-        spread = 0.0
-        coefficients = np.zeros((3, self._coarse.shape[2], 1), np.float32)
+        expected = np.zeros((3, self._coarse.shape[2], 1), np.float32) if before is None else before
+        # The fit is of what has changed since the expected model, so that the prior draws towards that model.
+        expected_levels = (self._coarse @ expected)[..., 0]
+        samples -= expected_levels
+        load = float(np.sqrt(np.mean(samples**2)))
+        weight = resized(first_guess, self._grid).ravel()
+        trust = p.late_weight + (1 - p.late_weight) * weight
+        # The less background there is, the more of a contact's own slopes the shapes could explain.
+        known = float(np.clip(weight.mean() / p.known_share, _LEAST_KNOWN, 1))
+        ridge = self._ridge / known**3
+        spread = p.most_spread / 2
+        change = np.zeros_like(expected)
         fitted = np.zeros_like(samples)
         for _ in range(_ITERATIONS):
             weighted = self._transposed * weight
-            normal = weighted @ self._coarse + ridge
-            coefficients = np.linalg.solve(normal, weighted @ samples[..., None]).astype(np.float32)
-            fitted = (self._coarse @ coefficients)[..., 0]
+            change = np.linalg.solve(weighted @ self._coarse + ridge, weighted @ samples[..., None]).astype(np.float32)
+            fitted = (self._coarse @ change)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
-            spread = SPREAD_CAP_LEVELS / 2
-            if weight.sum() >= _LEAST_BACKGROUND * weight.size:
-                spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, SPREAD_CAP_LEVELS))
+            if weight.sum() >= _LEAST_KNOWN * weight.size:
+                spread = float(np.clip(weighted_median(residual, weight), p.least_spread, p.most_spread))
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
-        levels = self._levels(coefficients[..., 0])
-        strength = float(np.sqrt(np.mean(fitted**2)))
-        certain = np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32)
-        return Drift(levels, resized(certain, self._size), spread, strength)
+        coefficients = expected + change
+        strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
+        certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._size)
+        return Background(
+            self._drawn(coefficients[..., 0]), certain, float(weight.mean()), spread, strength, coefficients, load
+        )
 
-    def _levels(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
-        """The drift at the reference's size: its smooth parts drawn at half of it and enlarged, its gain exactly."""
-        end = 1 + self._orders.shape[1]
-        waves = np.zeros((3, _HIGHEST_COSINE + 1, _HIGHEST_COSINE + 1), np.float32)
-        waves[:, self._orders[1], self._orders[0]] = coefficients[:, 1:end]
+    def _drawn(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
+        """The model at the reference's size: its smooth parts drawn at half of it and enlarged, its gain exactly."""
+        end = 1 + self._places.shape[1]
+        waves = np.zeros((3, len(self._upward), len(self._along)), np.float32)
+        waves[:, self._places[1], self._places[0]] = coefficients[:, 1:end]
         lines = self._upward.T @ _rows((waves @ self._along).transpose(1, 2, 0))
         for number, slope in enumerate(self._slopes):
             displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
@@ -145,13 +160,20 @@ class DriftModel:
         return levels
 
 
+def _profiles(length: int, band_reach: float) -> npt.NDArray[np.float32]:
+    """Cosines from the constant one on, then a band at the beginning and one at the end, shape (7, length)."""
+    place = (np.arange(length) + 0.5) / length
+    cosines = np.cos(np.outer(np.pi * np.arange(_HIGHEST_COSINE + 1), place))
+    return np.concatenate([cosines, np.exp(-np.stack([place, 1 - place]) / band_reach)]).astype(np.float32)
+
+
 def _rows(image: FloatImage) -> FloatImage:
     """The image with a row's colours side by side, which numpy goes through much faster; a view."""
     return image.reshape(len(image), -1)
 
 
-def without_bands(difference: FloatImage) -> FloatImage:
-    """The difference with each column's median taken off: good enough to tell a band from a contact.
+def without_column_medians(difference: FloatImage) -> FloatImage:
+    """The difference without each column's median, in which a band of light is no curvature.
 
     Args:
         difference: shape (height, width, 3), grey levels.
@@ -159,36 +181,38 @@ def without_bands(difference: FloatImage) -> FloatImage:
     return difference - np.median(difference[:: max(1, len(difference) // _MEDIAN_SIDE)], axis=0)
 
 
-def without_streaks(change: FloatImage, background: FloatImage) -> FloatImage:
+def destriped(change: FloatImage, background: FloatImage, constants: Constants) -> FloatImage:
     """Take each column's and then each row's offset over its background off the change, in place.
 
-    An offset is a mean that weights down what departs from it (Tukey's biweight), so that a contact's skirt does not
+    An offset is a mean that weights down what departs from it (Tukey's biweight), so that a contact's halo does not
     pull it; a line of which little is background is corrected by less.
 
     Args:
         change: shape (height, width, 3), grey levels.
         background: any size, 0 to 1.
+        constants: the prior of an offset.
 
     Returns:
         The change.
     """
     height, width = change.shape[:2]
     across, down = max(1, width // _STRIP_PX), max(1, height // _STRIP_PX)
-    columns = _offsets(resized(change, (width, down)), resized(background, (width, down)), 0)
+    columns = _offsets(resized(change, (width, down)), resized(background, (width, down)), 0, constants)
     strips = resized(change, (across, height)) - resized(columns, (across, 1))
-    rows = _offsets(strips, resized(background, (across, height)), 1)
+    rows = _offsets(strips, resized(background, (across, height)), 1, constants)
     lines = _rows(change)
     lines -= columns.reshape(1, -1)
     change -= cv2.resize(rows, (width, height), interpolation=cv2.INTER_NEAREST)
     return change
 
 
-def _offsets(strips: FloatImage, background: FloatImage, axis: int) -> FloatImage:
+def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: Constants) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
-    known = max(float(background.mean()) / _STREAKS_WELL_KNOWN, _LEAST_KNOWN)
-    prior = strips.shape[axis] * float(np.clip(_STREAK_PRIOR_SHARES[0] / known**_KNOWN_POWER, *_STREAK_PRIOR_SHARES))
+    # Twice as many strips as the known share have to be background before a line's own mean is believed.
+    known = np.clip(float(background.mean()) / constants.known_share, _LEAST_KNOWN, 1)
+    prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
-    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
+    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), constants.least_spread**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)
 
@@ -225,3 +249,15 @@ def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.flo
     if cumulated[-1] <= 0:
         return 0.0
     return float(values[order[cumulated.searchsorted(cumulated[-1] / 2)]])
+
+
+def quantile(values: npt.NDArray[np.floating], share: float) -> float:
+    """The value below which a share of all lies, of those that occur.
+
+    Args:
+        values: any shape, not empty.
+        share: 0 to 1.
+    """
+    values = values.ravel()
+    place = int(share * (values.size - 1))
+    return float(np.partition(values, place)[place])

@@ -1,4 +1,4 @@
-"""Where contacts may lie: where the gel bends or has moved, one region for each contact."""
+"""Contact candidates: where the gel curves or has moved, one region for each contact."""
 
 from typing import NamedTuple
 
@@ -6,21 +6,21 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.vision.background import quantile
 from station.vision.clusters import boundaries
+from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
-from station.vision.region import Movement, level_of, quantile
+from station.vision.region import Movement, level_of
 
 _FOOT_SHARE = 0.5
-_WINDOW_PX = 3.0
+"""Of the detection threshold: a candidate's foot is never lower."""
 _LOW_QUANTILE = 0.3
-_SHARE_OF_LOW = 0.5
 _STRONG_SHARE = 0.6
 _BESIDE = (0.85, 1.3)
 _OVER_SPREAD = 3.0
-_BRIDGE_PX = 9
 _OWN_SHARE = 0.35
 _LEAST = 0.01
-_LIGHT_RADIUS_PX = 7
+_WEAK_RADIUS_PX = 7
 _NECKS = (0.4, 0.55, 0.7, 0.8)
 _NECK_DEPTH = 0.12
 
@@ -29,50 +29,53 @@ class Candidates(NamedTuple):
     """Where contacts may lie, and what says so."""
 
     regions: list[Mask]
-    """Of the bending's shape, 0 or 1; the most likely first."""
+    """Of the curvature's shape, 0 or 1; the most likely first."""
     clustered: FloatImage
-    """The quantity whose clusters are asked for: the change's level, or the bending."""
+    """The quantity whose clusters are asked for: the change's level, or the curvature."""
     levels: list[float]
     """What parts its clusters, ascending."""
 
 
-def body_candidates(moved: Movement, bend: FloatImage, threshold: float) -> Candidates:
-    """Where one body may lie: what has moved clear of the noise, or bends enough to open the gate.
+def body_candidates(moved: Movement, threshold: float, constants: Constants) -> Candidates:
+    """Where one body may lie: what has moved clear of the noise, or curves enough to reach the threshold.
 
-    A place has moved from half of what the bent places mostly reach on, or from the cluster boundary next to that.
+    A place has moved from half of what the curved places mostly reach on, or from the cluster boundary next to that.
 
     Args:
-        moved: from `body.movement`, of the bending's size.
-        bend: shape (height, width), grey levels per pixel.
-        threshold: the gate's, grey levels per pixel; each region reaches it.
+        moved: from `region.movement`.
+        threshold: the detection threshold, grey levels per pixel; each region reaches it.
+        constants: window, share and the gaps that are bridged.
     """
-    level, spread = level_of(moved, _WINDOW_PX)
+    curvature = moved.curvature
+    level, spread = level_of(moved, constants.level_window)
     levels = _levels(level, max(spread, _LEAST))
-    strongest = float(bend.max())
+    strongest = float(curvature.max())
     if strongest <= threshold:
         return Candidates([], level, levels)
-    strong = level[bend > min(threshold, _STRONG_SHARE * strongest)]
-    wanted = _SHARE_OF_LOW * quantile(strong, _LOW_QUANTILE)
+    strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
+    wanted = constants.candidate_share * quantile(strong, _LOW_QUANTILE)
     beside = [cut for cut in levels if _BESIDE[0] * wanted < cut < _BESIDE[1] * wanted]
     lowest = max(_OVER_SPREAD * spread, min(beside, key=lambda cut: abs(np.log(cut / wanted)), default=wanted))
-    seen = ((level > lowest) | (bend > threshold)).astype(np.uint8)
-    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_BRIDGE_PX, _BRIDGE_PX))
-    framed = cv2.copyMakeBorder(seen, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, _BRIDGE_PX, cv2.BORDER_CONSTANT)
-    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[_BRIDGE_PX:-_BRIDGE_PX, _BRIDGE_PX:-_BRIDGE_PX]
-    found = [part for part in _parts(np.asarray(bridged, np.uint8)) if bend[part > 0].max() > threshold]
+    seen = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
+    gap = round(constants.bridge)
+    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (gap, gap))
+    framed = cv2.copyMakeBorder(seen, gap, gap, gap, gap, cv2.BORDER_CONSTANT)
+    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[gap:-gap, gap:-gap]
+    found = [part for part in _parts(np.asarray(bridged, np.uint8)) if curvature[part > 0].max() > threshold]
     return Candidates(_heaviest_first(level, found), level, levels)
 
 
-def around(place: tuple[int, int], moved: Movement) -> Candidates:
-    """Where a touch that is too light to bend the gel clear of the noise may lie: a small disc around its place.
+def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Candidates:
+    """Where a contact too weak to curve the gel clear of the noise may lie: a small disc around its place.
 
     Args:
         place: x and y, px of the movement.
-        moved: from `body.movement`.
+        moved: from `region.movement`.
+        constants: the level's window.
     """
-    level, spread = level_of(moved, _WINDOW_PX)
+    level, spread = level_of(moved, constants.level_window)
     shape = (level.shape[0], level.shape[1])
-    return Candidates([disc(shape, place, _LIGHT_RADIUS_PX)], level, _levels(level, max(spread, _LEAST)))
+    return Candidates([disc(shape, place, _WEAK_RADIUS_PX)], level, _levels(level, max(spread, _LEAST)))
 
 
 def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask:
@@ -87,25 +90,25 @@ def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask
     return np.asarray(cv2.circle(empty, place, radius_px, color=1, thickness=cv2.FILLED), np.uint8)
 
 
-def separate_candidates(bend: FloatImage, threshold: float) -> Candidates:
+def separate_candidates(curvature: FloatImage, threshold: float) -> Candidates:
     """Where several contacts may lie, each for itself.
 
-    Of each region counts what bends at least about a third as much as its own strongest place, so that a strong
+    Of each region counts what curves at least about a third as much as its own strongest place, so that a strong
     neighbour does not hide a weak contact; what narrow necks join is parted.
 
     Args:
-        bend: shape (height, width), grey levels per pixel.
-        threshold: the gate's, grey levels per pixel.
+        curvature: shape (height, width), grey levels per pixel.
+        threshold: the detection threshold, grey levels per pixel.
     """
-    levels = _levels(bend, _LEAST)
+    levels = _levels(curvature, _LEAST)
     pieces: list[Mask] = []
-    for whole in _parts((bend > _foot(levels, threshold)).astype(np.uint8)):
-        peak = float(bend[whole > 0].max())
+    for whole in _parts((curvature > _foot(levels, threshold)).astype(np.uint8)):
+        peak = float(curvature[whole > 0].max())
         if peak > threshold:
-            for part in _parts(whole * (bend > _OWN_SHARE * peak)):
-                if bend[part > 0].max() > threshold:
+            for part in _parts(whole * (curvature > _OWN_SHARE * peak)):
+                if curvature[part > 0].max() > threshold:
                     pieces += _split_at_necks(part)
-    return Candidates(_heaviest_first(bend * bend, pieces), bend, levels)
+    return Candidates(_heaviest_first(curvature * curvature, pieces), curvature, levels)
 
 
 def _levels(field: FloatImage, least: float) -> list[float]:

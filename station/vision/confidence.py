@@ -1,18 +1,17 @@
-"""How far the image supports an area."""
+"""Confidence: how far the image supports an area."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from station.vision.background import thinned, weighted_median
+from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage
 from station.vision.contour import Edge
 
-_RELIABLE_RATIO = 4.0
-_VISIBLE_RATIO = 2.0
-_WELL_SEEN = 0.25
-LEAST_NOISE_LEVELS = 0.1
-_NORMAL_OF_MEDIAN = 1.4826
+_LEAST_NOISE_LEVELS = 0.1
+_PER_SPREAD = 10.0
+"""An agreement is one half where the frames' areas spread by a tenth."""
 
 
 def background_spread(signal: FloatImage, background: FloatImage) -> float:
@@ -24,10 +23,10 @@ def background_spread(signal: FloatImage, background: FloatImage) -> float:
     """
     signal, background = thinned(signal), thinned(background)
     middle = weighted_median(signal, background)
-    return _NORMAL_OF_MEDIAN * weighted_median(np.abs(signal - middle), background)
+    return NORMAL_OF_MEDIAN * weighted_median(np.abs(signal - middle), background)
 
 
-def edge_confidence(edge: Edge, noise_levels: float) -> float:
+def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> float:
     """Signal to noise across the edge times the share of the edge that is seen to fall, 0 to 1.
 
     The first factor is q²/(q² + 4²) of the median drop q in units of the noise; the second is the share of the seen
@@ -37,14 +36,15 @@ def edge_confidence(edge: Edge, noise_levels: float) -> float:
     Args:
         edge: with its drops in grey levels.
         noise_levels: from `background_spread`.
+        constants: the three ratios.
     """
     if not edge.seen.any():
         return 0.0
-    ratio = edge.drop_levels[edge.seen] / max(noise_levels, LEAST_NOISE_LEVELS)
+    ratio = edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)
     signal = max(0.0, float(np.median(ratio)))
-    support = float(np.mean(ratio >= _VISIBLE_RATIO))
-    told = min(1.0, float(np.mean(edge.seen)) / _WELL_SEEN)
-    return told * support * signal**2 / (signal**2 + _RELIABLE_RATIO**2)
+    support = float(np.mean(ratio >= constants.visible_ratio))
+    seen = min(1.0, float(np.mean(edge.seen)) / constants.well_seen)
+    return seen * support * signal**2 / (signal**2 + constants.reliable_ratio**2)
 
 
 def agreement(areas: Sequence[float]) -> float:
@@ -63,4 +63,4 @@ def agreement(areas: Sequence[float]) -> float:
     middle = float(np.median(areas))
     if middle <= 0:
         return 1.0 if max(areas) <= 0 else 0.0
-    return 1.0 / (1.0 + 10.0 * float(np.median(np.abs(np.asarray(areas) - middle))) / middle)
+    return 1.0 / (1.0 + _PER_SPREAD * float(np.median(np.abs(np.asarray(areas) - middle))) / middle)

@@ -1,7 +1,7 @@
 """What a measurement method says about one image."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
@@ -60,6 +60,8 @@ class Contact:
     """Found by its slopes only, as a touch lighter than drift: its area is rough."""
     changed_area_px: int | None = None
     """The second witness: how much of the image has changed, px; None where the method does not say."""
+    trace: object = field(default=None, repr=False, compare=False)
+    """What the method takes over from here to the press's next step; for the method alone."""
 
     @property
     def found(self) -> bool:
@@ -104,6 +106,7 @@ def contact_from_mask(
     drift_levels: float | None = None,
     is_light: bool = False,
     changed_area_px: int | None = None,
+    trace: object = None,
 ) -> Contact:
     """Measure a mask: its area and centroid, with the flags that follow from it added.
 
@@ -115,6 +118,7 @@ def contact_from_mask(
         drift_levels: as in `Contact`.
         is_light: as in `Contact`.
         changed_area_px: as in `Contact`.
+        trace: as in `Contact`.
     """
     area_px = cv2.countNonZero(mask)
     if area_px == 0:
@@ -125,4 +129,4 @@ def contact_from_mask(
     centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)
     if left == 0 or top == 0 or left + width == mask.shape[1] or top + height == mask.shape[0]:
         flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light, changed_area_px)
+    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light, changed_area_px, trace)

@@ -1,39 +1,119 @@
-"""The contact's edge: where the change falls off most steeply on rays from the contact's middle.
+"""Contour by polar dynamic programming: where the change falls off most steeply on rays from the contact's middle.
 
-The change's length grows from the flat centre to the contact's edge and falls in the skirt of gel around it; the
+The change's length grows from the flat centre to the contact's edge and falls in the halo of gel around it; the
 steepest fall marks the edge. On each ray the length is first replaced by the largest further out, so that the fall
 towards the flat centre is none. The steepest closed path over all rays that does not jump is found by dynamic
-programming (Viterbi), twice: about the bending's middle and about the first path's.
+programming (Viterbi), twice: about the region's middle and about the first path's.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
+from station.vision.working import length_squared
 
 RAYS = 64
 _STEPS = 64
 _FIRST_SPAN = (0.3, 1.2)
 _SECOND_SPAN = (0.6, 1.4)
-_HIGHEST_HARMONIC = 3.0
 _LONGEST_JUMP = 2
-_STRONG_QUANTILE = 0.75
-_LEAST_STEEPNESS = 0.4
-_LEAST_FALL_LEVELS = 1e-3
-_CHORD_SHARE, _CHORD_IN_CORNER = 0.65, 0.4
-"""Of a region's extent along the border, from which on its middle is near that border, or that corner."""
-_WHOLE_FALL, _WHOLE_AREA = 0.68, 0.55
-"""An edge that lies in the image is the contact's own when it falls on the mean by this share of a strong fall, and
-encloses more than this share of what the completed one does."""
 _SIDE_SHARE = 0.15
-_REACH_STEP_PX = 2
+"""Of the radius: on either side of the edge, where the drop across it is read."""
+_ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
+"""Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
+_HALF_FROM_PX = 2.0
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
-COSINES, SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+_CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+
+
+class Rays(NamedTuple):
+    """Sixty-four rays from a body's middle, stretched along it where it is long."""
+
+    middle: tuple[float, float]
+    """x and y, px."""
+    axes: _Floats
+    """Shape (2, 2), of determinant 1: takes a circle to an ellipse that is as long as the body."""
+
+    @classmethod
+    def about(cls, mask: Mask) -> Self:
+        """The rays of a region.
+
+        Args:
+            mask: shape (height, width), 0 or not, not empty.
+        """
+        moments = cv2.moments(mask, binaryImage=True)
+        middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
+        (xx, xy, yy) = (moments[f"mu{order}"] / moments["m00"] for order in ("20", "11", "02"))
+        values, vectors = np.linalg.eigh(np.array([[xx + 1, xy], [xy, yy + 1]]))
+        aspect = float(np.interp(np.sqrt(values[1] / values[0]), _ASPECTS, _STRETCHES))
+        axes = vectors @ np.diag([aspect**-0.5, aspect**0.5]) @ vectors.T
+        return cls(middle, axes)
+
+    def reach(self, mask: Mask) -> float:
+        """The radius of a circle of a region's area, in the rays' unit, at least 3.
+
+        Args:
+            mask: 0 or not.
+        """
+        return max(3.0, float(np.sqrt(cv2.countNonZero(mask) / np.pi)))
+
+    def places(self, away: _Floats, every: int = 1) -> tuple[FloatImage, FloatImage]:
+        """The places at some distances on the rays.
+
+        Args:
+            away: in the rays' unit, shape (steps,) or (rays, steps).
+            every: of the rays, each so-manieth.
+
+        Returns:
+            x and y, each of shape (rays, steps), dtype float32, px.
+        """
+        across, down = self.axes @ _CIRCLE[:, ::every]
+        x, y = self.middle[0] + across[:, None] * away, self.middle[1] + down[:, None] * away
+        return x.astype(np.float32), y.astype(np.float32)
+
+    def points(self, radii: _Floats) -> _Floats:
+        """The point at one distance on each ray, shape (64, 2).
+
+        Args:
+            radii: shape (64,), in the rays' unit.
+        """
+        return self.middle + (self.axes @ (_CIRCLE * radii)).T
+
+    def scaled(self, scale: tuple[float, float]) -> Self:
+        """The same rays in an image of another size; distances grow by the first factor.
+
+        Args:
+            scale: of that size over this, along x and y, nearly equal.
+        """
+        middle = ((self.middle[0] + 0.5) * scale[0] - 0.5, (self.middle[1] + 0.5) * scale[1] - 0.5)
+        return self._replace(middle=middle)
+
+    def moved_to(self, points: _Floats, shape: tuple[int, int]) -> tuple[Self, _Floats]:
+        """Rays from the middle of a closed line, and that line's distances on them.
+
+        Args:
+            points: shape (64, 2), px.
+            shape: height and width of the image, in which the middle stays.
+        """
+        moments = cv2.moments(points.astype(np.float32))
+        if moments["m00"] <= 0:
+            return self, np.hypot(*(np.linalg.inv(self.axes) @ (points - self.middle).T))
+        middle = (
+            float(np.clip(moments["m10"] / moments["m00"], 0, shape[1] - 1)),
+            float(np.clip(moments["m01"] / moments["m00"], 0, shape[0] - 1)),
+        )
+        across, down = np.linalg.inv(self.axes) @ (points - middle).T
+        angles = np.arctan2(down, across)
+        order = np.argsort(angles)
+        radii = np.interp(_ANGLES, angles[order], np.hypot(across, down)[order], period=2 * np.pi)
+        return self._replace(middle=middle), radii
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,142 +128,103 @@ class Edge:
     """Shape (64,): by how much the change falls across the edge there, grey levels."""
 
 
-def find_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
-    """Find the edge of the contact in a region; a contact that the border cuts is completed by its mirror image.
+def change_length(change: FloatImage, half: FloatImage, radius_px: float, constants: Constants) -> FloatImage:
+    """The change's length over the channels, smoothed as far as a contact of that size allows.
 
     Args:
-        length: length of the change over the channels, shape (height, width), grey levels.
-        region: where the contact lies, skirt and all, shape (height, width), 0 or not.
-        middle: x and y from which the region is star-shaped, px.
-        stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
+        change: without background, shape (height, width, 3), grey levels.
+        half: the same averaged down to half the size.
+        radius_px: of a circle of the region's area, at the change's size.
+        constants: how far.
+
+    Returns:
+        Shape (height, width), grey levels.
     """
-    edge = _closed_edge(length, region, middle, stiffness)
-    left, top, right, bottom = _mirrored(region)
-    if not (left or top or right or bottom):
-        return edge
-    height, width = length.shape
-    sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
-    length = np.asarray(cv2.copyMakeBorder(length, *sides), np.float32)
-    region = np.asarray(cv2.copyMakeBorder(region, *sides), np.uint8)
-    moments = cv2.moments(region, binaryImage=True)
-    middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
-    completed = _closed_edge(length, region, middle, stiffness)
-    points = completed.points - (left, top)
-    completed = Edge(points, _in_image(points, height, width), completed.drop_levels)
-    return edge if _is_whole(edge, completed, height, width) else completed
-
-
-def _closed_edge(length: FloatImage, region: Mask, middle: tuple[float, float], stiffness: float) -> Edge:
-    height, width = length.shape
-    radius = _smooth(_reach(region, middle))
-    radius, _ = _steepest(length, middle, radius, _FIRST_SPAN, stiffness)
-    points = _points(middle, radius)
-    moments = cv2.moments(points.astype(np.float32))
-    if moments["m00"] > 0:
-        centre = (
-            float(np.clip(moments["m10"] / moments["m00"], 0, width - 1)),
-            float(np.clip(moments["m01"] / moments["m00"], 0, height - 1)),
-        )
-        away = points - centre
-        angle = np.arctan2(away[:, 1], away[:, 0])
-        order = np.argsort(angle)
-        again = np.interp(_ANGLES, angle[order], np.hypot(away[:, 0], away[:, 1])[order], period=2 * np.pi)
-        middle, radius = centre, _smooth(again)
-    radius, drop = _steepest(length, middle, radius, _SECOND_SPAN, stiffness)
-    points = _points(middle, radius)
-    return Edge(points, _in_image(points, height, width), drop)
-
-
-def _in_image(points: _Floats, height: int, width: int) -> npt.NDArray[np.bool_]:
-    return (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
-
-
-def _is_whole(edge: Edge, completed: Edge, height: int, width: int) -> bool:
-    """Whether an edge lies in the image and falls all around, so that the border cuts no more than the skirt.
-
-    On the way to a cut contact's flat centre the change falls by less, or what falls is a part of the contact.
-    """
-    if not edge.seen.all():
-        return False
-    drops = (edge.drop_levels, completed.drop_levels[completed.seen])
-    strong = float(np.quantile(np.concatenate(drops), _STRONG_QUANTILE))
-    if np.clip(edge.drop_levels / max(strong, _LEAST_FALL_LEVELS), 0, 1).mean() < _WHOLE_FALL:
-        return False
-    return _area(edge.points, height, width) > _WHOLE_AREA * _area(completed.points, height, width)
-
-
-def _area(points: _Floats, height: int, width: int) -> int:
-    mask = np.zeros((height, width), np.uint8)
-    return cv2.countNonZero(cv2.fillPoly(mask, [np.rint(points).astype(np.int32)], 1))
-
-
-def _mirrored(region: Mask) -> tuple[int, int, int, int]:
-    """By how much to continue the image beyond its left, upper, right and lower border with its mirror image, px.
-
-    A contact with its middle near the border or beyond it shows part of its edge only, and the way to its flat centre
-    falls like an edge. With its mirror image it is closed. One that reaches opposite borders fills the field instead.
-    """
-    _, _, width, height = cv2.boundingRect(region)
-    sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
-    chords = np.array([np.count_nonzero(side) for _, side in sides]) / (height, width, height, width)
-    if (np.minimum(chords, np.roll(chords, 2)) > 0).any():
-        return 0, 0, 0, 0
-    in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > _CHORD_IN_CORNER
-    near = chords > np.where(in_corner, _CHORD_IN_CORNER, _CHORD_SHARE)
-    left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
-    return left, top, right, bottom
-
-
-def _points(middle: tuple[float, float], radius: _Floats) -> _Floats:
-    return np.stack([middle[0] + COSINES * radius, middle[1] + SINES * radius], axis=1)
-
-
-def _reach(region: Mask, middle: tuple[float, float]) -> _Floats:
-    """How far the region reaches on each ray; beyond the border as far as it does elsewhere."""
-    height, width = region.shape
-    steps = np.arange(1.0, np.hypot(height, width), _REACH_STEP_PX)
-    x, y = middle[0] + COSINES[:, None] * steps, middle[1] + SINES[:, None] * steps
-    inside = (x >= -0.5) & (y >= -0.5) & (x <= width - 0.5) & (y <= height - 0.5)
-    values = cv2.remap(
-        region, x.astype(np.float32), y.astype(np.float32), cv2.INTER_NEAREST, None, cv2.BORDER_REPLICATE
+    sigma = float(
+        np.clip(constants.contour_blur * radius_px, constants.contour_blur_least, constants.contour_blur_most)
     )
-    reach = np.where((values > 0) & inside, steps, 2.0).max(axis=1)
-    cut = reach >= np.where(inside, steps, 0).max(axis=1) - 1.5
-    if cut.any() and not cut.all():
-        reach[cut] = np.maximum(reach[cut], np.median(reach[~cut]))
-    return reach
+    if sigma < _HALF_FROM_PX:
+        smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
+        return np.asarray(cv2.sqrt(length_squared(smooth)), np.float32)
+    # So much smoothing leaves nothing that half the size does not show.
+    length = cv2.sqrt(length_squared(np.asarray(cv2.GaussianBlur(half, (0, 0), sigma / 2), np.float32)))
+    size = (change.shape[1], change.shape[0])
+    return np.asarray(cv2.resize(length, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _smooth(radius: _Floats) -> _Floats:
-    spectrum = np.fft.rfft(radius)
-    spectrum *= np.exp(-0.5 * (np.arange(spectrum.size) / _HIGHEST_HARMONIC) ** 2)
+def find_edge(
+    length: FloatImage, rays: Rays, radii: _Floats, stiffness: float, constants: Constants, floor: Mask | None = None
+) -> Edge:
+    """Find the edge of the contact in a region.
+
+    Args:
+        length: from `change_length`, shape (height, width), grey levels.
+        rays: the region's, at that size.
+        radii: how far the region reaches on them, shape (64,).
+        stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
+        constants: what is a steep fall.
+        floor: what surely lies within the edge, 0 or not.
+    """
+    shape = (length.shape[0], length.shape[1])
+    seen = inside_image(rays.points(radii), shape)
+    if seen.any() and not seen.all():  # beyond the border the region says nothing: as far as it reaches elsewhere
+        radii = np.where(seen, radii, np.maximum(radii, np.median(radii[seen])))
+    radii = _smooth(radii, constants.highest_harmonic)
+    radii, _ = _steepest(length, rays, radii, _FIRST_SPAN, stiffness, constants, floor)
+    rays, radii = rays.moved_to(rays.points(radii), shape)
+    radii = _smooth(radii, constants.highest_harmonic)
+    radii, drop = _steepest(length, rays, radii, _SECOND_SPAN, stiffness, constants, floor)
+    points = rays.points(radii)
+    return Edge(points, inside_image(points, shape), drop)
+
+
+def inside_image(points: _Floats, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
+    """Which points lie in an image.
+
+    Args:
+        points: shape (n, 2), x and y, px.
+        shape: the image's height and width.
+    """
+    return (points >= 0).all(axis=1) & (points[:, 0] <= shape[1] - 1) & (points[:, 1] <= shape[0] - 1)
+
+
+def _smooth(radii: _Floats, highest_harmonic: float) -> _Floats:
+    spectrum = np.fft.rfft(radii)
+    spectrum *= np.exp(-0.5 * (np.arange(spectrum.size) / highest_harmonic) ** 2)
     return np.maximum(np.fft.irfft(spectrum, RAYS), 1.0)
 
 
 def _steepest(
-    length: FloatImage, middle: tuple[float, float], radius: _Floats, span: tuple[float, float], stiffness: float
+    length: FloatImage,
+    rays: Rays,
+    radii: _Floats,
+    span: tuple[float, float],
+    stiffness: float,
+    constants: Constants,
+    floor: Mask | None,
 ) -> tuple[_Floats, _Floats]:
     """The radius of the steepest path and the drop across it, per ray."""
     height, width = length.shape
     shares = np.linspace(*span, _STEPS)
-    away = radius[:, None] * shares
-    x, y = middle[0] + COSINES[:, None] * away, middle[1] + SINES[:, None] * away
-    profile = cv2.remap(
-        length, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
-    )
+    x, y = rays.places(radii[:, None] * shares)
+    profile = cv2.remap(length, x, y, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+    # The largest further out: on the way to the flat centre nothing falls.
     profile = np.maximum.accumulate(profile[:, ::-1], axis=1)[:, ::-1]
     fall = np.zeros_like(profile)
     np.subtract(profile[:, :-2], profile[:, 2:], out=fall[:, 1:-1])
     fall[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
+    if floor is not None:
+        fall[cv2.remap(floor, x, y, cv2.INTER_NEAREST, None, cv2.BORDER_CONSTANT) > 0] = 0
     steepest = np.sort(fall.max(axis=1))
     steepest = steepest[steepest > 0]
-    strong = steepest[int(_STRONG_QUANTILE * (steepest.size - 1))] if steepest.size else 1.0
-    reward = np.maximum(np.minimum(fall * (1 / strong), 1) - _LEAST_STEEPNESS, 0) * (1 / (1 - _LEAST_STEEPNESS))
+    strong = steepest[int(constants.strong_quantile * (steepest.size - 1))] if steepest.size else 1.0
+    least = constants.least_steepness
+    reward = np.maximum(np.minimum(fall * (1 / strong), 1) - least, 0) * (1 / (1 - least))
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
-    rays = np.arange(RAYS)
-    drop = profile[rays, np.maximum(path - side, 0)] - profile[rays, np.minimum(path + side, _STEPS - 1)]
-    return radius * shares[path], drop.astype(np.float64)
+    each = np.arange(RAYS)
+    drop = profile[each, np.maximum(path - side, 0)] - profile[each, np.minimum(path + side, _STEPS - 1)]
+    return radii * shares[path], drop.astype(np.float64)
 
 
 def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray[np.intp]:

@@ -1,8 +1,8 @@
-"""Crumbs on the gel: dents that the reference shows too, which a contact hides or moves about.
+"""Debris on the gel: dents that the reference shows too, which a contact hides or moves about.
 
-Under a contact a crumb's own pattern is missing from the frame, so the change shows the crumb although nothing of it
-is new. Where the change is shorter with that pattern given back, the crumb is hidden, and that is taken. Where it is
-not, the crumb still stands out, its slope has not changed, and the place says nothing: it is filled from around.
+Under a contact a particle's own pattern is missing from the frame, so the change shows the particle although nothing of
+it is new. Where the change is shorter with that pattern given back, the particle is hidden, and that is taken. Where it
+is not, the particle still stands out, its slope has not changed, and the place says nothing: it is filled from around.
 """
 
 import cv2
@@ -14,17 +14,17 @@ from station.vision.working import length_squared, resized
 
 _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
 _LEAST_LEVELS = 10.0
-"""Of what is fine in the reference: without crumbs it reaches 6 on the twin and 8 on the real presses' reference."""
-_RING_PX, _SKIRT_PX = 9, 5
+"""Of what is fine in the reference: without debris it reaches 6 on the twin and 8 on the real presses' reference."""
+_RING_PX, _HALO_PX = 9, 5
 _LONGEST_PX = 40
-"""At half the working size, about 4 mm, two crumbs side by side: what is longer is the edge of a beam of light."""
+"""At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
 _LEAST_SEEN = 1e-3
 
 
-class Crumbs:
-    """The crumbs on one reference.
+class Debris:
+    """The debris on one reference.
 
     Args:
         light: the reference at the working size, shape (height, width, 3), grey levels.
@@ -39,9 +39,9 @@ class Crumbs:
         for axis in (0, 1):
             fine -= np.median(fine, axis=axis, keepdims=True)
         length = cv2.GaussianBlur(cv2.sqrt(length_squared(fine)), (0, 0), _LENGTH_PX)
-        ring, skirt = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_RING_PX, _SKIRT_PX))
+        ring, halo = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_RING_PX, _HALO_PX))
         seen = cv2.morphologyEx((length > _LEAST_LEVELS).astype(np.uint8), cv2.MORPH_CLOSE, ring)
-        _, labels, boxes, _ = cv2.connectedComponentsWithStats(cv2.dilate(seen, skirt))
+        _, labels, boxes, _ = cv2.connectedComponentsWithStats(cv2.dilate(seen, halo))
         longest = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
         seen = ((labels > 0) & (longest <= _LONGEST_PX)[labels]).astype(np.uint8)
         self.clean = np.asarray(1 - seen, np.float32)
@@ -50,7 +50,7 @@ class Crumbs:
         self._pattern = _pattern(light, self._places) if seen.any() else None
 
     def bridged(self, change: FloatImage) -> FloatImage:
-        """A change in which crumbs neither hide nor feign a contact, in place.
+        """A change in which debris neither hides nor feigns a contact, in place.
 
         Args:
             change: shape (height, width, 3), grey levels.
@@ -63,12 +63,12 @@ class Crumbs:
         half = resized(change, self._half)
         given_back = half + resized(self._pattern, self._half)
         shown, hidden = (cv2.GaussianBlur(length_squared(one), (0, 0), _COMPARED_PX) for one in (half, given_back))
-        told = np.maximum(self.clean, hidden < shown)
-        half = np.where((hidden < shown)[..., None], given_back, half) * told[..., None]
-        weight = np.maximum(cv2.GaussianBlur(told, (0, 0), _AROUND_PX), _LEAST_SEEN)
+        valid = np.maximum(self.clean, hidden < shown)
+        half = np.where((hidden < shown)[..., None], given_back, half) * valid[..., None]
+        weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _AROUND_PX), _LEAST_SEEN)
         filled = np.asarray(cv2.GaussianBlur(half, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
         around = resized(filled, self._places.shape[::-1])
-        is_hidden = cv2.resize(told, self._places.shape[::-1], interpolation=cv2.INTER_NEAREST)[self._places] > 0
+        is_hidden = cv2.resize(valid, self._places.shape[::-1], interpolation=cv2.INTER_NEAREST)[self._places] > 0
         change[self._places] = np.where(
             is_hidden[:, None], (change + self._pattern)[self._places], around[self._places]
         )
@@ -76,8 +76,8 @@ class Crumbs:
 
 
 def _pattern(light: FloatImage, places: npt.NDArray[np.bool_]) -> FloatImage:
-    """What the crumbs add to the reference: it less what its surroundings go on as."""
-    wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SKIRT_PX, _SKIRT_PX)))
+    """What the debris adds to the reference: it less what its surroundings go on as."""
+    wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX)))
     without = cv2.inpaint(light.astype(np.uint8), wide, _INPAINT_PX, cv2.INPAINT_NS).astype(np.float32)
     smooth = cv2.GaussianBlur(without, (0, 0), _INPAINTED_BLUR_PX)
     return np.where(places[..., None], light - smooth, np.float32(0))

@@ -1,4 +1,4 @@
-"""The outline of one contact: along a smooth body's edge, or the union of what textured skin presses in."""
+"""Outline of one contact: along a smooth body's edge, or the union of what textured skin presses in."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from station.vision import texture
+from station.vision.background import Background
 from station.vision.confidence import background_spread, edge_confidence
+from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
-from station.vision.contour import COSINES, RAYS, SINES, Edge, find_edge
-from station.vision.region import Body
+from station.vision.contour import Edge, find_edge, inside_image
+from station.vision.region import Region
 
 _SUBPIXEL_BITS = 4
 _WITHIN, _BEYOND = 0.8, 1.2
-_SURELY_SMOOTH, _CLEAR_NOISES = 0.62, 15.0
+"""Of the region's radius: where the fall of its level across its end is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,37 +37,48 @@ class Outline:
         return np.asarray(cv2.threshold(grown, 127, 255, cv2.THRESH_BINARY)[1], np.uint8)
 
 
-def find_outline(length: FloatImage, body: Body, background: FloatImage, stiffness: float) -> Outline:
+def find_outline(
+    length: FloatImage,
+    body: Region,
+    background: Background,
+    stiffness: float,
+    constants: Constants,
+    floor: Mask | None = None,
+) -> Outline:
     """Find the outline of the contact in a body's region.
 
     Args:
-        length: of the denoised change, shape (height, width), grey levels.
+        length: of the smoothed change, shape (height, width), grey levels.
         body: found at half that size.
-        background: how surely a place is background, shape of `length`, 0 to 1.
+        background: of the same frame.
         stiffness: as for `find_edge`.
+        constants: as for `find_edge` and the texture.
+        floor: what surely lies within, shape of `length`, 0 or not.
     """
     height, width = length.shape
-    region = np.asarray(cv2.resize(body.region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-    scale = width / body.region.shape[1], height / body.region.shape[0]
-    middle = ((body.middle[0] + 0.5) * scale[0] - 0.5, (body.middle[1] + 0.5) * scale[1] - 0.5)
-    noise = texture.noise_of(length, background) if texture.has_room_for_few(region) else 0.0
-    if not body.textured and not _is_faint_skin(length, region, body, noise):
-        edge = find_edge(length, region, middle, stiffness)
-        confidence = edge_confidence(edge, background_spread(length, background))
+    region = np.asarray(cv2.resize(body.mask, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
+    scale = width / body.mask.shape[1], height / body.mask.shape[0]
+    rays, radii = body.rays.scaled(scale), body.radii * scale[0]
+    noise = texture.noise_level(length, background, constants) if texture.has_room_for_few(region, constants) else 0.0
+    if not body.textured and not _is_faint_skin(length, region, body, noise, constants):
+        edge = find_edge(length, rays, radii, stiffness, constants, floor)
+        confidence = edge_confidence(edge, background_spread(length, background.weight), constants)
         return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
-    points = np.stack([COSINES, SINES], axis=1) * body.radii_px[:, None] * scale + middle
-    seen = (points >= 0).all(axis=1) & (points[:, 0] <= width - 1) & (points[:, 1] <= height - 1)
-    edge = Edge(points, seen, _fall(body))
-    inside, sure = texture.union(length, region, texture.level(length, region, body, noise), noise)
-    return Outline(edge, inside, textured=True, confidence=sure * edge_confidence(edge, body.spread_levels))
+    points = rays.points(radii)
+    edge = Edge(points, inside_image(points, (height, width)), _fall(body))
+    level = texture.element_level(length, region, body, noise, constants)
+    inside, sure = texture.union(length, region, level, noise, constants)
+    confidence = sure * edge_confidence(edge, body.spread_levels, constants)
+    return Outline(edge, inside, textured=True, confidence=confidence)
 
 
-def _is_faint_skin(length: FloatImage, region: Mask, body: Body, noise: float) -> bool:
-    """Whether a body that passes for smooth stands so little out of the noise that the edge found may be a seed's.
+def _is_faint_skin(length: FloatImage, region: Mask, body: Region, noise: float, constants: Constants) -> bool:
+    """Whether a body that passes for smooth stands so little out of the noise that the edge found may be an achene's.
 
-    Not where directions agree as they hardly do on skin. Where the noise is not known, directions tell little.
+    Not where directions agree as they hardly do on skin. Where the noise is not known, directions say little.
     """
-    return body.coherence < _SURELY_SMOOTH and texture.strength(length, region) < _CLEAR_NOISES * noise
+    faint = texture.strength(length, region) < constants.faint_noises * noise
+    return body.coherence < constants.faint_coherence and faint
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
@@ -86,11 +99,8 @@ def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0
     return mask
 
 
-def _fall(body: Body) -> npt.NDArray[np.float64]:
+def _fall(body: Region) -> npt.NDArray[np.float64]:
     """By how much a body's level falls across the end of its region, on each ray, grey levels."""
-    away = body.radii_px[:, None] * np.array([_WITHIN, _BEYOND])
-    x, y = body.middle[0] + COSINES[:, None] * away, body.middle[1] + SINES[:, None] * away
-    levels = cv2.remap(
-        body.level, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE
-    )
-    return (levels[:, 0] - levels[:, 1]).astype(np.float64).reshape(RAYS)
+    x, y = body.rays.places(body.radii[:, None] * np.array([_WITHIN, _BEYOND]))
+    levels = cv2.remap(body.level, x, y, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
+    return (levels[:, 0] - levels[:, 1]).astype(np.float64)

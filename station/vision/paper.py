@@ -34,6 +34,7 @@ class PaperMethod:
         Args:
             image: shape (height, width, 3), dtype uint8, BGR, of the reference's size.
             on_stage: gets the pictures `difference`, `denoised` and `segmented`.
+            previous: has no part in the method as printed.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.

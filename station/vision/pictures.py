@@ -19,10 +19,10 @@ def emit(
     *,
     difference: FloatImage,
     change: FloatImage,
-    bend: FloatImage,
+    curvature: FloatImage,
     threshold: float,
     response: FloatImage,
-    response_gate: float,
+    response_threshold: float,
     candidates: Candidates,
     edges: list[Edge],
     mask: Mask,
@@ -34,10 +34,10 @@ def emit(
         names: eight, in the order of the stages.
         difference: frame minus reference, shape (height, width, 3), grey levels.
         change: the same without drift and streaks.
-        bend: shape (height, width), grey levels per pixel.
-        threshold: the gate's.
-        response: from `LightTouch.response`, shape of `bend`.
-        response_gate: from how much of it on a light touch is looked for.
+        curvature: shape (height, width), grey levels per pixel.
+        threshold: the detection threshold of the curvature.
+        response: from `WeakContactDetector.response`, shape of `curvature`.
+        response_threshold: from how much of it on a weak contact is outlined.
         candidates: with the clusters that they come from.
         edges: of the contacts found, in pixels of `change`.
         mask: 0 or 255, at the input's size.
@@ -55,8 +55,8 @@ def emit(
         _signed(difference, 1),
         _signed(change, _AMPLIFICATION),
         _signed(denoised, _AMPLIFICATION),
-        _strength(bend, threshold),
-        _strength(response, response_gate),
+        _strength(curvature, threshold),
+        _strength(response, response_threshold),
         clusters,
         outlined,
     )
@@ -71,7 +71,7 @@ def _signed(change: FloatImage, amplification: float) -> Image:
     return np.clip(_GREY + amplification * change, 0, 255).astype(np.uint8)
 
 
-def _strength(field: FloatImage, gate: float) -> Image:
-    """What opens the gate is bright; twice the gate, or the strongest place beyond it, is brightest."""
-    grey = np.clip(field * (255 / max(float(field.max()), 2 * gate)), 0, 255).astype(np.uint8)
+def _strength(field: FloatImage, threshold: float) -> Image:
+    """What reaches the threshold is bright; twice the threshold, or the strongest place beyond it, is brightest."""
+    grey = np.clip(field * (255 / max(float(field.max()), 2 * threshold)), 0, 255).astype(np.uint8)
     return np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS), np.uint8)

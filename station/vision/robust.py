@@ -1,102 +1,186 @@
-"""The station's own method: the contact's edge, under drift, streaks and weak light.
+"""Robust method: the contact's edge under drift, streaks and weak light, as one pipeline of stages.
 
-Stages: signed difference to the reference; drift and streaks taken off; bending and the gate; clusters of the bending,
-as many as the data ask for; for each region the edge where the change falls off most steeply. Where the gate stays
-shut, touches lighter than drift are looked for. `docs/robust.md` explains each with its reasons.
+`RobustMethod.pipeline` has the stages in their order. One `State` is passed along; each stage reads what is there and
+adds its own part. `docs/robust.md` explains each with its reasons, and has the table of what each earns.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from station.settings.segmentation import RobustParameters
-from station.vision import pictures, weak_contact
-from station.vision.background import SPREAD_CAP_LEVELS, Drift, DriftModel, without_bands, without_streaks
+from station.vision import pictures
+from station.vision.background import Background, BackgroundModel, Coefficients, destriped, without_column_medians
 from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
+from station.vision.changed_area import agreement, agreement_of_growth, changed
+from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.curvature import bending, noise_of, quiet
-from station.vision.debris import Crumbs
-from station.vision.edge_signal import denoised, length_of
+from station.vision.contour import change_length
+from station.vision.curvature import calm, curvature, curvature_noise
+from station.vision.debris import Debris
 from station.vision.outline import Outline, find_outline
-from station.vision.region import Body, Movement, evening, find_body, has_moved_widely, movement
-from station.vision.weak_contact import LightTouch
-from station.vision.working import SATURATED_LEVEL, capped, resized, working_image
+from station.vision.region import Movement, Region, find_region, flat_field_correction, movement, radius_of
+from station.vision.weak_contact import WeakContactDetector
+from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480
-"""The image for which parameters in pixels are given; they scale with the image."""
+"""The image for which the recipe's parameters in pixels are given; they scale with the image."""
 
-_SATURATED_SHARE = 0.05
-_FOREIGN_DRIFT_SHARE = 0.35
-_ONE_SIDED = 0.85
-_LEAST_SUPPORT, _LEAST_SUPPORT_CUT = 0.03, 0.25
-"""Of an outline, and of one that the border cuts, which drift at the border resembles."""
 _COARSE_STEP, _FINE_STEP = 4, 2
-_LEAST_TRUST = 0.25
-"""In a calm place that the drift does not fit: it may be a band of light or a skirt."""
-_SURE_GATE = 2.0
-_LEAST_LIGHT = 0.25
-_FIRM_GATE = 10.0
-"""Drift has not been seen to open the gate so far."""
-_LIGHT_LEAST_BEND = 0.3
-"""Of the gate's threshold, at a light touch too: what misleads one of the two seldom misleads the other."""
-_LIGHT_REACHES_PX, _REACHED = (18, 36, 72), 0.9
-"""How far a light touch may reach, at half the working size; the next where its body fills the one before."""
-_GATE_OF_WIDE = 0.6
-"""Of the gate's threshold, where so much has moved that the background's bending is the skirt's."""
+_WEAK_REACHES_PX, _REACHED = (18, 36, 72), 0.9
+"""How far a weak contact may reach, at half the working size; the next where its region fills the one before."""
+_WEAK_DOUBT = 0.5
+"""Of a weak contact's confidence: its area is rough, so that it is hardly ever judged."""
+
+STAGES = (
+    "background",
+    "destriping",
+    "debris",
+    "flat field",
+    "weak contact",
+    "support",
+    "one colour",
+    "texture",
+    "following",
+    "witness",
+)
+"""Those that can be switched off, to see what each earns."""
+
+
+class Trace(NamedTuple):
+    """What one step of a press hands on to the next."""
+
+    coefficients: Coefficients
+    """Of the background model."""
+    floor: Mask | None
+    """The contact at the last step that was trusted, at half the working size, 0 or 1; None before there is one."""
+    floor_load_levels: float
+    """How much the whole image differed then."""
+    contact_px: int
+    changed_px: int
+    """Both areas at the last step, px of half the working size; 0 where there was no contact."""
+    textured: bool | None
+    """Whether the body is textured, as last seen with enough background to know; None before."""
+
+
+@dataclass(slots=True)
+class State:
+    """One frame on its way through the pipeline."""
+
+    work: Image
+    """The frame at the working size, shape (height, width, 3), dtype uint8."""
+    difference: FloatImage
+    """Frame minus reference, shape (height, width, 3), grey levels; afterwards without its background: the change."""
+    before: Trace | None
+    calm: FloatImage = field(init=False)
+    """First guess of the background, at a quarter of the working size, 0 to 1."""
+    background: Background = field(init=False)
+    half: FloatImage = field(init=False)
+    """The change averaged down to half the working size."""
+    moved: Movement = field(init=False)
+    threshold: float = field(init=False)
+    """The detection threshold of the curvature, grey levels per pixel."""
+    changed: Mask = field(init=False)
+    """The witness, at half the working size, 0 or 1."""
+    floor: Mask | None = None
+    """What has been in contact since an earlier step, at half the working size, 0 or 1."""
+    candidates: Candidates = field(init=False)
+    weak_at: tuple[int, int] | None = None
+    """Where a weak contact lies: x and y at half the working size."""
+    outlines: list[Outline] = field(default_factory=list)
+    mask: Mask = field(init=False)
+    """At the input's size, 0 or 255."""
+    flags: set[Flag] = field(default_factory=set)
+    confidence: float = 0.0
+
+    @property
+    def gate(self) -> float:
+        """The strongest curvature over the detection threshold."""
+        return float(self.moved.curvature.max()) / self.threshold
 
 
 class RobustMethod:
-    """The robust measurement against one or several reference images."""
+    """The robust measurement against one or several reference images.
+
+    Args:
+        references: one or more images with nothing touching, each (height, width, 3), dtype uint8, BGR.
+        parameters: the recipe's.
+        constants: all other numbers.
+        without: stages of `STAGES` to leave out.
+
+    Raises:
+        ValueError: there is no reference, or one is not a colour image of the others' size.
+    """
 
     stages: tuple[str, ...] = (
         "difference",
         "amplified",
         "denoised",
-        "bending",
+        "curvature",
         "slopes",
         "clustered",
         "edge",
         "segmented",
     )
 
-    def __init__(self, references: Sequence[Image], parameters: RobustParameters) -> None:
-        """Prepare the reference, which is the median of the references.
-
-        Args:
-            references: one or more images with nothing touching, each (height, width, 3), dtype uint8, BGR.
-            parameters: the recipe's.
-
-        Raises:
-            ValueError: there is no reference, or one is not a colour image of the others' size.
-        """
+    def __init__(
+        self,
+        references: Sequence[Image],
+        parameters: RobustParameters,
+        constants: Constants = CONSTANTS,
+        without: frozenset[str] = frozenset(),
+    ) -> None:
         if not references:
             raise ValueError("no reference image: at least one frame with nothing touching the gel is needed")
         shape = references[0].shape
         if any(r.shape != shape or r.dtype != np.uint8 or r.ndim != 3 or r.shape[2] != 3 for r in references):
             raise ValueError(f"references must be uint8 images (height, width, 3) of one size, not {shape} and others")
-        self._shape = shape
-        self._parameters = parameters
+        if unknown := without.difference(STAGES):
+            raise ValueError(f"no such stage: {', '.join(sorted(unknown))}; there are {', '.join(STAGES)}")
+        self._shape, self._parameters, self._constants, self._without = shape, parameters, constants, without
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
-        self._light = capped(self._reference)
-        height, width = self._light.shape[:2]
-        half = resized(self._light, (-(-width // _FINE_STEP), -(-height // _FINE_STEP)))
-        self._evening = evening(half)
+        self._light = clipped(self._reference)
+        half = self._reduced(self._light, _FINE_STEP)
+        self._flat_field = flat_field_correction(half, constants)
+        if "flat field" in without:
+            self._flat_field = np.ones_like(self._flat_field)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
-        self._drift = DriftModel(self._reference)
-        self._lit = _lit(self._light)
-        self._crumbs = Crumbs(self._light)
-        halves = [resized(capped(working_image(one)), (half.shape[1], half.shape[0])) for one in references]
+        self._model = BackgroundModel(self._reference, constants)
+        means = np.asarray(cv2.mean(self._light)[:3])
+        lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
+        self._debris = Debris(self._light)
+        # The detector needs the mean of the references: a median's noise is not that of the frames.
+        halves = [resized(clipped(working_image(one)), (half.shape[1], half.shape[0])) for one in references]
         mean = np.asarray(np.mean(halves, axis=0), np.float32)
-        self._touch = LightTouch(mean, self._lit, self._crumbs.clean)
-        sighted = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
-        self._sighted = np.repeat(sighted, 3, axis=2).astype(np.float32)
-        least_bend = float(np.mean(self._lit)) * parameters.least_bend
-        self._least_bend = least_bend * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+        self._weak = WeakContactDetector(mean, lit, self._debris.clean, constants, parameters.gate_ratio)
+        unsaturated = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
+        self._unsaturated = np.repeat(unsaturated, 3, axis=2).astype(np.float32)
+        least = float(np.mean(lit)) * parameters.least_bend
+        self._least_curvature = least * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
+
+    @property
+    def pipeline(self) -> tuple[Callable[[State], None], ...]:
+        """The stages in their order."""
+        return (
+            self._subtract_background,
+            self._destripe,
+            self._bridge_debris,
+            self._respond,
+            self._see_what_changed,
+            self._follow,
+            self._find_candidates,
+            self._outline_candidates,
+            self._drop_unsupported,
+            self._find_weak_contact,
+            self._keep_floor,
+            self._draw,
+            self._judge,
+        )
 
     def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
         """Find the contact in an image.
@@ -104,225 +188,315 @@ class RobustMethod:
         Args:
             image: shape (height, width, 3), dtype uint8, BGR, of the references' size.
             on_stage: gets the pictures named in `stages`.
+            previous: the same contact at the last step of less compression; a single image is measured without.
 
         Raises:
             ValueError: the image's shape or dtype is not the references'.
         """
-        seen = self._look(image)
-        sure = seen.gate > _SURE_GATE
-        if self._parameters.contacts == "several":
-            candidates = separate_candidates(seen.bend, seen.threshold)
-        else:
-            candidates = body_candidates(seen.moved, seen.bend, seen.threshold)
-        found = self._outlines(seen, candidates, sure=sure)
-        are_sure = [_sureness(one, seen.gate) >= self._parameters.least_confidence for one in found]
-        if not found or (seen.gate < _FIRM_GATE and not all(are_sure)):
-            response = self._response(seen.work)
-            found = [one for one, is_sure in zip(found, are_sure, strict=True) if is_sure or self._shows(one, response)]
-            if not found and (place := self._touched_at(seen, response)):
-                seen, candidates = seen._replace(touched_at=place), around(place, seen.moved)
-                found = self._outlines(seen, candidates, sure=sure)
-        mask = self._mask(found)
+        state = self._begun(image, previous)
+        difference = state.difference.copy() if on_stage else state.difference
+        for stage in self.pipeline:
+            stage(state)
         if on_stage:
-            pictures.emit(
-                on_stage,
-                self.stages,
-                difference=capped(seen.work) - self._light,
-                change=seen.change,
-                bend=seen.bend,
-                threshold=seen.threshold,
-                response=self._response(seen.work),
-                response_gate=weak_contact.gate(self._parameters.gate_ratio),
-                candidates=candidates,
-                edges=[outline.edge for outline in found],
-                mask=mask,
-            )
-        flags, confidence = self._judge(seen, mask, found)
+            self._show(on_stage, state, difference)
         return contact_from_mask(
-            mask,
-            flags,
-            confidence=confidence,
-            gate=seen.gate,
-            drift_levels=seen.drift.strength_levels,
-            is_light=seen.touched_at is not None,
+            state.mask,
+            frozenset(state.flags),
+            confidence=state.confidence,
+            gate=state.gate,
+            drift_levels=state.background.strength_levels,
+            is_light=state.weak_at is not None,
+            changed_area_px=self._at_input_size(cv2.countNonZero(state.changed), state),
+            trace=self._trace(state),
         )
 
-    def light_touch(self, image: Image) -> tuple[FloatImage, float]:
-        """How far the gel's slopes stand out of the frame's noise, and from how much on a light touch is looked for.
+    def weak_response(self, image: Image) -> tuple[FloatImage, float]:
+        """The weak-contact detector's response to an image, and its threshold.
 
         Args:
             image: as for `measure`.
 
         Returns:
-            Shape (height, width) at half the working size, as `LightTouch.response`, and the gate's threshold.
+            Shape (height, width) at half the working size, as `WeakContactDetector.response`, and the threshold.
 
         Raises:
             ValueError: as `measure`.
         """
-        return self._response(self._look(image).work), weak_contact.gate(self._parameters.gate_ratio)
+        return self._weak_response(self._begun(image, None)), self._weak.threshold
 
-    def _response(self, work: Image) -> FloatImage:
-        height, width = self._crumbs.clean.shape
-        return self._touch.response(resized(capped(work), (width, height)))
-
-    def _look(self, image: Image) -> "_Seen":
+    def _begun(self, image: Image, previous: Contact | None) -> State:
         if image.shape != self._shape or image.dtype != np.uint8:
             raise ValueError(
                 f"image {image.shape} {image.dtype} must be uint8 and of the reference's shape {self._shape}"
             )
+        before = previous.trace if previous is not None and "following" not in self._without else None
         work = working_image(image)
-        height, width = work.shape[:2]
-        difference = capped(work)
+        difference = clipped(work)
         difference -= self._light
-        quarter = resized(difference, (-(-width // _COARSE_STEP), -(-height // _COARSE_STEP)))
-        drift = self._drift.fit(quarter, quiet(bending(quarter, _COARSE_STEP), self._least_bend))
-        change = difference - drift.levels
-        change *= self._sighted
-        calm = quiet(bending(without_bands(quarter), _COARSE_STEP), self._least_bend)
-        fits = resized(drift.background, (calm.shape[1], calm.shape[0]))
-        calm *= resized(self._crumbs.clean, (calm.shape[1], calm.shape[0]))
-        change = self._crumbs.bridged(without_streaks(change, np.minimum(calm, _LEAST_TRUST + fits)))
-        half = resized(change, (-(-width // _FINE_STEP), -(-height // _FINE_STEP)))
-        background = resized(drift.background, (half.shape[1], half.shape[0]))
-        bend = bending(half, _FINE_STEP)
-        noise = noise_of(bend, background)
-        threshold = max(self._parameters.gate_ratio * noise, self._least_bend)
-        moved = movement(half, background, self._evening, bend)
-        if bend.max() <= threshold and has_moved_widely(moved):
-            threshold *= _GATE_OF_WIDE
-        return _Seen(work, drift, change, half, moved, bend, threshold)
+        return State(work, difference, before if isinstance(before, Trace) else None)
 
-    def _touched_at(self, seen: "_Seen", response: FloatImage) -> tuple[int, int] | None:
-        """Where a touch too light for the gate lies, or one that drift hides: x and y at half the working size."""
-        place = self._touch.place(response, self._parameters.gate_ratio)
-        if place and seen.bend[self._touch.near(place)].max() > _LIGHT_LEAST_BEND * seen.threshold:
-            return place
-        return None
+    # The stages
 
-    def _shows(self, outline: Outline, response: FloatImage) -> bool:
-        """Whether the place of an outline shows more than drift."""
-        size = (response.shape[1], response.shape[0])
-        place = cv2.resize(outline.inside, size, interpolation=cv2.INTER_NEAREST)
-        return self._touch.shows(np.asarray(place, np.uint8), response, self._parameters.gate_ratio)
+    def _subtract_background(self, state: State) -> None:
+        """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
+        quarter = self._reduced(state.difference, _COARSE_STEP)
+        first_guess = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
+        # A band of light that drifts is no curvature once its columns are level; only then is it seen to be calm.
+        banded = curvature(without_column_medians(quarter), _COARSE_STEP, self._constants)
+        state.calm = calm(banded, self._least_curvature, self._constants)
+        before = state.before
+        if before is not None and before.floor is not None:
+            size = (first_guess.shape[1], first_guess.shape[0])
+            free = 1 - resized(before.floor.astype(np.float32), size)
+            first_guess, state.calm = first_guess * free, state.calm * free
+        state.background = self._model.fit(quarter, first_guess, None if before is None else before.coefficients)
+        if "background" not in self._without:
+            state.difference = state.difference - state.background.levels
+        state.difference *= self._unsaturated
 
-    def _outlines(self, seen: "_Seen", candidates: Candidates, *, sure: bool) -> list[Outline]:
-        """The outlines that the image supports, or any where contact is sure or a light touch was seen."""
-        found: list[Outline] = []
+    def _destripe(self, state: State) -> None:
+        """Take rows' and columns' noise off, as far as what is calm is background too."""
+        if "destriping" in self._without:
+            return
+        size = (state.calm.shape[1], state.calm.shape[0])
+        fits = resized(state.background.weight, size)
+        trusted = np.minimum(state.calm * resized(self._debris.clean, size), self._constants.calm_trust + fits)
+        state.difference = destriped(state.difference, trusted, self._constants)
+
+    def _bridge_debris(self, state: State) -> None:
+        """Fill what debris hides or feigns."""
+        if "debris" not in self._without:
+            state.difference = self._debris.bridged(state.difference)
+
+    def _respond(self, state: State) -> None:
+        """Compute the curvature response and the threshold from which on something touches."""
+        state.half = self._reduced(state.difference, _FINE_STEP)
+        response = curvature(state.half, _FINE_STEP, self._constants)
+        noise = curvature_noise(response, state.background, self._constants)
+        state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
+        state.moved = movement(state.half, state.background, self._flat_field, response)
+
+    def _see_what_changed(self, state: State) -> None:
+        """Find where the image has changed at all, contact or halo."""
+        state.changed = changed(state.moved, state.background.spread_levels, self._constants)
+
+    def _follow(self, state: State) -> None:
+        """Take over what was in contact at the last trusted step, unless the body has been let go."""
+        before = state.before
+        if before is None or before.floor is None or self._parameters.contacts == "several":
+            return
+        if state.background.load_levels < self._constants.released_share * before.floor_load_levels:
+            return
+        room_px = self._constants.floor_erosion * radius_of(before.floor)
+        side = 2 * round(room_px) + 1
+        framed = cv2.copyMakeBorder(before.floor, side, side, side, side, cv2.BORDER_REPLICATE)
+        eroded = cv2.erode(framed, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+        state.floor = np.ascontiguousarray(eroded[side:-side, side:-side], np.uint8)
+
+    def _find_candidates(self, state: State) -> None:
+        """Find where contacts may lie."""
+        if self._parameters.contacts == "several":
+            state.candidates = separate_candidates(state.moved.curvature, state.threshold)
+            return
+        found = body_candidates(state.moved, state.threshold, self._constants)
+        if state.floor is not None:  # the body is where it was, and whatever joins it there is its own
+            joined = [one for one in found.regions if (one & state.floor).any()]
+            start = np.bitwise_or.reduce([state.floor, *joined])
+            found = found._replace(regions=[np.asarray(start, np.uint8)])
+        state.candidates = found
+
+    def _outline_candidates(self, state: State) -> None:
+        """Outline the candidates that the image supports; of one body the first."""
         one = self._parameters.contacts == "one"
-        height, width = seen.change.shape[:2]
-        smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
-        for candidate in candidates.regions:
-            if found and one:
+        regions = state.candidates.regions
+        for candidate in regions:
+            if state.outlines and one:
                 break
-            body = _body(seen, candidate, None if one else candidates.regions)
-            if body is None:
-                continue
-            smooth = denoised(seen.change, seen.half, body.radius_px * width / candidate.shape[1])
-            length = resized(length_of(smooth), (width, height))
-            outline = find_outline(length, body, seen.drift.background, self._parameters.edge_stiffness)
-            if cv2.countNonZero(outline.inside) < smallest_px or _one_sided(smooth, outline, sure=sure):
-                continue
-            support = _LEAST_SUPPORT if outline.edge.seen.all() else _LEAST_SUPPORT_CUT
-            if sure or seen.touched_at or outline.confidence >= support:
-                found.append(outline)
-        return found
+            others = None if one else sum((other for other in regions if other is not candidate), 0 * candidate)
+            body = self._region(state, candidate, others)
+            if body is not None and (outline := self._outlined(state, body)) is not None:
+                state.outlines.append(outline)
 
-    def _mask(self, outlines: list[Outline]) -> Mask:
+    def _drop_unsupported(self, state: State) -> None:
+        """Drop doubtful outlines within which no slope stands out of the noise: they are drift."""
+        doubtful = [one for one in state.outlines if self._sureness(one, state) < self._parameters.least_confidence]
+        if not doubtful or state.floor is not None or state.gate >= 10 or "support" in self._without:
+            return
+        response = self._weak_response(state)
+        size = (response.shape[1], response.shape[0])
+        places = [cv2.resize(one.inside, size, interpolation=cv2.INTER_NEAREST) for one in doubtful]
+        dropped = [
+            one
+            for one, place in zip(doubtful, places, strict=True)
+            if not self._weak.supports(np.asarray(place, np.uint8), response)
+        ]
+        state.outlines = [one for one in state.outlines if one not in dropped]
+
+    def _find_weak_contact(self, state: State) -> None:
+        """Look for a contact below the detection threshold where nothing was found."""
+        if state.outlines or "weak contact" in self._without:
+            return
+        place = self._weak.place(self._weak_response(state))
+        least = self._constants.weak_least_curvature * state.threshold
+        if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
+            return
+        state.weak_at = place
+        state.candidates = around(place, state.moved, self._constants)
+        start, body = state.candidates.regions[0], None
+        for reach_px in _WEAK_REACHES_PX:  # no further than its own region fills, since drift is all around it
+            body = self._region(state, start, 1 - disc(start.shape, place, reach_px))
+            if body is None or body.radii.max() < _REACHED * reach_px:
+                break
+        if body is not None and (outline := self._outlined(state, body)) is not None:
+            state.outlines.append(outline)
+
+    def _keep_floor(self, state: State) -> None:
+        """Say at least what the press so far has shown, where the edge is lost."""
+        if state.floor is None:
+            return
+        sure = [self._sureness(one, state) >= self._parameters.least_confidence for one in state.outlines]
+        if not sure or not all(sure):
+            state.flags.add(Flag.LOWER_BOUND)
+
+    def _draw(self, state: State) -> None:
+        """Draw the contacts at the input's size."""
         height, width = self._shape[:2]
-        if len(outlines) == 1:
-            return outlines[0].drawn(height, width)
-        mask = np.zeros((height, width), np.uint8)
-        for outline in outlines:
-            mask |= outline.drawn(height, width)
-        return mask
+        if len(state.outlines) == 1:
+            state.mask = state.outlines[0].drawn(height, width)
+        else:
+            state.mask = np.zeros((height, width), np.uint8)
+            for outline in state.outlines:
+                state.mask |= outline.drawn(height, width)
+        if state.floor is not None:
+            floor = cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST)
+            state.mask |= np.asarray(floor * 255, np.uint8)
 
-    def _judge(self, seen: "_Seen", mask: Mask, found: list[Outline]) -> tuple[frozenset[Flag], float]:
-        """The flags, and the weakest area's confidence; without an area 1 to 0 as the gate opens."""
-        flags: set[Flag] = set()
-        work, drift = seen.work, seen.drift
-        if (
-            drift.strength_levels > _FOREIGN_DRIFT_SHARE * self._light_levels
-            or drift.spread_levels >= SPREAD_CAP_LEVELS
-        ):
+    def _judge(self, state: State) -> None:
+        """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
+        p, flags, work = self._constants, state.flags, state.work
+        background = state.background
+        if background.strength_levels > 0.35 * self._light_levels or background.spread_levels >= p.most_spread:
             flags.add(Flag.REFERENCE_MISMATCH)
-        inside = cv2.resize(mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
+        inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
-        if np.mean(saturated[inside] if inside.any() else saturated) > _SATURATED_SHARE:
+        if np.mean(saturated[inside] if inside.any() else saturated) > p.saturated_share:
             flags.add(Flag.SATURATED)
-        if not found and (seen.gate > 1 or seen.touched_at):
+        touched = bool(state.outlines) or state.floor is not None
+        if not touched and (state.gate > 1 or state.weak_at):
             flags.add(Flag.UNDECIDED)
-        untouched = 0.0 if seen.touched_at else min(1.0, _SURE_GATE * max(0.0, 1.0 - seen.gate))
-        confidence = min((_sureness(outline, seen.gate) for outline in found), default=untouched)
-        if Flag.REFERENCE_MISMATCH in flags or seen.touched_at:
-            confidence *= 0.5
-        if confidence < self._parameters.least_confidence:
+        if not touched:
+            state.confidence = 0.0 if state.weak_at else min(1.0, p.sure_gate * max(0.0, 1.0 - state.gate))
+        else:
+            state.confidence = min((self._sureness(one, state) for one in state.outlines), default=0.0)
+            if "witness" not in self._without:
+                state.confidence *= self._witnessed(state, cv2.countNonZero(state.mask))
+        if state.weak_at:
+            state.confidence *= _WEAK_DOUBT
+        if Flag.REFERENCE_MISMATCH in flags:
+            state.confidence = 0.0
+        if state.confidence < self._parameters.least_confidence:
             flags.add(Flag.LOW_CONFIDENCE)
-        return frozenset(flags), confidence
 
+    # What the stages share
 
-class _Seen(NamedTuple):
-    """One frame without drift, before contacts are looked for."""
+    def _region(self, state: State, start: Mask, others: Mask | None) -> Region | None:
+        known = None
+        if "texture" in self._without:
+            known = False
+        elif state.before is not None and state.background.share < self._constants.known_share / 2:
+            known = state.before.textured
+        return find_region(state.moved, start, self._constants, others, state.floor, texture=known)
 
-    work: Image
-    drift: Drift
-    change: FloatImage
-    half: FloatImage
-    """The change averaged down to the bending's size."""
-    moved: Movement
-    bend: FloatImage
-    threshold: float
-    touched_at: tuple[int, int] | None = None
-    """Where a touch lies that is too light for the gate: x and y at the change's half size."""
+    def _outlined(self, state: State, body: Region) -> Outline | None:
+        """The outline of a region, or None where the image does not support it."""
+        p = self._constants
+        height, width = state.difference.shape[:2]
+        scale = width / body.mask.shape[1]
+        length = change_length(state.difference, state.half, body.radius_px * scale, p)
+        floor = None
+        if state.floor is not None:
+            floor = np.asarray(cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
+        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, floor)
+        smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
+        if cv2.countNonZero(outline.inside) < smallest_px:
+            return None
+        if state.floor is not None or state.weak_at is not None:
+            return outline
+        sure = state.gate > p.sure_gate
+        support = p.support_least if outline.edge.seen.all() else p.support_cut
+        if self._one_colour(state, outline, sure=sure) or not (sure or outline.confidence >= support):
+            return None
+        return outline
 
-    @property
-    def gate(self) -> float:
-        """The strongest bending over the gate's threshold."""
-        return float(self.bend.max()) / self.threshold
+    def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
+        """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
 
+        Not of a sure contact that the border cuts: its other slopes may lie outside.
+        """
+        if "one colour" in self._without or (sure and not outline.edge.seen.all()):
+            return False
+        half = state.half
+        inside = cv2.resize(outline.inside, (half.shape[1], half.shape[0]), interpolation=cv2.INTER_NEAREST)
+        mean, deviation = cv2.meanStdDev(half, mask=inside)
+        power = float((mean**2).sum())
+        return power > self._constants.one_colour * (power + float((deviation**2).sum()))
 
-def _lit(light: FloatImage) -> npt.NDArray[np.bool_]:
-    """Which colours have light, shape (3,): one whose LED is dead adds nothing to what bends."""
-    means = np.asarray(cv2.mean(light)[:3])
-    return np.asarray(means > _LEAST_LIGHT * means.max())
+    def _sureness(self, outline: Outline, state: State) -> float:
+        """An outline's confidence, less where the border cuts it and the gel hardly curves: drift resembles that."""
+        if outline.edge.seen.all() or state.floor is not None:
+            return outline.confidence
+        return outline.confidence * float(np.clip((state.gate - 1) / (self._constants.sure_gate - 1), 0, 1))
 
+    def _witnessed(self, state: State, contact_px: int) -> float:
+        """How far the changed area agrees with the contact area, 0 to 1."""
+        contact_px = round(contact_px * state.changed.size / (self._shape[0] * self._shape[1]))
+        changed_px = cv2.countNonZero(state.changed)
+        agreed = agreement(contact_px, changed_px, self._constants)
+        if state.before is not None and state.before.contact_px:
+            areas = (state.before.contact_px, contact_px), (state.before.changed_px, changed_px)
+            agreed *= agreement_of_growth(*areas)
+        return agreed
 
-def _sureness(outline: Outline, gate: float) -> float:
-    """An outline's confidence; drift at the border looks like a contact that it cuts, and opens the gate a little."""
-    if outline.edge.seen.all():
-        return outline.confidence
-    return outline.confidence * float(np.clip((gate - 1) / (_SURE_GATE - 1), 0, 1))
+    def _weak_response(self, state: State) -> FloatImage:
+        height, width = self._debris.clean.shape
+        return self._weak.response(resized(clipped(state.work), (width, height)))
 
+    def _trace(self, state: State) -> Trace:
+        before, background = state.before, state.background
+        known = background.share >= self._constants.known_share / 2
+        shape = state.changed.shape
+        mask = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)
+        mask = np.asarray(mask > 0, np.uint8)
+        floor, load_levels = state.floor, 0.0 if before is None else before.floor_load_levels
+        contact_px = cv2.countNonZero(mask)
+        if contact_px and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
+            floor, load_levels = mask, background.load_levels
+        textured = None if before is None else before.textured
+        if state.outlines and known:
+            textured = state.outlines[0].textured
+        # What is fitted with hardly any background would take in more of the contact from step to step.
+        coefficients = background.coefficients if known or before is None else before.coefficients
+        return Trace(coefficients, floor, load_levels, contact_px, cv2.countNonZero(state.changed), textured)
 
-def _body(seen: _Seen, candidate: Mask, several: list[Mask] | None) -> Body | None:
-    """The body that a candidate belongs to.
+    def _at_input_size(self, half_px: int, state: State) -> int:
+        return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
 
-    Args:
-        seen: the frame.
-        candidate: where the body has been seen.
-        several: all candidates, where each may be a body of its own.
-    """
-    if seen.touched_at is None:
-        others = None if several is None else sum((one for one in several if one is not candidate), 0 * candidate)
-        return find_body(seen.moved, candidate, others)
-    body = None
-    for reach_px in _LIGHT_REACHES_PX:
-        beyond = 1 - disc(candidate.shape, seen.touched_at, reach_px)
-        body = find_body(seen.moved, candidate, beyond)
-        if body is None or body.radii_px.max() < _REACHED * reach_px:
-            break
-    return body
+    def _reduced(self, field_: FloatImage, step: int) -> FloatImage:
+        height, width = field_.shape[:2]
+        return resized(field_, (-(-width // step), -(-height // step)))
 
-
-def _one_sided(change: FloatImage, outline: Outline, *, sure: bool) -> bool:
-    """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
-
-    Not asked of a sure contact that the border cuts: its other slopes may lie outside.
-    """
-    if sure and not outline.edge.seen.all():
-        return False
-    size = (change.shape[1], change.shape[0])
-    inside = cv2.resize(outline.inside, size, interpolation=cv2.INTER_NEAREST)
-    mean, deviation = cv2.meanStdDev(change, mask=inside)
-    of_the_mean = float((mean**2).sum())
-    return of_the_mean > _ONE_SIDED * (of_the_mean + float((deviation**2).sum()))
+    def _show(self, on_stage: StageSink, state: State, difference: FloatImage) -> None:
+        pictures.emit(
+            on_stage,
+            self.stages,
+            difference=difference,
+            change=state.difference,
+            curvature=state.moved.curvature,
+            threshold=state.threshold,
+            response=self._weak_response(state),
+            response_threshold=self._weak.threshold,
+            candidates=state.candidates,
+            edges=[outline.edge for outline in state.outlines],
+            mask=state.mask,
+        )

@@ -1,6 +1,6 @@
-"""Touches too light for the bending's gate: where the gel's slopes stand out of the frame's own noise.
+"""Weak-contact detector: a matched filter for touches that stay below the detection threshold of the curvature.
 
-A light touch changes the light by a grey level or two over a millimetre, less than it drifts. But the light drifts in
+A weak contact changes the light by a grey level or two over a millimetre, less than it drifts. But the light drifts in
 bands along the columns and slowly down them, gains, and moves its pattern: each column less its lowest cosines and a
 parabola, and less what the reference turns into with a gain or a shift, is left with the touch and noise. What is left
 is correlated with the slopes of a small round dent, in both directions and each colour, and counted in units of its own
@@ -13,10 +13,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 
-_DENT_SIGMA_PX = 2.5
-"""Of the dent at half the working size, about 0.27 mm."""
 _REACH = 3.5
 _COSINES_DOWN = 7
 """With a parabola, since drift may slope at the border where cosines are level."""
@@ -24,31 +23,44 @@ _LEVELS, _MOST_CUT_OFF = (12.0, 224.0), 0.05
 """Beyond these noise and drift reach the ends of the scale, where drift has edges; and how much of a column may be."""
 _PATTERN_SIGMA_PX = 2.0
 """The reference's own noise must not pass for its pattern: the change has the same noise."""
-_NORMAL_OF_MEDIAN = 1.4826
 _LEAST_NOISE_LEVELS = 1e-3
 _WINSORISED, _RIDGE = 2.0, 0.05
 _EVERY, _BORDER_PX = 2, 8
 """Noise is counted at every second place, away from the border, where there is less of it."""
 _LONG_SIDE_PX = 160
-_GATE, _LEAST_SHOWN, _GATE_RATIO = 6.9, 6.0, 3.0
-"""What a touch stands out by, and less than contacts show; a `gate_ratio` above the default raises both."""
-_LEAST_TOLD, _RIM_PX = 0.5, 9
+_GATE_RATIO = 3.0
+"""The recipe's default `gate_ratio`; a higher one raises the detector's thresholds too."""
+_LEAST_VALID, _RIM_PX = 0.5, 9
 
 
-class LightTouch:
-    """Looks for light touches, prepared for a reference.
+class WeakContactDetector:
+    """The matched filter, prepared for a reference.
 
     Args:
         reference: mean of the untouched gel's frames at half the working size, shape (height, width, 3),
             grey levels.
-        lit: which colours have light, shape (3,); the others are not asked.
-        clean: where there is no crumb, shape (height, width), 0 or 1.
+        lit: which colours have light, shape (3,); the others are left out.
+        clean: where there is no debris, shape (height, width), 0 or 1.
+        constants: the dent's size and the thresholds.
+        gate_ratio: the recipe's.
     """
 
-    def __init__(self, reference: FloatImage, lit: npt.NDArray[np.bool_], clean: FloatImage) -> None:
+    def __init__(
+        self,
+        reference: FloatImage,
+        lit: npt.NDArray[np.bool_],
+        clean: FloatImage,
+        constants: Constants,
+        gate_ratio: float,
+    ) -> None:
         height, width = clean.shape
+        # A lower ratio than the default does not lower the thresholds: noise would reach them.
+        strictness = max(1.0, gate_ratio / _GATE_RATIO)
+        self.threshold = constants.weak_threshold * strictness
+        """What the response has to reach."""
+        self._support = constants.weak_support * strictness
         self._reference, self._lit = reference, lit.astype(np.float32)
-        sigma_px = _DENT_SIGMA_PX * min(1.0, max(height, width) / _LONG_SIDE_PX)
+        sigma_px = constants.dent_sigma * min(1.0, max(height, width) / _LONG_SIDE_PX)
         self._reach_px = int(np.ceil(_REACH * sigma_px))
         x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
@@ -57,7 +69,7 @@ class LightTouch:
         blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
         side = 2 * self._reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-        self._told = (cv2.dilate(blind, around) == 0).astype(np.float32)
+        self._valid = (cv2.dilate(blind, around) == 0).astype(np.float32)
         down = ((np.arange(height) + 0.5) / height - 0.5)[:, None]
         orders = np.arange(min(_COSINES_DOWN, max(1, height // 4)))
         slow = [np.cos(np.pi * (down + 0.5) * orders), down, down**2]
@@ -96,24 +108,23 @@ class LightTouch:
 
         Returns:
             Shape (height, width): the chi distribution's six degrees of freedom are two of each lit colour. 0 where the
-            reference says nothing, since it is at an end of the scale or a crumb lies there.
+            reference is not valid, since it is at an end of the scale or debris lies there.
         """
         left = self._without_known(self._without_slow((frame - self._reference) * self._lit))
         total = np.zeros(left.shape[:2], np.float32)
         for across, down in ((self._slope, self._dent), (self._dent, self._slope)):
             slopes = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
             total += _in_units_of_noise(np.asarray(slopes, np.float32))
-        return np.sqrt(total) * self._told
+        return np.sqrt(total) * self._valid
 
-    def place(self, response: FloatImage, gate_ratio: float) -> tuple[int, int] | None:
-        """Where a touch lies, x and y, or None where nothing stands out.
+    def place(self, response: FloatImage) -> tuple[int, int] | None:
+        """Find where something touches: x and y, or None where nothing stands out.
 
         Args:
             response: from `response`.
-            gate_ratio: the recipe's.
         """
         _, strongest, _, (x, y) = cv2.minMaxLoc(response)
-        return (x, y) if strongest > gate(gate_ratio) else None
+        return (x, y) if strongest > self.threshold else None
 
     def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
         """Rows and columns within the dent's reach of a place.
@@ -125,31 +136,17 @@ class LightTouch:
         reach_px = self._reach_px
         return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
-    def shows(self, region: Mask, response: FloatImage, gate_ratio: float) -> bool:
-        """Whether a region's slopes are more than noise and drift; True where the reference does not let it be told.
+    def supports(self, region: Mask, response: FloatImage) -> bool:
+        """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
 
         Args:
             region: shape (height, width), 0 or not.
             response: from `response`.
-            gate_ratio: the recipe's.
         """
-        if np.mean(self._told[region > 0]) < _LEAST_TOLD:
+        if np.mean(self._valid[region > 0]) < _LEAST_VALID:
             return True
         with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
-        return float(response[with_rim].max()) > _LEAST_SHOWN * _strictness(gate_ratio)
-
-
-def gate(gate_ratio: float) -> float:
-    """What the response has to reach. A lower ratio than the default does not lower it: noise would open it.
-
-    Args:
-        gate_ratio: the recipe's.
-    """
-    return _GATE * _strictness(gate_ratio)
-
-
-def _strictness(gate_ratio: float) -> float:
-    return max(1.0, gate_ratio / _GATE_RATIO)
+        return float(response[with_rim].max()) > self._support
 
 
 def _in_units_of_noise(slopes: FloatImage) -> FloatImage:
@@ -160,7 +157,7 @@ def _in_units_of_noise(slopes: FloatImage) -> FloatImage:
     border_px = min(_BORDER_PX, min(slopes.shape[:2]) // 4)
     inner = slice(border_px, -border_px or None, _EVERY)
     few = slopes[inner, inner].reshape(-1, 3)
-    spread = np.maximum(_NORMAL_OF_MEDIAN * np.median(np.abs(few), axis=0), _LEAST_NOISE_LEVELS)
+    spread = np.maximum(NORMAL_OF_MEDIAN * np.median(np.abs(few), axis=0), _LEAST_NOISE_LEVELS)
     noise = np.clip(few / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
     size = np.sqrt(np.maximum(common.diagonal(), _LEAST_NOISE_LEVELS))

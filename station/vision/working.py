@@ -28,7 +28,7 @@ def working_image(image: Image) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def capped(image: Image) -> FloatImage:
+def clipped(image: Image) -> FloatImage:
     """The image cut off where it saturates, as float32.
 
     Args:

@@ -1,0 +1,60 @@
+"""Changed area: the second, plain witness of a contact, in a few lines that anyone can check.
+
+It is the number of pixels whose change, without the background and after flat-field correction, is longer than a few
+grey levels. It takes in the halo around a contact and misses a flat centre, so it is no contact area; but it rises
+with the contact whatever the body, and where it and the contour disagree, the contour is not to be trusted.
+"""
+
+import cv2
+import numpy as np
+
+from station.vision.constants import Constants
+from station.vision.contact import Mask
+from station.vision.region import Movement
+from station.vision.working import length_squared
+
+_PER_E_FOLD = 4.0
+"""How fast the confidence falls with the logarithm by which only the contour has shrunk: to a half at 16 %."""
+_NOISES = 4.0
+"""A place has changed beyond this many standard deviations of the background's own noise."""
+
+
+def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
+    """Where the image has changed.
+
+    Args:
+        moved: from `region.movement`.
+        noise_levels: the change's standard deviation where nothing touches.
+        constants: threshold and smoothing.
+
+    Returns:
+        Shape (height, width) at half the working size, 0 or 1.
+    """
+    smooth = cv2.GaussianBlur(moved.change, (0, 0), constants.changed_blur)
+    length = np.sqrt(length_squared(np.asarray(smooth, np.float32))) * moved.flat_field
+    return (length > max(constants.changed_levels, _NOISES * noise_levels)).astype(np.uint8)
+
+
+def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
+    """How far a contact's contour agrees with the changed area in size, 0 to 1.
+
+    A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing.
+    The reverse says little: a flat centre and a weak contact change less than the threshold.
+
+    Args:
+        contact_px: the contact area.
+        changed_px: the changed area, in the same unit.
+        constants: the ratio beyond which they disagree.
+    """
+    return float(min(1.0, constants.witness_ratio * contact_px / max(changed_px, 1.0)) ** 2)
+
+
+def agreement_of_growth(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:
+    """How far a contact's contour agrees with the changed area on whether the contact has shrunk, 0 to 1.
+
+    Args:
+        contact_px: contact area at the last step and now.
+        changed_px: changed area then and now.
+    """
+    grown, witnessed = (float(np.log(max(now, 1.0) / max(then, 1.0))) for then, now in (contact_px, changed_px))
+    return float(np.exp(-_PER_E_FOLD * max(0.0, min(0.0, witnessed) - grown)))
