@@ -8,6 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from station.twin.digit.backgrounds import background
+from station.twin.digit.codec import as_jpeg
+from station.twin.digit.debris import dent_of, moved, scattered
+from station.twin.digit.loaded import LoadedLight
 from station.twin.digit.noise import Drift, FrameNoise
 from station.twin.digit.numbers import Array, Fitted
 from station.twin.digit.optics import Optics
@@ -40,6 +43,14 @@ class Condition:
     """0 new to 1 worn through: the coating reflects less of the light that a dent turns, most in the middle."""
     light: tuple[float, float, float] = _FULL_LIGHT
     """Brightness of the LEDs, blue, green and red, over that of the fit."""
+    dirt_moved: int = 0
+    """0 for debris that stays; any other number is the seed of its new places: some specks moved, lost or new."""
+    bands: float = 0.0
+    """Grey levels that the image's border gains in the end as the whole gel is pushed towards its LEDs."""
+    depth_shade: float = 0.0
+    """Grey levels that a flat dent changes for each mm of its depth."""
+    jpeg_quality: int = 0
+    """1 to 100: each frame is compressed and decoded again; 0 for frames as the sensor sends them."""
 
 
 class DigitSensor:
@@ -68,7 +79,8 @@ class DigitSensor:
         self._gain = np.clip(levels, *_GAIN_LIMITS).astype(np.float32)
         self._noise, self._noise_factor = FrameNoise(fitted.noise, seed), noise
         self._drift, self._drift_factor = Drift(fitted.noise, seed), drift
-        self._seed = seed
+        self._seed, self._unit = seed, unit
+        self._loaded: LoadedLight | None = None
         self._dent: FloatArray | None = None
         self._condition = Condition()
         # Kept from frame to frame: fresh memory of this size costs as much as the sums.
@@ -95,6 +107,10 @@ class DigitSensor:
             self._clean = self._draw(dent, condition)
         if self._drift.advance(now_s) or redraw:
             self._base = self._drifted()
+        image = self._noisy()
+        return as_jpeg(image, condition.jpeg_quality) if condition.jpeg_quality else image
+
+    def _noisy(self) -> Image:
         if not self._noise_factor:
             return np.asarray(cv2.convertScaleAbs(np.maximum(self._base, 0.0)), np.uint8)
         factor = np.float32(self._noise_factor)
@@ -111,13 +127,19 @@ class DigitSensor:
 
     def _draw(self, dent: FloatArray | None, condition: Condition) -> Array:
         generator = np.random.default_rng([self._seed, 5])
+        pressed = dent  # without the debris, which is there in the reference too
         if condition.dirt:
-            crumbs = _crumbs(condition.dirt, generator)
-            dent = crumbs if dent is None else np.maximum(dent, crumbs)
+            specks = scattered(condition.dirt, generator)
+            if condition.dirt_moved:
+                specks = moved(specks, np.random.default_rng([self._seed, 9, condition.dirt_moved]))
+            debris = dent_of(specks)
+            dent = debris if dent is None else np.maximum(dent, debris)
         image = self._background.copy()
         if dent is not None:
             change = self._optics.change(dent, self._gain)
             image += change * _worn(condition.wear) if condition.wear else change
+        if pressed is not None:
+            self._load(image, pressed, condition)
         if condition.torn:
             _tear(image, self._background, generator)
         if condition.light != _FULL_LIGHT:
@@ -129,15 +151,16 @@ class DigitSensor:
             image = blurred * (1.0 - 0.7 * condition.fog) + blurred.mean() * 0.7 * condition.fog
         return image.astype(np.float32, copy=False)
 
-
-def _crumbs(count: int, generator: np.random.Generator) -> FloatArray:
-    """Dents of crumbs of 0.5 to 1.5 mm, shape (320, 240), mm."""
-    rows, columns = (side // 2 for side in SENSOR_SHAPE)
-    dent = np.zeros((rows, columns), np.float32)
-    for _ in range(count):
-        centre = (int(generator.integers(columns)), int(generator.integers(rows)))
-        cv2.circle(dent, centre, int(generator.integers(5, 14)), float(generator.uniform(0.1, 0.35)), cv2.FILLED)
-    return np.asarray(cv2.GaussianBlur(dent, (0, 0), 3.0), np.float32)
+    def _load(self, image: Array, dent: FloatArray, condition: Condition) -> None:
+        """Add the light of a loaded gel to an image."""
+        if not (condition.bands or condition.depth_shade):
+            return
+        if self._loaded is None:
+            self._loaded = LoadedLight(self._unit)
+        if condition.bands:
+            image += self._loaded.bands(dent, condition.bands)
+        if condition.depth_shade:
+            image += self._loaded.shade(dent, condition.depth_shade)
 
 
 def _worn(wear: float) -> Array:
