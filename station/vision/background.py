@@ -19,7 +19,7 @@ from station.vision.working import clipped, length_squared, resized
 
 _GRID_LONG_SIDE = 32
 _HIGHEST_COSINE = 4
-_ITERATIONS = 5
+_ITERATIONS = 3
 _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
 _STRIP_PX = 10
@@ -170,15 +170,6 @@ def _profiles(length: int, band_reach: float) -> npt.NDArray[np.float32]:
 def _rows(image: FloatImage) -> FloatImage:
     """The image with a row's colours side by side, which numpy goes through much faster; a view."""
     return image.reshape(len(image), -1)
-
-
-def without_column_medians(difference: FloatImage) -> FloatImage:
-    """The difference without each column's median, in which a band of light is no curvature.
-
-    Args:
-        difference: shape (height, width, 3), grey levels.
-    """
-    return difference - np.median(difference[:: max(1, len(difference) // _MEDIAN_SIDE)], axis=0)
 
 
 def destriped(change: FloatImage, background: FloatImage, constants: Constants) -> FloatImage:

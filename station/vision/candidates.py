@@ -7,22 +7,21 @@ import numpy as np
 import numpy.typing as npt
 
 from station.vision.background import quantile
-from station.vision.clusters import boundaries
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.region import Movement, level_of
 
 _FOOT_SHARE = 0.5
 """Of the detection threshold: a candidate's foot is never lower."""
-_LOW_QUANTILE = 0.3
-_STRONG_SHARE = 0.6
-_BESIDE = (0.85, 1.3)
+_STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
+"""Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
 _OVER_SPREAD = 3.0
+"""In standard deviations of the background's level: a candidate stands out by as much."""
 _OWN_SHARE = 0.35
-_LEAST = 0.01
+"""Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
-_NECKS = (0.4, 0.55, 0.7, 0.8)
-_NECK_DEPTH = 0.12
+_NECKS, _NECK_DEPTH = (0.4, 0.55, 0.7, 0.8), 0.12
+"""Of the greatest depth: where several contacts are parted, and by how much both sides have to be deeper."""
 
 
 class Candidates(NamedTuple):
@@ -30,16 +29,14 @@ class Candidates(NamedTuple):
 
     regions: list[Mask]
     """Of the curvature's shape, 0 or 1; the most likely first."""
-    clustered: FloatImage
-    """The quantity whose clusters are asked for: the change's level, or the curvature."""
-    levels: list[float]
-    """What parts its clusters, ascending."""
+    level: FloatImage
+    """What they stand out in: the change's level, or the curvature response."""
 
 
 def body_candidates(moved: Movement, threshold: float, constants: Constants) -> Candidates:
     """Where one body may lie: what has moved clear of the noise, or curves enough to reach the threshold.
 
-    A place has moved from half of what the curved places mostly reach on, or from the cluster boundary next to that.
+    A place has moved from half of what the curved places mostly reach on.
 
     Args:
         moved: from `region.movement`.
@@ -48,21 +45,18 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     """
     curvature = moved.curvature
     level, spread = level_of(moved, constants.level_window)
-    levels = _levels(level, max(spread, _LEAST))
     strongest = float(curvature.max())
     if strongest <= threshold:
-        return Candidates([], level, levels)
+        return Candidates([], level)
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
-    wanted = constants.candidate_share * quantile(strong, _LOW_QUANTILE)
-    beside = [cut for cut in levels if _BESIDE[0] * wanted < cut < _BESIDE[1] * wanted]
-    lowest = max(_OVER_SPREAD * spread, min(beside, key=lambda cut: abs(np.log(cut / wanted)), default=wanted))
+    lowest = max(_OVER_SPREAD * spread, constants.candidate_share * quantile(strong, _LOW_QUANTILE))
     seen = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
     gap = round(constants.bridge)
     bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (gap, gap))
     framed = cv2.copyMakeBorder(seen, gap, gap, gap, gap, cv2.BORDER_CONSTANT)
     bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[gap:-gap, gap:-gap]
     found = [part for part in _parts(np.asarray(bridged, np.uint8)) if curvature[part > 0].max() > threshold]
-    return Candidates(_heaviest_first(level, found), level, levels)
+    return Candidates(_heaviest_first(level, found), level)
 
 
 def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Candidates:
@@ -73,9 +67,8 @@ def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Can
         moved: from `region.movement`.
         constants: the level's window.
     """
-    level, spread = level_of(moved, constants.level_window)
-    shape = (level.shape[0], level.shape[1])
-    return Candidates([disc(shape, place, _WEAK_RADIUS_PX)], level, _levels(level, max(spread, _LEAST)))
+    level, _ = level_of(moved, constants.level_window)
+    return Candidates([disc(level.shape, place, _WEAK_RADIUS_PX)], level)
 
 
 def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask:
@@ -100,25 +93,14 @@ def separate_candidates(curvature: FloatImage, threshold: float) -> Candidates:
         curvature: shape (height, width), grey levels per pixel.
         threshold: the detection threshold, grey levels per pixel.
     """
-    levels = _levels(curvature, _LEAST)
     pieces: list[Mask] = []
-    for whole in _parts((curvature > _foot(levels, threshold)).astype(np.uint8)):
+    for whole in _parts((curvature > _FOOT_SHARE * threshold).astype(np.uint8)):
         peak = float(curvature[whole > 0].max())
         if peak > threshold:
             for part in _parts(whole * (curvature > _OWN_SHARE * peak)):
                 if curvature[part > 0].max() > threshold:
                     pieces += _split_at_necks(part)
-    return Candidates(_heaviest_first(curvature * curvature, pieces), curvature, levels)
-
-
-def _levels(field: FloatImage, least: float) -> list[float]:
-    """The values that part a field's clusters, clustered by their logarithm."""
-    return [float(np.exp(cut)) for cut in boundaries(np.log(np.maximum(field[::2, ::2], least)))]
-
-
-def _foot(levels: list[float], threshold: float) -> float:
-    """The highest cluster boundary between half the threshold and the threshold, or that half."""
-    return max([_FOOT_SHARE * threshold, *(level for level in levels if level <= threshold)])
+    return Candidates(_heaviest_first(curvature * curvature, pieces), curvature)
 
 
 def _heaviest_first(weight: FloatImage, regions: list[Mask]) -> list[Mask]:

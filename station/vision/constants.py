@@ -83,10 +83,8 @@ class Constants:
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
-    skin_window: float = constant(0.11, "of the radius", "window of the coherence that tells skin from smooth", "fit")
-    skin_left_out: float = constant(0.25, "", "weakest share of the region left out there", "fit")
-    smooth_small: float = constant(0.7, "", "coherence from which a small body is smooth", "fit")
-    smooth_at_one: float = constant(1.393, "", "the same, extrapolated to a radius of one pixel", "fit")
+    smooth_small: float = constant(0.64, "", "coherence from which a small body is smooth", "fit")
+    smooth_at_one: float = constant(1.333, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     fine_on_skin: float = constant(
         0.105, "grey level/px", "fine share times curvature, from which a body without background is skin", "fit"
@@ -120,6 +118,12 @@ class Constants:
     strong_quantile: float = constant(0.75, "", "quantile of the rays' falls that is called strong", "fit")
     least_steepness: float = constant(0.4, "of a strong fall", "a fall below it is no edge", "fit")
     highest_harmonic: float = constant(3.0, "", "of the start's radius around the circle", "fit")
+    border_chord: float = constant(
+        0.65, "of the extent", "a contact that reaches so far along a border is mirrored", "fit"
+    )
+    corner_chord: float = constant(0.4, "of the extent", "the same about a corner", "fit")
+    whole_fall: float = constant(0.68, "of a strong fall", "an edge that falls so far all around is no cut one", "fit")
+    whole_area: float = constant(0.55, "of the mirrored one", "and encloses more than this", "fit")
     # Weak contact
     dent_sigma: float = constant(2.5, "px", "size of the dent that is looked for, 0.27 mm", "fit", "half")
     weak_threshold: float = constant(
@@ -132,6 +136,10 @@ class Constants:
     # Press
     floor_erosion: float = constant(0.04, "of the radius", "by how much the contact so far may seem to shrink", "fit")
     released_share: float = constant(0.5, "of the load's change", "below it the body has been let go", "fit")
+    confirmed_share: float = constant(
+        0.9, "of the last area", "the next step confirms a contact that it contains", "fit"
+    )
+    confirmed_growth: float = constant(2.5, "", "and that has grown at most by this factor", "fit")
     # Witness
     changed_levels: float = constant(8.0, "grey level", "a place has changed from here on", "fit")
     changed_blur: float = constant(1.5, "px", "smoothing before", "fit", "half")

@@ -18,15 +18,17 @@ from station.vision.contact import FloatImage, Mask
 from station.vision.working import length_squared
 
 RAYS = 64
-_STEPS = 64
-_FIRST_SPAN = (0.3, 1.2)
-_SECOND_SPAN = (0.6, 1.4)
+_FIRST_SPAN, _FIRST_STEPS = (0.3, 1.2), 32
+_SECOND_SPAN, _SECOND_STEPS = (0.6, 1.4), 64
+"""In radii, from where to where the edge is looked for about the region's middle and about the first path's."""
 _LONGEST_JUMP = 2
 _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
 _ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
 """Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
 _HALF_FROM_PX = 2.0
+_LEAST_FALL_LEVELS = 1e-3
+_REACH_STEP_PX = 2.0
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -48,9 +50,14 @@ class Rays(NamedTuple):
         Args:
             mask: shape (height, width), 0 or not, not empty.
         """
-        moments = cv2.moments(mask, binaryImage=True)
-        middle = (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"])
-        (xx, xy, yy) = (moments[f"mu{order}"] / moments["m00"] for order in ("20", "11", "02"))
+        # Sums over rows and columns: `cv2.moments` of a mask takes ten times as long.
+        inside = (mask > 0).astype(np.float32)
+        x, y = np.arange(mask.shape[1], dtype=np.float32), np.arange(mask.shape[0], dtype=np.float32)
+        columns, rows = inside.sum(axis=0), inside.sum(axis=1)
+        area = float(columns.sum())
+        middle = (float(columns @ x) / area, float(rows @ y) / area)
+        x, y = x - np.float32(middle[0]), y - np.float32(middle[1])
+        xx, yy, xy = (float(value) / area for value in (columns @ (x * x), rows @ (y * y), y @ inside @ x))
         values, vectors = np.linalg.eigh(np.array([[xx + 1, xy], [xy, yy + 1]]))
         aspect = float(np.interp(np.sqrt(values[1] / values[0]), _ASPECTS, _STRETCHES))
         axes = vectors @ np.diag([aspect**-0.5, aspect**0.5]) @ vectors.T
@@ -153,29 +160,100 @@ def change_length(change: FloatImage, half: FloatImage, radius_px: float, consta
 
 
 def find_edge(
-    length: FloatImage, rays: Rays, radii: _Floats, stiffness: float, constants: Constants, floor: Mask | None = None
+    length: FloatImage,
+    region: Mask,
+    rays: Rays,
+    radii: _Floats,
+    stiffness: float,
+    constants: Constants,
+    floor: Mask | None = None,
 ) -> Edge:
-    """Find the edge of the contact in a region.
+    """Find the edge of the contact in a region; a contact that the border cuts is completed by its mirror image.
 
     Args:
         length: from `change_length`, shape (height, width), grey levels.
+        region: where the contact lies, halo and all, shape (height, width), 0 or not.
         rays: the region's, at that size.
         radii: how far the region reaches on them, shape (64,).
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
         constants: what is a steep fall.
         floor: what surely lies within the edge, 0 or not.
     """
+    edge = _closed_edge(length, rays, radii, stiffness, constants, floor)
+    left, top, right, bottom = _mirrored(region, constants)
+    if floor is not None or not (left or top or right or bottom):
+        return edge
+    # With its middle near the border a contact shows part of its edge only, and the way to its flat centre falls like
+    # an edge. With its mirror image it is closed.
+    sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
+    length_twice = np.asarray(cv2.copyMakeBorder(length, *sides), np.float32)
+    region_twice = np.asarray(cv2.copyMakeBorder(region, *sides), np.uint8)
+    rays_twice = Rays.about(region_twice)
+    radii_twice = _reach(region_twice, rays_twice)
+    completed = _closed_edge(length_twice, rays_twice, radii_twice, stiffness, constants, None)
+    points = completed.points - (left, top)
+    shape = (length.shape[0], length.shape[1])
+    completed = Edge(points, inside_image(points, shape), completed.drop_levels)
+    return edge if _is_whole(edge, completed, shape, constants) else completed
+
+
+def _closed_edge(
+    length: FloatImage, rays: Rays, radii: _Floats, stiffness: float, constants: Constants, floor: Mask | None
+) -> Edge:
     shape = (length.shape[0], length.shape[1])
     seen = inside_image(rays.points(radii), shape)
     if seen.any() and not seen.all():  # beyond the border the region says nothing: as far as it reaches elsewhere
         radii = np.where(seen, radii, np.maximum(radii, np.median(radii[seen])))
     radii = _smooth(radii, constants.highest_harmonic)
-    radii, _ = _steepest(length, rays, radii, _FIRST_SPAN, stiffness, constants, floor)
+    radii, _ = _steepest(length, rays, radii, np.linspace(*_FIRST_SPAN, _FIRST_STEPS), stiffness, constants, floor)
     rays, radii = rays.moved_to(rays.points(radii), shape)
     radii = _smooth(radii, constants.highest_harmonic)
-    radii, drop = _steepest(length, rays, radii, _SECOND_SPAN, stiffness, constants, floor)
+    radii, drop = _steepest(length, rays, radii, np.linspace(*_SECOND_SPAN, _SECOND_STEPS), stiffness, constants, floor)
     points = rays.points(radii)
     return Edge(points, inside_image(points, shape), drop)
+
+
+def _is_whole(edge: Edge, completed: Edge, shape: tuple[int, int], constants: Constants) -> bool:
+    """Whether an edge lies in the image and falls all around, so that the border cuts no more than the halo.
+
+    On the way to a cut contact's flat centre the change falls by less, or what falls is a part of the contact.
+    """
+    if not edge.seen.all():
+        return False
+    drops = (edge.drop_levels, completed.drop_levels[completed.seen])
+    strong = float(np.quantile(np.concatenate(drops), constants.strong_quantile))
+    if np.clip(edge.drop_levels / max(strong, _LEAST_FALL_LEVELS), 0, 1).mean() < constants.whole_fall:
+        return False
+    return _area(edge.points, shape) > constants.whole_area * _area(completed.points, shape)
+
+
+def _area(points: _Floats, shape: tuple[int, int]) -> int:
+    mask = np.zeros(shape, np.uint8)
+    return cv2.countNonZero(cv2.fillPoly(mask, [np.rint(points).astype(np.int32)], 1))
+
+
+def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
+    """By how much to continue the image beyond its left, upper, right and lower border with its mirror image, px.
+
+    Not where a contact reaches opposite borders: it fills the field instead.
+    """
+    _, _, width, height = cv2.boundingRect(region)
+    sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
+    chords = np.array([np.count_nonzero(side) for _, side in sides]) / (height, width, height, width)
+    if (np.minimum(chords, np.roll(chords, 2)) > 0).any():
+        return 0, 0, 0, 0
+    in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > constants.corner_chord
+    near = chords > np.where(in_corner, constants.corner_chord, constants.border_chord)
+    left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
+    return left, top, right, bottom
+
+
+def _reach(region: Mask, rays: Rays) -> _Floats:
+    """How far a region reaches on each ray."""
+    steps = np.arange(1.0, np.hypot(*region.shape), _REACH_STEP_PX)
+    x, y = rays.places(steps)
+    values = cv2.remap(region, x, y, cv2.INTER_NEAREST, None, cv2.BORDER_CONSTANT)
+    return np.asarray(np.where(values > 0, steps, 2.0).max(axis=1), np.float64)
 
 
 def inside_image(points: _Floats, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
@@ -198,14 +276,13 @@ def _steepest(
     length: FloatImage,
     rays: Rays,
     radii: _Floats,
-    span: tuple[float, float],
+    shares: _Floats,
     stiffness: float,
     constants: Constants,
     floor: Mask | None,
 ) -> tuple[_Floats, _Floats]:
     """The radius of the steepest path and the drop across it, per ray."""
     height, width = length.shape
-    shares = np.linspace(*span, _STEPS)
     x, y = rays.places(radii[:, None] * shares)
     profile = cv2.remap(length, x, y, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
     # The largest further out: on the way to the flat centre nothing falls.
@@ -223,7 +300,7 @@ def _steepest(
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
     each = np.arange(RAYS)
-    drop = profile[each, np.maximum(path - side, 0)] - profile[each, np.minimum(path + side, _STEPS - 1)]
+    drop = profile[each, np.maximum(path - side, 0)] - profile[each, np.minimum(path + side, len(shares) - 1)]
     return radii * shares[path], drop.astype(np.float64)
 
 

@@ -61,7 +61,7 @@ def find_outline(
     rays, radii = body.rays.scaled(scale), body.radii * scale[0]
     noise = texture.noise_level(length, background, constants) if texture.has_room_for_few(region, constants) else 0.0
     if not body.textured and not _is_faint_skin(length, region, body, noise, constants):
-        edge = find_edge(length, rays, radii, stiffness, constants, floor)
+        edge = find_edge(length, region, rays, radii, stiffness, constants, floor)
         confidence = edge_confidence(edge, background_spread(length, background.weight), constants)
         return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
     points = rays.points(radii)

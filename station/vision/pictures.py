@@ -11,6 +11,8 @@ _GREY = 128.0
 _AMPLIFICATION = 4.0
 _BLUR_PX = 2.0
 _SUBPIXEL_BITS = 4
+_LEVEL_SHOWN = 8.0
+"""Grey levels: twice as much is brightest where nothing has moved more."""
 
 
 def emit(
@@ -38,7 +40,7 @@ def emit(
         threshold: the detection threshold of the curvature.
         response: from `WeakContactDetector.response`, shape of `curvature`.
         response_threshold: from how much of it on a weak contact is outlined.
-        candidates: with the clusters that they come from.
+        candidates: with the level that they stand out in.
         edges: of the contacts found, in pixels of `change`.
         mask: 0 or 255, at the input's size.
     """
@@ -49,15 +51,13 @@ def emit(
         cv2.polylines(
             outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
         )
-    levels = candidates.levels
-    clusters = (np.digitize(candidates.clustered, levels) * (255 // (len(levels) + 1))).astype(np.uint8)
     pictures = (
         _signed(difference, 1),
         _signed(change, _AMPLIFICATION),
         _signed(denoised, _AMPLIFICATION),
         _strength(curvature, threshold),
         _strength(response, response_threshold),
-        clusters,
+        _strength(candidates.level, _LEVEL_SHOWN),
         outlined,
     )
     size = (mask.shape[1], mask.shape[0])

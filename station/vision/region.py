@@ -128,7 +128,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, coherence = start, p.candidate_share, 0.0
+    mask, share, agreed, coherence = start, p.candidate_share, 0.0, 0.0
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
@@ -139,8 +139,9 @@ def find_region(
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
         if last:
-            known = min(1.0, 2 * moved.share / p.known_share)
-            coherence = known * _coherence(moved, mask, p.coherence_window * radius)
+            agreed = _coherence(moved, mask, p.coherence_window * radius)
+            # With hardly any background the model has bent the body's own slopes, and directions say little.
+            coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
             share = p.share_random + p.share_coherent * coherence + p.share_field * float(mask.mean())
             share = float(np.clip(share, p.share_least, p.share_most))
@@ -157,27 +158,27 @@ def find_region(
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
-    textured = is_textured(moved, mask, p) if texture is None else texture
+    textured = is_textured(moved, mask, agreed, p) if texture is None else texture
     return Region(mask, rays, radii, level, spread, coherence, textured)
 
 
-def is_textured(moved: Movement, region: Mask, constants: Constants) -> bool:
+def is_textured(moved: Movement, region: Mask, coherence: float, constants: Constants) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
 
-    Without background the model has bent the body's own slopes, and directions say little: there skin is what is finer
-    than those slopes, times how much the strongest tenth curves.
+    Without background directions say little: there skin is what is finer than the body's own slopes, times how much
+    the strongest tenth curves.
 
     Args:
         moved: from `movement`.
         region: at half the working size, 0 or 1, not empty.
+        coherence: of the change's directions in the region, 0 to 1.
         constants: windows and limits.
     """
     p = constants
-    radius = radius_of(region)
     if moved.share < p.known_share / 2:
         return _fine_share(moved.change, region, p) * quantile(moved.curvature[region > 0], 0.9) > p.fine_on_skin
-    skin = _coherence(moved, region, p.skin_window * radius, p.skin_left_out)
-    return skin < min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
+    smooth_from = p.smooth_at_one - p.smooth_per_size * float(np.log(radius_of(region)))
+    return coherence < min(p.smooth_small, smooth_from)
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
@@ -212,11 +213,10 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float = 0.0) -> float:
+def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
-    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
-    share `leave_out` of the region that has moved least is left out.
+    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
     change, squared, weight = moved.change, moved.squared, moved.weight
@@ -238,8 +238,7 @@ def _coherence(moved: Movement, region: Mask, window_px: float, leave_out: float
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
     whole = np.maximum(whole, _LEAST_LEVEL)
-    kept = whole >= quantile(whole, leave_out)
-    return quantile(agreed[kept] / whole[kept], 0.5)
+    return quantile(agreed / whole, 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from station.settings.segmentation import RobustParameters
 from station.vision import pictures
-from station.vision.background import Background, BackgroundModel, Coefficients, destriped, without_column_medians
+from station.vision.background import Background, BackgroundModel, Coefficients, destriped
 from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
 from station.vision.changed_area import agreement, agreement_of_growth, changed
 from station.vision.constants import CONSTANTS, Constants
@@ -57,12 +57,13 @@ class Trace(NamedTuple):
     coefficients: Coefficients
     """Of the background model."""
     floor: Mask | None
-    """The contact at the last step that was trusted, at half the working size, 0 or 1; None before there is one."""
+    """The contact so far, at half the working size, 0 or 1; None before one is trusted or confirmed."""
     floor_load_levels: float
     """How much the whole image differed then."""
-    contact_px: int
+    contact: Mask
+    """The contact at the last step, trusted or not, at half the working size, 0 or 1."""
     changed_px: int
-    """Both areas at the last step, px of half the working size; 0 where there was no contact."""
+    """The changed area at the last step, px of half the working size."""
     textured: bool | None
     """Whether the body is textured, as last seen with enough background to know; None before."""
 
@@ -122,7 +123,7 @@ class RobustMethod:
         "denoised",
         "curvature",
         "slopes",
-        "clustered",
+        "level",
         "edge",
         "segmented",
     )
@@ -240,16 +241,12 @@ class RobustMethod:
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
         quarter = self._reduced(state.difference, _COARSE_STEP)
-        first_guess = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
-        # A band of light that drifts is no curvature once its columns are level; only then is it seen to be calm.
-        banded = curvature(without_column_medians(quarter), _COARSE_STEP, self._constants)
-        state.calm = calm(banded, self._least_curvature, self._constants)
+        state.calm = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
         before = state.before
         if before is not None and before.floor is not None:
-            size = (first_guess.shape[1], first_guess.shape[0])
-            free = 1 - resized(before.floor.astype(np.float32), size)
-            first_guess, state.calm = first_guess * free, state.calm * free
-        state.background = self._model.fit(quarter, first_guess, None if before is None else before.coefficients)
+            size = (state.calm.shape[1], state.calm.shape[0])
+            state.calm *= 1 - resized(before.floor.astype(np.float32), size)
+        state.background = self._model.fit(quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
             state.difference = state.difference - state.background.levels
         state.difference *= self._unsaturated
@@ -453,9 +450,8 @@ class RobustMethod:
         contact_px = round(contact_px * state.changed.size / (self._shape[0] * self._shape[1]))
         changed_px = cv2.countNonZero(state.changed)
         agreed = agreement(contact_px, changed_px, self._constants)
-        if state.before is not None and state.before.contact_px:
-            areas = (state.before.contact_px, contact_px), (state.before.changed_px, changed_px)
-            agreed *= agreement_of_growth(*areas)
+        if state.before is not None and (before_px := cv2.countNonZero(state.before.contact)):
+            agreed *= agreement_of_growth((before_px, contact_px), (state.before.changed_px, changed_px))
         return agreed
 
     def _weak_response(self, state: State) -> FloatImage:
@@ -471,13 +467,24 @@ class RobustMethod:
         floor, load_levels = state.floor, 0.0 if before is None else before.floor_load_levels
         contact_px = cv2.countNonZero(mask)
         if contact_px and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
-            floor, load_levels = mask, background.load_levels
+            # Together with what was known: each step may seem to shrink a little, and many must not add up.
+            known_before = None if before is None or state.floor is None else before.floor
+            floor, load_levels = mask if known_before is None else mask | known_before, background.load_levels
+        elif before is not None and self._confirms(mask, before.contact):
+            floor = before.contact if floor is None else floor | before.contact
+            load_levels = max(load_levels, background.load_levels)
         textured = None if before is None else before.textured
         if state.outlines and known:
             textured = state.outlines[0].textured
         # What is fitted with hardly any background would take in more of the contact from step to step.
         coefficients = background.coefficients if known or before is None else before.coefficients
-        return Trace(coefficients, floor, load_levels, contact_px, cv2.countNonZero(state.changed), textured)
+        return Trace(coefficients, floor, load_levels, mask, cv2.countNonZero(state.changed), textured)
+
+    def _confirms(self, contact: Mask, before: Mask) -> bool:
+        """Whether a contact holds nearly all of the last step's and has not grown too much: chance does neither."""
+        area_px = cv2.countNonZero(before)
+        kept = cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
+        return area_px > 0 and kept and cv2.countNonZero(contact) <= self._constants.confirmed_growth * area_px
 
     def _at_input_size(self, half_px: int, state: State) -> int:
         return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
