@@ -50,11 +50,11 @@ class Rays(NamedTuple):
         Args:
             mask: shape (height, width), 0 or not, not empty.
         """
-        # Sums over rows and columns: `cv2.moments` of a mask takes ten times as long.
-        inside = (mask > 0).astype(np.float32)
-        x, y = np.arange(mask.shape[1], dtype=np.float32), np.arange(mask.shape[0], dtype=np.float32)
+        # Sums over every second row and column: `cv2.moments` of a mask takes forty times as long.
+        inside = (mask[::2, ::2] > 0).astype(np.float32)
+        y, x = (2 * np.arange(side, dtype=np.float32) + np.float32(0.5) for side in inside.shape)
         columns, rows = inside.sum(axis=0), inside.sum(axis=1)
-        area = float(columns.sum())
+        area = max(1.0, float(columns.sum()))
         middle = (float(columns @ x) / area, float(rows @ y) / area)
         x, y = x - np.float32(middle[0]), y - np.float32(middle[1])
         xx, yy, xy = (float(value) / area for value in (columns @ (x * x), rows @ (y * y), y @ inside @ x))

@@ -22,6 +22,7 @@ from station.vision.contour import change_length
 from station.vision.curvature import calm, curvature, curvature_noise
 from station.vision.debris import Debris
 from station.vision.outline import Outline, find_outline
+from station.vision.reference_check import ReferenceCheck
 from station.vision.region import Movement, Region, find_region, flat_field_correction, movement, radius_of
 from station.vision.weak_contact import WeakContactDetector
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
@@ -37,6 +38,7 @@ _WEAK_DOUBT = 0.5
 """Of a weak contact's confidence: its area is rough, so that it is hardly ever judged."""
 
 STAGES = (
+    "reference check",
     "background",
     "destriping",
     "debris",
@@ -145,12 +147,12 @@ class RobustMethod:
         self._shape, self._parameters, self._constants, self._without = shape, parameters, constants, without
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
+        self._check = ReferenceCheck(self._reference)
         self._light = clipped(self._reference)
         half = self._reduced(self._light, _FINE_STEP)
         self._flat_field = flat_field_correction(half, constants)
         if "flat field" in without:
             self._flat_field = np.ones_like(self._flat_field)
-        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._model = BackgroundModel(self._reference, constants)
         means = np.asarray(cv2.mean(self._light)[:3])
         lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
@@ -168,6 +170,7 @@ class RobustMethod:
     def pipeline(self) -> tuple[Callable[[State], None], ...]:
         """The stages in their order."""
         return (
+            self._check_reference,
             self._subtract_background,
             self._destripe,
             self._bridge_debris,
@@ -237,6 +240,11 @@ class RobustMethod:
         return State(work, difference, before if isinstance(before, Trace) else None)
 
     # The stages
+
+    def _check_reference(self, state: State) -> None:
+        """Flag a frame of another sensor than the reference's."""
+        if "reference check" not in self._without and self._check.mismatch(state.work) > 1:
+            state.flags.add(Flag.REFERENCE_MISMATCH)
 
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
@@ -371,9 +379,6 @@ class RobustMethod:
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
         p, flags, work = self._constants, state.flags, state.work
-        background = state.background
-        if background.strength_levels > 0.35 * self._light_levels or background.spread_levels >= p.most_spread:
-            flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
