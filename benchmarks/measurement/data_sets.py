@@ -89,12 +89,13 @@ def soft_presses(seeds: Sequence[int]) -> DataSet:
     for press in soft_bodies.soft_presses(seeds):
         images = [working_image(mean_image(step.frames)) for step in press.steps]
         # A ring's flat middle is measured with it, as a ball's is: one image does not tell which of them it is.
-        truths = [small(_filled(np.asarray(step.true_mask, np.uint8))) for step in press.steps]
+        truths = [small(filled(np.asarray(step.true_mask, np.uint8))) for step in press.steps]
         found.append(PressData(press.kind, [working_image(one) for one in press.references], images, truths))
     return found
 
 
-def _filled(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+def filled(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """A mask with its holes filled."""
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return np.asarray(cv2.drawContours(np.zeros_like(mask), outlines, -1, 255, cv2.FILLED), np.uint8)
 
@@ -119,7 +120,7 @@ def _call(part: Callable[[], DataSet]) -> DataSet:
     return part()
 
 
-def twin_sets(held_back: bool) -> Iterator[tuple[str, Callable[[], DataSet]]]:
+def twin_sets(*, held_back: bool) -> Iterator[tuple[str, Callable[[], DataSet]]]:
     """The twin's data sets, of seeds to fit on or held back."""
     fruit, bruised, soft = ((2600, 22800, 7000), (0, 20000, 5000))[not held_back]
     yield "fruit", partial(fruit_presses, fruit, bruised=False)

@@ -17,11 +17,11 @@ from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
+from station.vision.constants import CONSTANTS
 from station.vision.contact import Image
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
-from station.vision.weak_contact import gate as light_touch_gate
 
 DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
 DETECTION_UNITS = (None, 7)
@@ -33,7 +33,7 @@ BOUND_COSINES = 6
 
 AVERAGED = ((FRAMES_PER_STEP, 5), (6, 15), (12, 31))
 """Frames a step and reference frames: the recipes', and more."""
-GATE = light_touch_gate(RobustParameters().gate_ratio)
+GATE = CONSTANTS.weak_threshold
 GATES = (6.0, 6.5, 6.9, 7.5, 8.5)
 """Of the light touches' response that are tried."""
 UNTOUCHED_RADII = 2.5
@@ -94,7 +94,7 @@ def light_contacts(frames_per_step: int, references: int) -> tuple[list[Light], 
                 elif abs(step.true_mm2 / area_mm2 - 1) < 0.3:
                     fruit = seed, options.pose, unit
                     ratio = contact.area_px / step.true_px
-                    response = float(method.light_touch(image)[0].max())
+                    response = float(method.weak_response(image)[0].max())
                     peer_found = bool(peer(image).any())
                     contacts.append(Light(kind, fruit, area_mm2, closing_mm, ratio, response, peer_found))
     return contacts, len(empty), sum(empty)
@@ -106,7 +106,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
     empty = [one.response for unit in UNITS for one in untouched(unit, "plain")]
     beside: list[float] = []
     for reference, image, far in presses:
-        response, _ = RobustMethod([reference], RobustParameters()).light_touch(image)
+        response, _ = RobustMethod([reference], RobustParameters()).weak_response(image)
         size = (response.shape[1], response.shape[0])
         clear = cv2.resize(far.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
         beside.append(float(response[clear].max()))

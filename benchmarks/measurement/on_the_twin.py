@@ -95,7 +95,12 @@ def squeezed(
 
 
 def squeezed_with_masks(
-    kind: str, seed: int, options: PressOptions, *, bruised: bool = False
+    kind: str,
+    seed: int,
+    options: PressOptions,
+    *,
+    bruised: bool = False,
+    closings_mm: Sequence[float] = CLOSINGS_MM,
 ) -> tuple[list[Image], list[Image], list[npt.NDArray[np.bool_]]]:
     """The references, the steps' mean images and the true masks of a press, all at the working size."""
     fruit, gel = replace(draw_fruit(kind, seed), bruised=bruised), Gel()
@@ -104,7 +109,7 @@ def squeezed_with_masks(
     references = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]
     images: list[Image] = []
     truths: list[npt.NDArray[np.bool_]] = []
-    for number, closing_mm in enumerate(CLOSINGS_MM):
+    for number, closing_mm in enumerate(closings_mm):
         seen = on_gel.pressed(Squeeze(fruit, gel, held_s=number * options.step_s).at(closing_mm))
         began_s = options.references / FRAMES_PER_S + (number + 1) * options.step_s
         frames = [

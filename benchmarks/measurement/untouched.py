@@ -42,7 +42,7 @@ def untouched(unit: int, condition: str) -> list[Untouched]:
         frames = [sensor.frame(None, now_s, options.condition) for now_s in times_s]
         mean = mean_image(frames)
         contact = measure_step(method, frames, parameters.least_confidence)
-        found.append(Untouched(contact, float(method.light_touch(mean)[0].max()), bool(np.any(peer(mean)))))
+        found.append(Untouched(contact, float(method.weak_response(mean)[0].max()), bool(np.any(peer(mean)))))
     return found
 
 

@@ -127,6 +127,8 @@ class BackgroundModel:
         # The less background there is, the more of a contact's own slopes the shapes could explain.
         known = float(np.clip(weight.mean() / p.known_share, _LEAST_KNOWN, 1))
         ridge = self._ridge / known**3
+        if before is not None:  # from step to step the light drifts by less than since the reference
+            ridge = ridge / p.step_share**2
         spread = p.most_spread / 2
         change = np.zeros_like(expected)
         fitted = np.zeros_like(samples)

@@ -46,6 +46,7 @@ class Constants:
     band_prior: float = constant(10.0, "grey level", "prior standard deviation of a border band", "fit")
     band_reach: float = constant(0.07, "of the side", "a border band falls by e over this length", "fit")
     cell_noise: float = constant(2.0, "grey level", "noise of one cell of the fit's grid", "fit")
+    step_share: float = constant(0.3, "of the priors", "how much the light changes from step to step", "fit")
     known_share: float = constant(0.2, "of the frame", "with less background the priors are drawn in", "fit")
     least_spread: float = constant(0.5, "grey level", "the background's residual is never taken as smaller", "fit")
     most_spread: float = constant(8.0, "grey level", "the background's residual is never taken as larger", "fit")
