@@ -23,7 +23,7 @@ _ITERATIONS = 3
 _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
 _STRIP_PX = 10
-_MEDIAN_SIDE = 28
+_MEDIAN_SIDE = 20
 _NO_PRIOR = 1e-3
 
 Coefficients = npt.NDArray[np.float32]

@@ -22,7 +22,7 @@ from station.vision.working import length_squared, resized
 _CHANGE_BLUR_PX = 1.0
 _STEPS = 80
 _FIRST_EVERY = 2
-_HALF_FROM_PX = 2.5
+_HALF_FROM_PX = 1.5
 _LEAST_LEVEL = 1e-3
 _FLOOR_QUANTILE = 0.03
 """Of a field without background: nearly its least."""
