@@ -96,6 +96,8 @@ class Point(Model):
     area_px: int | None
     confidence: float | None
     flags: list[str]
+    changed_area_mm2: float | None = Field(default=None, description="How much of the image has changed.")
+    changed_area_px: int | None = Field(default=None, description="The same.")
 
 
 class InspectionWhole(Model):

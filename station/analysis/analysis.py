@@ -1,7 +1,7 @@
 """One run of `station analyze`: images in, the folder of results out."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from station.analysis.decoding import Decoded
 from station.analysis.measurement import Measured, Refused, measure_all
 from station.analysis.output import OutputFolder, flag_names
 from station.analysis.pictures import outlined, sheet, stacked, thumbnail
+from station.analysis.presses import Run, runs, singles
 from station.analysis.report import Report, ReportRow, data_uri, render
 from station.analysis.sources import Source
 from station.calibration.model import Calibration
@@ -27,6 +28,7 @@ _THUMBNAIL_PX = 220
 _STAGE_PX = 150
 _COLUMNS = 10
 _NO_MASK = np.zeros((0, 0), np.uint8)
+_LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,20 +47,24 @@ class Request:
     jobs: int
     calibration: Calibration | None = None
     """Of the unit that took the images; None where it is not known."""
+    sequence: bool = False
+    """The images are the steps of one press, in the order given."""
 
 
-@dataclass(slots=True)
-class _Gathered:
-    """What the report needs of each image, small enough to keep for all of them."""
+@dataclass(frozen=True, slots=True)
+class _Summary:
+    """What the report needs of one image, small enough to keep for all of them."""
 
-    rows: list[ReportRow] = field(default_factory=list)
-    thumbnails: list[tuple[str, list[Image]]] = field(default_factory=list)
-    stages: list[tuple[str, list[Image]]] = field(default_factory=list)
-    stage_names: tuple[str, ...] = ()
-    qualities: list[tuple[str, DenoisingQuality]] = field(default_factory=list)
-    details: list[tuple[str, Contact]] = field(default_factory=list)
-    """Without their masks: those lie on the disk."""
-    readings: list[tuple[str, Reading]] = field(default_factory=list)
+    row: ReportRow
+    contact: Contact
+    """Without its mask, which is on the disk, and without what is for the next step."""
+    caption: str
+    thumbnail: Image
+    reading: Reading | None
+    """None without widths, and where the area is unknown."""
+    stages: dict[str, Image]
+    """Their thumbnails by name; empty where they were not asked for."""
+    quality: DenoisingQuality | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,27 +92,39 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     references = [decoded.image for decoded in request.references]
     shape = references[0].shape
     scale = _scale(request.calibration, shape[0], shape[1])
-    gathered = _Gathered()
-    refused: list[Refused] = []
+    order = _order(request)
+    found: dict[int, _Summary | Refused] = {}
     with OutputFolder(request.out) as output:
         for item in measure_all(
             request.sources,
+            order,
             shape,
             lambda: make_method(references, request.segmentation),
+            least_confidence=request.segmentation.robust.least_confidence,
             jobs=request.jobs,
             stages=request.stages,
         ):
             if isinstance(item, Refused):
-                refused.append(item)
+                output.leave_out(item)
+                found[item.number] = item
             else:
-                area_mm2, _ = scale.area_mm2(item.contact.area_px)
-                output.add(item, area_mm2)
+                output.add(item, scale.area_mm2(item.contact.area_px)[0])
                 output.add_stages(item)
-                _gather(gathered, item, area_mm2, request.widths_mm)
+                found[item.number] = _summary(item, scale, request.widths_mm)
             on_done()
-        if gathered.rows:
-            _write_summaries(output, request, gathered, refused, scale)
-    return Outcome(len(gathered.rows), sum(row.contact for row in gathered.rows), refused)
+        given = [found[number] for number in sorted(found)]
+        measured = [item for item in given if isinstance(item, _Summary)]
+        refused = [item for item in given if isinstance(item, Refused)]
+        if measured:
+            _write_summaries(output, request, measured, refused, scale, order)
+    return Outcome(len(measured), sum(item.row.contact for item in measured), refused)
+
+
+def _order(request: Request) -> list[Run]:
+    """The presses; `paper` measures every image by itself, as printed, so its images need no order."""
+    if request.segmentation.method == "paper":
+        return singles(request.sources)
+    return runs(request.sources, request.widths_mm, sequence=request.sequence)
 
 
 def _check_widths(request: Request) -> None:
@@ -119,35 +137,38 @@ def _check_widths(request: Request) -> None:
         raise BadInputError(f"--widths: no width for {', '.join(missing[:3])}{more}; add a row for each image")
 
 
-def _gather(gathered: _Gathered, item: Measured, area_mm2: float, widths_mm: dict[str, float] | None) -> None:
-    name = item.source.name
-    picture = thumbnail(outlined(item.image, item.contact.mask), _THUMBNAIL_PX)
+def _summary(item: Measured, scale: Scale, widths_mm: dict[str, float] | None) -> _Summary:
+    name, contact = item.source.name, item.contact
+    area_mm2, _ = scale.area_mm2(contact.area_px)
+    changed_mm2 = None if contact.changed_area_px is None else scale.area_mm2(contact.changed_area_px)[0]
+    picture = thumbnail(outlined(item.image, contact.mask), _THUMBNAIL_PX)
     width_mm = widths_mm[name] if widths_mm is not None else None
-    unknown = Flag.UNDECIDED in item.contact.flags
-    gathered.rows.append(
-        ReportRow(
+    unknown = Flag.UNDECIDED in contact.flags
+    known_at_mm = None if unknown else width_mm
+    bound = "at least " if contact.found and contact.flags & _LOWER_BOUNDS else ""
+    return _Summary(
+        row=ReportRow(
             image=name,
             picture=data_uri(picture),
             mask=f"masks/{item.source.stem}.png",
-            contact=item.contact.found,
-            area_px=item.contact.area_px,
+            contact=contact.found,
+            area_px=contact.area_px,
             area_mm2=area_mm2,
+            lower_bound=bool(bound),
+            changed_area_mm2=changed_mm2,
             width_mm=width_mm,
             closing_mm=None,
-            confidence=item.contact.confidence,
+            confidence=contact.confidence,
             flags=flag_names(item),
             notes=item.conversions,
-        )
+        ),
+        contact=replace(contact, mask=_NO_MASK, trace=None),
+        caption=f"{name}\n" + ("area unknown" if unknown else f"{bound}{area_mm2:.2f} mm2"),
+        thumbnail=picture,
+        reading=None if known_at_mm is None else Reading(known_at_mm, contact.area_px, area_mm2, contact.is_firm),
+        stages={stage: thumbnail(shown, _STAGE_PX) for stage, shown in item.stages.items()},
+        quality=_quality(item) if item.stages else None,
     )
-    gathered.details.append((name, replace(item.contact, mask=_NO_MASK)))
-    area = "area unknown" if unknown else f"{area_mm2:.2f} mm2"
-    gathered.thumbnails.append((f"{name}\n{area}", [picture]))
-    if width_mm is not None and not unknown:
-        gathered.readings.append((name, Reading(width_mm, item.contact.area_px, area_mm2, item.contact.is_firm)))
-    if item.stages:
-        gathered.stage_names = tuple(item.stages)
-        gathered.stages.append((name, [thumbnail(stage, _STAGE_PX) for stage in item.stages.values()]))
-        gathered.qualities.append((name, _quality(item)))
 
 
 def _quality(item: Measured) -> DenoisingQuality:
@@ -158,52 +179,67 @@ def _quality(item: Measured) -> DenoisingQuality:
 
 
 def _write_summaries(
-    output: OutputFolder, request: Request, gathered: _Gathered, refused: Sequence[Refused], scale: Scale
+    output: OutputFolder,
+    request: Request,
+    measured: Sequence[_Summary],
+    refused: Sequence[Refused],
+    scale: Scale,
+    order: Sequence[Run],
 ) -> None:
     output.write_errors(refused)
-    if any(contact.confidence is not None for _, contact in gathered.details):
-        output.write_details(gathered.details)
-    for name, picture in _pages("contact_sheet", gathered.thumbnails, 4):
+    if any(item.contact.confidence is not None for item in measured):
+        output.write_details([(item.row.image, item.contact) for item in measured])
+    for name, picture in _pages("contact_sheet", [(item.caption, [item.thumbnail]) for item in measured], 4):
         output.write_picture(name, picture)
     stages_pictures: list[tuple[str, str]] = []
-    for name, picture in _pages("stages", gathered.stages, 1, gathered.stage_names):
+    staged = [(item.row.image, list(item.stages.values())) for item in measured if item.stages]
+    for name, picture in _pages("stages", staged, 1, tuple(measured[0].stages)):
         output.write_picture(name, picture)
         stages_pictures.append((name, data_uri(picture)))
-    if gathered.qualities:
-        output.write_denoising(gathered.qualities)
-    svg, rows = _write_curve(output, request, gathered)
+    qualities = [(item.row.image, item.quality) for item in measured if item.quality is not None]
+    if qualities:
+        output.write_denoising(qualities)
+    svg, rows = _write_curve(output, request, measured)
     report = Report(
-        title=f"Contact areas of {len(gathered.rows)} images",
-        facts=_facts(request, scale),
+        title=f"Contact areas of {len(measured)} images",
+        facts=_facts(request, scale, order),
         rows=rows,
         errors=[(item.source.name, item.reason) for item in refused],
         curve_svg=svg,
         stages=stages_pictures,
         no_onset=request.widths_mm is not None and svg is None,
-        quality=_mean_quality(gathered.qualities),
+        quality=_mean_quality(qualities),
     )
     output.write_bytes("report.html", render(report).encode())
 
 
-def _write_curve(output: OutputFolder, request: Request, gathered: _Gathered) -> tuple[str | None, list[ReportRow]]:
+def _write_curve(
+    output: OutputFolder, request: Request, measured: Sequence[_Summary]
+) -> tuple[str | None, list[ReportRow]]:
     """Write the curve where there are widths, and put the closings into the report's rows."""
     from station.analysis.plots import curve_svg  # noqa: PLC0415 (matplotlib takes a second to load; few runs draw)
 
-    curve = area_curve(reading for _, reading in gathered.readings)
+    rows = [item.row for item in measured]
+    by_reading = {id(item.reading): item for item in measured if item.reading is not None}
+    curve = area_curve(item.reading for item in by_reading.values() if item.reading is not None)
     if not curve.points:
-        return None, gathered.rows
-    names = {id(reading): name for name, reading in gathered.readings}
-    images = [names[id(point.reading)] for point in curve.points]
+        return None, rows
+    of_points = [by_reading[id(point.reading)].row for point in curve.points]
+    images = [row.image for row in of_points]
     points = [point.reading for point in curve.points]
     wrong = wrong_frames([reading.width_mm for reading in points], [reading.area_mm2 for reading in points])
     output.write_curve(images, curve, wrong)
-    svg = curve_svg(curve, wrong, f"{request.recipe or 'press'}, method {request.segmentation.method}")
+    svg = curve_svg(
+        curve,
+        wrong,
+        f"{request.recipe or 'press'}, method {request.segmentation.method}",
+        changed_mm2=[row.changed_area_mm2 for row in of_points],
+        lower_bounds=[place for place, row in enumerate(of_points) if row.lower_bound],
+    )
     output.write_bytes("curve.svg", svg.encode())
     closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
     unfit = {images[frame.index] for frame in wrong}
-    return svg, [
-        _on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in gathered.rows
-    ]
+    return svg, [_on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in rows]
 
 
 def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
@@ -219,7 +255,7 @@ def _scale(calibration: Calibration | None, height_px: int, width_px: int) -> Sc
     return Scale(calibration.mm_per_px * smaller, calibration.scale_uncertainty)
 
 
-def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
+def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[str, str]]:
     count = len(request.references)
     converted = sorted({text for decoded in request.references for text in decoded.conversions})
     known = request.calibration
@@ -229,6 +265,7 @@ def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
         ("Method", request.segmentation.method),
         ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
         ("Recipe", request.recipe or "none: the method's defaults"),
+        ("Measured as", _presses_in_words(order)),
         (
             "Reference",
             "; ".join([request.reference_name + (f", median of {count} images" if count > 1 else ""), *converted]),
@@ -236,6 +273,13 @@ def _facts(request: Request, scale: Scale) -> list[tuple[str, str]]:
         ("Scale", f"{scale.mm_per_px:.4f} mm per pixel, {whose}: areas in mm² are good to {2 * scale.uncertainty:.0%}"),
         ("Program", f"fruit-station {version('fruit-station')}"),
     ]
+
+
+def _presses_in_words(order: Sequence[Run]) -> str:
+    steps = [len(run.numbers) for run in order if run.followed]
+    alone = sum(not run.followed for run in order)
+    pressed = f"{len(steps)} {'press' if len(steps) == 1 else 'presses'} of {', '.join(map(str, steps))} images"
+    return "; ".join([*([pressed] if steps else []), *([f"{alone} images, each by itself"] if alone else [])])
 
 
 def _mean_quality(qualities: Sequence[tuple[str, DenoisingQuality]]) -> str | None:

@@ -1,8 +1,8 @@
-"""Many images through one method, in order, on several threads."""
+"""Many images through one method: those of one press in order, the others on several threads."""
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -10,9 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from station.analysis.decoding import Decoded
+from station.analysis.presses import Run
 from station.analysis.sources import Source
+from station.analysis.stages import StagedMethod
 from station.errors import BadInputError
 from station.vision.contact import Contact, Image, Method
+from station.vision.press import PressTracker
 
 MakeMethod = Callable[[], Method]
 
@@ -22,6 +25,8 @@ class Measured:
     """One image with what was found in it."""
 
     source: Source
+    number: int
+    """In the order given by the user, from 0."""
     image: Image
     contact: Contact
     conversions: tuple[str, ...]
@@ -34,63 +39,110 @@ class Refused:
     """One image that could not be measured, and why."""
 
     source: Source
+    number: int
+    """In the order given by the user, from 0."""
     reason: str
 
 
+class _Press:
+    """Measures the images of one press, one after the other, all in one thread.
+
+    Args:
+        get_method: gives the method of the thread that measures.
+        least_confidence: the recipe's.
+        stages: whether the stages' pictures are wanted.
+    """
+
+    def __init__(self, get_method: MakeMethod, least_confidence: float, *, stages: bool) -> None:
+        self._get_method, self._least_confidence, self._stages = get_method, least_confidence, stages
+        self._staged: StagedMethod | None = None
+        self._tracker: PressTracker | None = None
+
+    def measure(self, image: Image) -> tuple[Contact, dict[str, npt.NDArray[np.uint8]]]:
+        """Find the contact in the next image.
+
+        Args:
+            image: of the reference's shape.
+
+        Returns:
+            The contact, and the stages' pictures by name.
+        """
+        if self._tracker is None:
+            method = self._get_method()
+            if self._stages:
+                method = self._staged = StagedMethod(method)
+            self._tracker = PressTracker(method, self._least_confidence)
+        contact = self._tracker.measure_step([image])
+        return contact, {} if self._staged is None else self._staged.pictures
+
+
 def measure_all(
-    sources: Iterable[Source],
+    sources: Sequence[Source],
+    order: Iterable[Run],
     shape: tuple[int, ...],
     make_method: MakeMethod,
     *,
+    least_confidence: float,
     jobs: int,
     stages: bool,
 ) -> Iterator[Measured | Refused]:
-    """Measure every source and give the results in the sources' order.
+    """Measure every source and give the results in the order of measuring.
 
-    Threads are enough: OpenCV releases the interpreter. At most two images a thread are held at once.
+    Threads are enough: OpenCV releases the interpreter. Images by themselves are measured on several threads, those of
+    a press on one of their own while the next are decoded. An image of a press that cannot be measured is passed over.
+    At most two images a thread are held at once.
 
     Args:
         sources: what to measure; decoded here, one after the other, since a video can only be read forwards.
+        order: every source once; a video's frames forwards.
         shape: the reference's shape (height, width, 3).
         make_method: makes a method for one thread's use.
+        least_confidence: the recipe's; below it a contact is flagged.
         jobs: number of threads, 1 or more.
         stages: whether the stages' pictures are wanted.
     """
     local = threading.local()
 
-    def measure(source: Source, decoded: Decoded) -> Measured:
+    def get_method() -> Method:
         if not hasattr(local, "method"):
             local.method = make_method()
-        pictures: dict[str, npt.NDArray[np.uint8]] = {}
-        contact = local.method.measure(decoded.image, pictures.__setitem__ if stages else None)
-        return Measured(source, decoded.image, contact, decoded.conversions, pictures)
+        return local.method
+
+    def measure(number: int, decoded: Decoded, press: _Press) -> Measured:
+        contact, pictures = press.measure(decoded.image)
+        return Measured(sources[number], number, decoded.image, contact, decoded.conversions, pictures)
 
     waiting: deque[Future[Measured] | Refused] = deque()
-    pool = ThreadPoolExecutor(jobs, thread_name_prefix="measure")
+    pool, in_order = (ThreadPoolExecutor(count, thread_name_prefix="measure") for count in (jobs, 1))
     try:
-        for source in sources:
-            try:
-                decoded = source.load()
-                _check_size(source, decoded, shape)
-            except BadInputError as error:
-                waiting.append(Refused(source, str(error)))
-            else:
-                waiting.append(pool.submit(measure, source, decoded))
-            while len(waiting) > 2 * jobs:
-                yield _finished(waiting.popleft())
+        for run in order:
+            press = _Press(get_method, least_confidence, stages=stages)
+            for number in run.numbers:
+                item = _load(sources[number], number, shape)
+                executor = in_order if run.followed else pool
+                waiting.append(item if isinstance(item, Refused) else executor.submit(measure, number, item, press))
+                while len(waiting) > 2 * jobs:
+                    yield _finished(waiting.popleft())
         while waiting:
             yield _finished(waiting.popleft())
     finally:
-        pool.shutdown(cancel_futures=True)
+        for executor in (pool, in_order):
+            executor.shutdown(cancel_futures=True)
 
 
-def _check_size(source: Source, decoded: Decoded, shape: tuple[int, ...]) -> None:
-    if decoded.image.shape != shape:
-        height, width = decoded.image.shape[:2]
-        raise BadInputError(
-            f"{source.name}: {width}x{height} px, but the reference has {shape[1]}x{shape[0]}; "
-            "use a reference from the same sensor, mode and orientation"
-        )
+def _load(source: Source, number: int, shape: tuple[int, ...]) -> Decoded | Refused:
+    try:
+        decoded = source.load()
+    except BadInputError as error:
+        return Refused(source, number, str(error))
+    if decoded.image.shape == shape:
+        return decoded
+    height, width = decoded.image.shape[:2]
+    why = (
+        f"{source.name}: {width}x{height} px, but the reference has {shape[1]}x{shape[0]}; "
+        "use a reference from the same sensor, mode and orientation"
+    )
+    return Refused(source, number, why)
 
 
 def _finished(item: "Future[Measured] | Refused") -> Measured | Refused:

@@ -24,7 +24,7 @@ from station.vision.quality import DenoisingQuality
 
 RESULT_COLUMNS = ("image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags")
 CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2")
-DETAIL_COLUMNS = ("image", "confidence", "gate", "drift_levels")
+DETAIL_COLUMNS = ("image", "confidence", "gate", "drift_levels", "changed_area_px")
 _OWN_NAMES = (
     "results.csv",
     "errors.csv",
@@ -49,6 +49,9 @@ class OutputFolder:
         self.folder = folder
         self._made: list[Path] = []
         self._results: FileIO | None = None
+        self._waiting: dict[int, tuple[object, ...] | None] = {}
+        """Rows that come before their turn; None for an image without a row."""
+        self._next = 0
 
     def __enter__(self) -> Self:
         """Make the folder and try to write in it.
@@ -72,6 +75,9 @@ class OutputFolder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close the table; leave no empty folder where nothing could be measured."""
+        with contextlib.suppress(BadInputError):  # ended early: the rows that are left follow without those before them
+            for number in sorted(self._waiting):
+                self._append(self._waiting.pop(number))
         if self._results is not None:
             self._results.close()
             return
@@ -83,7 +89,7 @@ class OutputFolder:
                 place.rmdir()
 
     def add(self, measured: Measured, area_mm2: float) -> None:
-        """Write an image's mask, then its row.
+        """Write an image's mask, then its row as soon as the rows of all images before it are written.
 
         Args:
             measured: the image and its contact.
@@ -104,6 +110,28 @@ class OutputFolder:
             "" if y_px is None else f"{y_px:.2f}",
             ";".join(flag_names(measured)),
         )
+        self._in_turn(measured.number, row)
+
+    def leave_out(self, refused: Refused) -> None:
+        """Wait for no row of an image that could not be measured.
+
+        Args:
+            refused: the image.
+
+        Raises:
+            BadInputError: as in `add`, for the rows that waited for it.
+        """
+        self._in_turn(refused.number, None)
+
+    def _in_turn(self, number: int, row: tuple[object, ...] | None) -> None:
+        self._waiting[number] = row
+        while self._next in self._waiting:
+            self._append(self._waiting.pop(self._next))
+            self._next += 1
+
+    def _append(self, row: tuple[object, ...] | None) -> None:
+        if row is None:
+            return
         path = self.folder / "results.csv"
         try:
             if self._results is None:
@@ -165,7 +193,11 @@ class OutputFolder:
             contacts: the image's name with its contact.
         """
         rows = [
-            (name, *("" if value is None else f"{value:.3f}" for value in (c.confidence, c.gate, c.drift_levels)))
+            (
+                name,
+                *("" if value is None else f"{value:.3f}" for value in (c.confidence, c.gate, c.drift_levels)),
+                "" if c.changed_area_px is None else c.changed_area_px,
+            )
             for name, c in contacts
         ]
         self._write_table("details.csv", DETAIL_COLUMNS, rows)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from io import StringIO
+from math import isnan, nan
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -10,13 +11,22 @@ from station.inspection.curve import AreaCurve
 from station.inspection.monotone import WrongFrame
 
 
-def curve_svg(curve: AreaCurve, wrong: Sequence[WrongFrame], title: str) -> str:
-    """Draw area over closing in the manner of the paper's Fig. 14.
+def curve_svg(
+    curve: AreaCurve,
+    wrong: Sequence[WrongFrame],
+    title: str,
+    *,
+    changed_mm2: Sequence[float | None],
+    lower_bounds: Sequence[int],
+) -> str:
+    """Draw area over closing in the manner of the paper's Fig. 14, beside the area of the image that has changed.
 
     Args:
         curve: a curve with at least one point.
         wrong: the points that do not fit the others; they are marked, not moved.
         title: what was pressed and how it was measured.
+        changed_mm2: how much of each point's image has changed; None where the method does not say.
+        lower_bounds: the places of the points whose contact is at least as large as their area.
 
     Returns:
         An SVG document that is the same for the same input.
@@ -26,7 +36,21 @@ def curve_svg(curve: AreaCurve, wrong: Sequence[WrongFrame], title: str) -> str:
     with mpl.rc_context({"svg.hashsalt": "area-curve", "svg.fonttype": "none", "font.size": 10}):
         figure = Figure(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.add_subplot()
-        axes.plot(closing_mm, area_mm2, color="#1f4e79", marker="o", markersize=4, linewidth=1.5)
+        axes.plot(closing_mm, area_mm2, color="#1f4e79", marker="o", markersize=4, linewidth=1.5, label="contact area")
+        witness = [nan if changed is None else changed for changed in changed_mm2]
+        if not all(map(isnan, witness)):
+            axes.plot(closing_mm, witness, color="#8a8a86", linestyle="--", linewidth=1.2, label="changed area")
+        if lower_bounds:
+            axes.plot(
+                [closing_mm[place] for place in lower_bounds],
+                [area_mm2[place] for place in lower_bounds],
+                color="#1f4e79",
+                marker="^",
+                markersize=9,
+                markerfacecolor="white",
+                linestyle="none",
+                label="lower bound: the contact is at least this large",
+            )
         if wrong:
             axes.plot(
                 [closing_mm[frame.index] for frame in wrong],
@@ -38,6 +62,7 @@ def curve_svg(curve: AreaCurve, wrong: Sequence[WrongFrame], title: str) -> str:
                 linestyle="none",
                 label="does not fit: a contact cannot shrink while closing",
             )
+        if len(axes.get_legend_handles_labels()[1]) > 1:
             axes.legend(loc="lower right", frameon=False)
         axes.axvline(0, color="#888888", linewidth=0.8, linestyle="--")
         axes.annotate(
@@ -49,7 +74,7 @@ def curve_svg(curve: AreaCurve, wrong: Sequence[WrongFrame], title: str) -> str:
             color="#555555",
         )
         axes.set_xlabel("closing [mm]")
-        axes.set_ylabel("contact area [mm²]")
+        axes.set_ylabel("area [mm²]")
         axes.set_ylim(bottom=0)
         axes.set_title(title)
         axes.grid(color="#dddddd", linewidth=0.6)

@@ -25,6 +25,10 @@ class ReportRow:
     contact: bool
     area_px: int
     area_mm2: float
+    lower_bound: bool
+    """The contact is at least this large."""
+    changed_area_mm2: float | None
+    """How much of the image has changed; None where the method does not say."""
     width_mm: float | None
     closing_mm: float | None
     confidence: float | None

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -29,6 +29,9 @@ class Source:
     """Decodes it; raises BadInputError."""
     refused: bool = False
     """It is known already that it cannot be loaded."""
+    place: int = -1
+    """The number of its folder or video among those named; -1 for a file that was named by itself."""
+    from_video: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +60,15 @@ def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listi
     found: list[Source] = []
     passed_over: list[Path] = []
     refused: list[BadInputError] = []
-    for place in places:
+    for number, place in enumerate(places):
         try:
             listing = _list_place(place, reference)
         except BadInputError as error:
             refused.append(error)
             found.append(_refused_source(place, error))
         else:
-            found += listing.sources
+            named_alone = len(listing.sources) == 1 and not place.is_dir() and not listing.sources[0].from_video
+            found += [replace(source, place=-1 if named_alone else number) for source in listing.sources]
             passed_over += listing.passed_over
     if len(refused) == len(found):
         raise BadInputError("; ".join(str(error) for error in refused) or "no images were named")
@@ -137,7 +141,7 @@ def _video_sources(path: Path) -> Iterator[Source]:
         yield _refused_source(path, BadInputError(f"{shown(path)}: {whole}"))
     for index in range(frames.count):
         name = f"{shown(path.stem)}_{index:05d}"
-        yield Source(name, name, lambda index=index: frames.frame(index))
+        yield Source(name, name, lambda index=index: frames.frame(index), from_video=True)
 
 
 class _Video:

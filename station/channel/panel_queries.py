@@ -88,6 +88,9 @@ class CurvePointTold(Message):
     area_px: int | None
     confidence: float | None
     flags: tuple[str, ...]
+    changed_area_mm2: float | None = None
+    """How much of the image has changed; None in older records, and where the method does not say."""
+    changed_area_px: int | None = None
 
 
 class ImageTold(Message):

@@ -26,7 +26,10 @@ PLACE = click.Path(path_type=Path, readable=False)
 @click.option("--reference", required=True, type=PLACE, help="Image of the untouched gel, or a folder or video of it.")
 @click.option("--recipe", "recipe_name", metavar="NAME", help="Recipe, by name or file, whose segmentation is used.")
 @click.option("--method", type=click.Choice(["paper", "robust"]), help="Method, in place of the recipe's.")
-@click.option("--widths", type=PLACE, help="CSV image,width_mm: adds closing and the area curve.")
+@click.option(
+    "--widths", type=PLACE, help="CSV image,width_mm: adds closing and the area curve. The images are one press."
+)
+@click.option("--sequence", is_flag=True, help="The images are the steps of one press, in the order given.")
 @click.option("--unit", metavar="SERIAL", help="The sensor that took the images, whose calibration gives the scale.")
 @click.option("--stages", is_flag=True, help="Write each stage's picture as well.")
 @click.option(
@@ -34,7 +37,7 @@ PLACE = click.Path(path_type=Path, readable=False)
     type=click.IntRange(1, 64),
     default=lambda: min(64, os.cpu_count() or 1),
     show_default="one a core",
-    help="Images measured at the same time.",
+    help="Images measured at the same time; those of one press are measured one after the other.",
 )
 @click.option("--out", required=True, type=PLACE, help="Folder for the results; it must not hold an earlier one.")
 @click.argument("images", nargs=-1, required=True, type=PLACE, metavar="IMAGE...")
@@ -44,7 +47,8 @@ def analyze_command(
     method: str | None,
     widths: Path | None,
     unit: str | None,
-    stages: bool,  # noqa: FBT001 (click passes arguments by name)
+    sequence: bool,  # noqa: FBT001 (click passes arguments by name)
+    stages: bool,  # noqa: FBT001
     jobs: int,
     out: Path,
     images: tuple[Path, ...],
@@ -53,6 +57,9 @@ def analyze_command(
 
     Writes results.csv, masks/, contact_sheet.png and report.html into the folder given with --out. An image that
     cannot be measured is listed in errors.csv; the others' results are kept, and the exit code is 2.
+
+    A video, and images with --widths or --sequence, are steps of a press: each is measured with the step before.
+    Each video and each folder is a press of its own. Other images are measured each by itself.
     """
     cv2.setNumThreads(1)  # so that --jobs says how many cores are used
     site = load_configuration()
@@ -79,6 +86,7 @@ def analyze_command(
         stages=stages,
         jobs=jobs,
         calibration=calibration,
+        sequence=sequence,
     )
     with click.progressbar(
         length=len(listing.sources), label="measuring", file=sys.stderr, hidden=not sys.stderr.isatty()

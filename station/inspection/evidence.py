@@ -25,6 +25,7 @@ An area at its growth limit changes by 1.2 mm² over this, a quarter of what rep
 _WINDOW_POINTS = 4
 """Of which the median of pairwise slopes bears one that is wrong."""
 _WINDOW_MM = 2.0
+_LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 _LEAST_NOISE = 0.02
 """Share of the largest area threshold below which a falling area is noise."""
 
@@ -38,7 +39,8 @@ class Growth:
     from_closing_mm: float
     to_closing_mm: float
     trusted: bool
-    """It is at least a lower bound: every point in it is trusted."""
+    """It is at least a lower bound: every point in it is trusted, and no area before the last is one whose edge was
+    lost, from which the growth would seem larger than it is."""
 
     @property
     def least_mm2_per_mm(self) -> float:
@@ -94,8 +96,8 @@ class Evidence:
         return [point for point in self.needed if self.doubts(point) == {Flag.LOW_CONFIDENCE}]
 
     def bounds(self, point: Measured) -> bool:
-        """Whether the area is surely no smaller: a contact that the border cuts is larger still."""
-        return self.doubts(point) <= {Flag.CUT_BY_BORDER} and point not in self.falling
+        """Whether the area is surely no smaller: a contact that the border cuts, or whose edge was lost, is larger."""
+        return self.doubts(point) <= _LOWER_BOUNDS and point not in self.falling
 
     def doubts(self, point: Measured) -> frozenset[Flag]:
         """The point's flags, with those that follow from its values."""
@@ -172,7 +174,10 @@ class Evidence:
         middle_mm = sum(point.closing_mm for point in window) / len(window)
         spread_mm = sum((point.closing_mm - middle_mm) ** 2 for point in window) ** 0.5
         uncertainty = max(point.area_uncertainty_mm2 for point in window) / spread_mm
-        trusted = all(self.bounds(point) for point in window)
+        # What the border cuts off grows too, so a difference of cut areas is a lower bound of the growth. An edge that
+        # was lost may be found again: the difference from its area would count what was there before as growth.
+        lost = any(Flag.LOWER_BOUND in point.flags for point in window[:-1])
+        trusted = not lost and all(self.bounds(point) for point in window)
         return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, trusted)
 
 

@@ -85,6 +85,7 @@ _DOUBTS = {
         Reason.CUT_BY_BORDER,
         "the image's border cuts the contact, so its area is only a lower bound",
     ),
+    Flag.LOWER_BOUND: (Reason.LOW_CONFIDENCE, "the edge was lost, so the contact is at least as large as its area"),
     Flag.SATURATED: (Reason.SATURATED, "much of the contact is at the end of the grey scale"),
     Flag.LOW_CONFIDENCE: (Reason.LOW_CONFIDENCE, "the image supports the area too little"),
     Flag.REFERENCE_MISMATCH: (Reason.REFERENCE_BAD, "the image does not fit its reference"),

@@ -17,6 +17,7 @@ class Flag(StrEnum):
     NO_CONTACT = "no_contact"
     UNDECIDED = "undecided"
     CUT_BY_BORDER = "cut_by_border"
+    LOWER_BOUND = "lower_bound"
     SATURATED = "saturated"
     LOW_CONFIDENCE = "low_confidence"
     REFERENCE_MISMATCH = "reference_mismatch"
@@ -45,9 +46,13 @@ class Measured:
     confidence: float | None
     """0 to 1; None where the method does not say, which is no trust."""
     flags: frozenset[Flag] = frozenset()
+    changed_area_mm2: float | None = None
+    """The second witness: how much of the image has changed; None where the method does not say. No criterion."""
+    changed_area_px: int | None = None
 
     def __post_init__(self) -> None:
-        sizes = (self.area_mm2, self.area_px, self.area_uncertainty_mm2, self.confidence or 0.0)
+        changed = (self.changed_area_mm2 or 0.0, self.changed_area_px or 0)
+        sizes = (self.area_mm2, self.area_px, self.area_uncertainty_mm2, self.confidence or 0.0, *changed)
         if not isfinite(self.closing_mm) or not all(isfinite(size) and size >= 0 for size in sizes):
             raise ValueError(f"expected finite values, and sizes that are not negative, got {self}")
 

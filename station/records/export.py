@@ -58,6 +58,12 @@ COLUMNS = (
     Column("closings_mm", pa.list_(pa.float64()), _LIST.format("closing_mm", "curve_points", "step"), "of each step"),
     Column("areas_mm2", pa.list_(pa.float64()), _LIST.format("area_mm2", "curve_points", "step"), "of each step"),
     Column("images", pa.list_(pa.string()), _LIST.format("sha256", "images", "id"), "the SHA-256 of those kept"),
+    Column(
+        "changed_areas_mm2",
+        pa.list_(pa.float64()),
+        _LIST.format("changed_area_mm2", "curve_points", "step"),
+        "of each step: how much of the image has changed",
+    ),
 )
 """A list is JSON text in CSV."""
 SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])

@@ -78,6 +78,9 @@ class CurvePoint:
     flags: tuple[str, ...] = ()
     captured_s: float | None = None
     """After the inspection's begin, by the monotonic clock."""
+    changed_area_mm2: float | None = None
+    """How much of the image has changed; None in older records, and where the method does not say."""
+    changed_area_px: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

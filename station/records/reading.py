@@ -200,6 +200,8 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
                 point.confidence,
                 tuple(point.flags),
                 point.captured_s,
+                point.changed_area_mm2,
+                point.changed_area_px,
             )
             for point in points
         ),

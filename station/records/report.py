@@ -127,7 +127,7 @@ def _judged(judged: InspectionRecord) -> Iterator[str]:
 
 
 def _curve_rows(curve: Sequence[CurvePoint]) -> list[tuple[str, ...]]:
-    rows = [("step", "width mm", "closing mm", "area mm²", "px", "confidence", "flags")]
+    rows = [("step", "width mm", "closing mm", "area mm²", "px", "changed mm²", "px", "confidence", "flags")]
     rows += [
         (
             str(point.step),
@@ -135,6 +135,8 @@ def _curve_rows(curve: Sequence[CurvePoint]) -> list[tuple[str, ...]]:
             _number(point.closing_mm, ".2f"),
             _number(point.area_mm2, ".1f"),
             _number(point.area_px, "d"),
+            _number(point.changed_area_mm2, ".1f"),
+            _number(point.changed_area_px, "d"),
             _number(point.confidence, ".2f"),
             ", ".join(point.flags) or "-",
         )

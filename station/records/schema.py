@@ -186,6 +186,8 @@ curve_points = Table(
     Column("confidence", Float),
     Column("flags", JSON, nullable=False),
     Column("captured_s", Float),
+    Column("changed_area_mm2", Float),
+    Column("changed_area_px", Integer),
 )
 
 images = Table(

@@ -1,10 +1,10 @@
-"""Measures images in one thread of its own, so that neither the channel nor the arm's lease waits for a picture."""
+"""Vision worker: measures a press's steps in one thread, so that neither channel nor the arm's lease waits for it."""
 
 import asyncio
 import os
 import sys
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -15,9 +15,10 @@ from station.service.grip import GripStep
 from station.service.reference import Golden, Looks, examine
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
-from station.vision.contact import Contact, Method, StageSink
+from station.vision.contact import Contact, Method
 from station.vision.methods import make_method, median_image
-from station.vision.step import mean_image, measure_step
+from station.vision.press import PressTracker
+from station.vision.step import mean_image
 
 ResultT = TypeVar("ResultT")
 
@@ -36,25 +37,12 @@ class Seen:
     contact: Contact
 
 
-class _Begun:
-    """A method that knows the images whose measurement was begun before it was asked for them.
-
-    Args:
-        method: for all other images.
-        known: what each of these images shows, by the image's identity; who asks takes it out.
-    """
-
-    def __init__(self, method: Method, known: dict[int, tuple[Image, Future[Contact]]]) -> None:
-        self.stages, self._method, self._known = method.stages, method, known
-
-    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
-        """See `Method.measure`."""
-        begun = self._known.pop(id(image), None)
-        return self._method.measure(image, on_stage, previous) if begun is None else begun[1].result()
-
-
 class Eye:
     """The measurement against one reference at a time.
+
+    The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
+    compression only rises: each step is measured with the contact of the step before. One thread does the work in the
+    order of the calls, so a frame's measurement ahead always uses the same earlier step as its step's measurement.
 
     Args:
         golden: the reference that every new one is compared with.
@@ -68,7 +56,9 @@ class Eye:
         self._worker = ThreadPoolExecutor(1, "vision")
         self._method: Method | None = None
         self._least_confidence = 0.0
-        self._begun: dict[int, tuple[Image, Future[Contact]]] = {}
+        self._tracker: PressTracker | None = None
+        """Of the press that is followed, or of the next step alone; only the worker thread uses it."""
+        self._follows = False
 
     def close(self) -> None:
         """End the thread, after what it is doing."""
@@ -91,8 +81,8 @@ class Eye:
         """
 
         def take() -> tuple[Image, Looks]:
-            self._method = None
-            self._begun.clear()
+            self._method = self._tracker = None
+            self._follows = False
             image = median_image([frame.image for frame in frames])
             looks = examine(image, self._golden.prepared(segmentation), self._settings)
             self._golden.keep_first(image)
@@ -104,14 +94,32 @@ class Eye:
 
         return await self._do(take)
 
+    async def follow(self, contact: Contact) -> None:
+        """Measure every later step as a step of one press, until the next reference.
+
+        Args:
+            contact: of the press's first step, against this reference.
+        """
+
+        def follow() -> None:
+            self._tracker, self._follows = self._new_tracker(contact), True
+
+        await self._do(follow)
+
     def look_ahead(self, frame: Frame) -> None:
-        """Begin to measure one frame of a step while the next is waited for; `measure` then has less to do.
+        """Begin to measure one frame of the next step while more are captured; `measure` then has less to do.
 
         Args:
             frame: of the reference's shape.
         """
-        if (method := self._method) is not None:
-            self._begun[id(frame.image)] = frame.image, self._worker.submit(method.measure, frame.image)
+
+        def measure() -> None:
+            if self._method is not None:
+                self._tracker = self._tracker or self._new_tracker()
+                self._tracker.look_ahead(frame.image)
+
+        if self._method is not None:
+            self._worker.submit(measure)
 
     async def measure(self, step: GripStep) -> Seen:
         """Find the contact in a step's frames.
@@ -121,13 +129,18 @@ class Eye:
         """
 
         def measure() -> Seen:
-            if self._method is None:
-                raise RuntimeError("a step is measured before the reference was taken")
+            tracker = self._tracker or self._new_tracker()
+            if not self._follows:
+                self._tracker = None
             images = [frame.image for frame in step.frames]
-            method = _Begun(self._method, self._begun)
-            return Seen(step, mean_image(images), measure_step(method, images, self._least_confidence))
+            return Seen(step, mean_image(images), tracker.measure_step(images))
 
         return await self._do(measure)
+
+    def _new_tracker(self, first: Contact | None = None) -> PressTracker:
+        if self._method is None:
+            raise RuntimeError("a step is measured before the reference was taken")
+        return PressTracker(self._method, self._least_confidence, first)
 
     async def _do(self, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.get_running_loop().run_in_executor(self._worker, work)

@@ -133,6 +133,8 @@ class Inspection:
             area_uncertainty_mm2=usual_uncertainty_mm2(area_mm2),
             confidence=contact.confidence,
             flags=frozenset(Flag(flag.value) for flag in contact.flags),
+            changed_area_mm2=self._mm2(contact.changed_area_px),
+            changed_area_px=contact.changed_area_px,
         )
 
     def _point(self, number: int, seen: Seen, onset_mm: float | None) -> CurvePoint:
@@ -146,7 +148,12 @@ class Inspection:
             confidence=seen.contact.confidence,
             flags=tuple(sorted(flag.value for flag in seen.contact.flags)),
             captured_s=seen.step.last_frame.captured_s - self.began_s,
+            changed_area_mm2=self._mm2(seen.contact.changed_area_px),
+            changed_area_px=seen.contact.changed_area_px,
         )
+
+    def _mm2(self, area_px: int | None) -> float | None:
+        return None if area_px is None else area_px * self.mm_per_px**2
 
     def _images(self) -> tuple[Image, ...]:
         steps = [

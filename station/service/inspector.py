@@ -129,6 +129,7 @@ class Inspector:
         now.steps.append(start)
         known = self._glanced is not None and self._glanced.step is start
         now.seen.append(self._glanced if known and self._glanced else await self._eye.measure(start))
+        await self._eye.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
     async def close_step(self, now: Inspection) -> Event:

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from station.calibration.gate import gated
 from station.channel.messages import Message
 from station.channel.panel_queries import GetImage, GetStages, Picture, Stages
 from station.channel.server import Handler
@@ -18,6 +19,7 @@ from station.settings.problems import SettingsError
 from station.settings.recipe_form import parse_recipe
 from station.vision.contact import Image
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 
 LARGEST_IMAGE_BYTES = 8 * 1024 * 1024
 _JPEG_QUALITY = 88
@@ -68,8 +70,20 @@ class PanelPictures:
         def take(name: str, picture: np.ndarray) -> None:
             pictures.append((name, _jpeg(picture)))
 
-        contact = make_method([reference], recipe.segmentation).measure(image, take)
+        segmentation = gated(recipe.segmentation, _gate_factor(record))
+        method = make_method([reference], segmentation)
+        # A step is measured with the contact of the step before, and that one with its own: all of them again.
+        tracker, previous = PressTracker(method, segmentation.robust.least_confidence), None
+        for before in range(request.step):
+            previous = tracker.measure_step([_picture(_kept(record, "step", before))])
+        contact = method.measure(image, take, previous)
         return Stages(pictures=tuple(pictures), area_px=contact.area_px)
+
+
+def _gate_factor(record: FullRecord) -> float:
+    """By which the sensor's calibration had raised the gate in an inspection; 1 where it did not."""
+    factor = record.judged.measures.get("gate_factor") if record.judged is not None else None
+    return float(factor or 1.0)
 
 
 def _kept(record: FullRecord, kind: str, step: int | None) -> StoredImage:

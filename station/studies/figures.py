@@ -9,12 +9,14 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from station.analysis.stages import StagedMethod
 from station.studies.cohort import member
 from station.studies.failure import image_at
 from station.studies.sample import SampleResult, segmentation_of
 from station.studies.study import Study
 from station.twin.gel import MM_PER_PX
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 
 _MM2 = MM_PER_PX**2
 _GOOD, _BAD, _TRUTH, _QUIET = "#1f4e79", "#b3261e", "#222222", "#8a8a86"
@@ -36,15 +38,18 @@ def press_sheet(study: Study, number: int) -> bytes:
     """
     request = study.request
     press = member(request.kind, request.seed, number).press()
-    method = make_method(press.references, segmentation_of(request.fruit, request.method))
+    segmentation = segmentation_of(request.fruit, request.method)
+    method = StagedMethod(make_method(press.references, segmentation))
+    tracker = PressTracker(method, segmentation.robust.least_confidence)
     places = _spread(press.closings_mm)
     columns: list[dict[str, npt.NDArray[np.uint8]]] = []
-    for place in places:
-        stages: dict[str, npt.NDArray[np.uint8]] = {"image": press.frames[place]}
-        method.measure(press.frames[place], stages.__setitem__)
-        if "amplified" in stages:
-            del stages["difference"]
-        columns.append(stages)
+    for place, frame in enumerate(press.frames):  # all of them, since each step is measured with the one before
+        tracker.measure_step([frame])
+        if place in places:
+            stages = {"image": frame, **method.pictures}
+            if "amplified" in stages:
+                del stages["difference"]
+            columns.append(stages)
     rows = [name for name in _SHOWN if name in columns[0]]
     figure = Figure(figsize=(1.25 * len(places), 1.68 * len(rows) + 0.35), layout="constrained")
     axes = np.asarray(figure.subplots(len(rows), len(places), squeeze=False))

@@ -15,6 +15,7 @@ from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 from station.vision.step import measure_step
 
 _FRAME_S, _STEP_S = 1 / 30, 0.5
@@ -76,12 +77,12 @@ class Grip:
         self._method = make_method(references, recipe.segmentation)
 
     def held(self, closing_mm: float) -> Contact:
-        """Measure one step at a width that something else than the gripper's counts decides.
+        """Measure one step by itself, at a width that something else than the gripper's counts decides.
 
         Args:
             closing_mm: the true one.
         """
-        return self._measured(self._fruit.width_mm - closing_mm)
+        return self._measured_alone(self._fruit.width_mm - closing_mm)
 
     def press(self, phase: float, zero_mm: float) -> Pressed:
         """Close to the onset, then step by step.
@@ -100,6 +101,7 @@ class Grip:
             return Pressed(untouched, untouched, None)
         steps, enough_mm = self._recipe.steps, deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm
         press = Press(widths[onset] + zero_mm, self._count_mm if onset else 0.0, (self._point(0.0, contact),))
+        tracker = PressTracker(self._method, self._recipe.segmentation.robust.least_confidence, first=contact)
         stopped: Press | None = None
         for step in range(1, steps.number + 1):
             closing_mm = round(step * steps.step_mm / self._count_mm) * self._count_mm
@@ -107,7 +109,7 @@ class Grip:
                 stopped = press
             if stopped is not None and press.points[-1].closing_mm > enough_mm - self._count_mm:
                 break
-            point = self._point(closing_mm, self._measured(widths[onset] - closing_mm))
+            point = self._point(closing_mm, tracker.measure_step(self._step_frames(widths[onset] - closing_mm)))
             press = replace(press, points=(*press.points, point))
         return Pressed(stopped or press, press, self._fruit.width_mm - widths[onset])
 
@@ -116,13 +118,16 @@ class Grip:
         self._now_s += _FRAME_S
         if not self._method.measure(self._frames(width_mm, 1)[0]).is_firm:
             return None
-        contact = self._measured(width_mm)
+        contact = self._measured_alone(width_mm)
         return contact if contact.is_firm else None
 
-    def _measured(self, width_mm: float) -> Contact:
-        self._now_s += _STEP_S
-        frames = self._frames(width_mm, self._recipe.imaging.frames_per_step)
+    def _measured_alone(self, width_mm: float) -> Contact:
+        frames = self._step_frames(width_mm)
         return measure_step(self._method, frames, self._recipe.segmentation.robust.least_confidence)
+
+    def _step_frames(self, width_mm: float) -> Sequence[Image]:
+        self._now_s += _STEP_S
+        return self._frames(width_mm, self._recipe.imaging.frames_per_step)
 
     def _frames(self, width_mm: float | None, number: int) -> Sequence[Image]:
         """So many frames at a true width; None for nothing between the fingers."""

@@ -10,6 +10,7 @@ from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 from station.studies.cohort import member
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 
 
 class Task(NamedTuple):
@@ -49,7 +50,7 @@ def segmentation_of(fruit: str, method: str) -> Segmentation:
 
 
 def measure_sample(task: Task) -> SampleResult:
-    """Draw a sample's press and measure each image, on one thread.
+    """Draw a sample's press and measure its images as the steps of one press, on one thread.
 
     Args:
         task: which sample, and how.
@@ -57,8 +58,9 @@ def measure_sample(task: Task) -> SampleResult:
     cv2.setNumThreads(1)
     one = member(task.fruit, task.seed, task.number)
     press = one.press()
-    method = make_method(press.references, segmentation_of(task.fruit, task.method))
-    contacts = [method.measure(frame) for frame in press.frames]
+    segmentation = segmentation_of(task.fruit, task.method)
+    tracker = PressTracker(make_method(press.references, segmentation), segmentation.robust.least_confidence)
+    contacts = [tracker.measure_step([frame]) for frame in press.frames]
     return SampleResult(
         number=task.number,
         weight_g=one.fruit.weight_g,

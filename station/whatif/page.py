@@ -16,7 +16,9 @@ from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
 from station.settings.segmentation import Segmentation
+from station.vision.contact import Contact
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 from station.whatif.outcome_table import AFTER, BEFORE, Counted
 from station.whatif.replay import Replayed
 from station.whatif.stored import read_gate_factor
@@ -126,7 +128,8 @@ def _picture(connection: Connection, folder: Path, sequence: int, draft: Segment
     by_draft = None
     if draft is not None and reference is not None:
         segmentation = gated(draft, read_gate_factor(connection, sequence))
-        by_draft = make_method([np.asarray(reference, np.uint8)], segmentation).measure(np.asarray(image, np.uint8))
+        before = [_image(folder, sha256) for kind, of_step, sha256 in rows if kind == "step" and of_step != step]
+        by_draft = _followed(reference, [*before, image], segmentation)
     if mask is not None and mask.shape[:2] == image.shape[:2]:
         _outline(image, mask[:, :, 0], _WHITE)
     if by_draft is not None:
@@ -135,6 +138,21 @@ def _picture(connection: Connection, folder: Path, sequence: int, draft: Segment
     small = cv2.resize(image, (round(scale * image.shape[1]), _PICTURE_PX), interpolation=cv2.INTER_AREA)
     data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, 85))[1].tobytes()
     return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+
+
+def _followed(
+    reference: cv2.typing.MatLike, steps: Sequence[cv2.typing.MatLike | None], segmentation: Segmentation
+) -> Contact | None:
+    """The last step's contact, measured as the last of its press; None where an image is no longer kept."""
+    tracker = PressTracker(
+        make_method([np.asarray(reference, np.uint8)], segmentation), segmentation.robust.least_confidence
+    )
+    contact = None
+    for image in steps:
+        if image is None:
+            return None
+        contact = tracker.measure_step([np.asarray(image, np.uint8)])
+    return contact
 
 
 def _outline(image: cv2.typing.MatLike, mask: cv2.typing.MatLike, colour: tuple[int, int, int]) -> None:

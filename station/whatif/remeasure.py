@@ -10,8 +10,9 @@ from station.calibration.gate import gated
 from station.errors import StationError
 from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Image, Method
+from station.vision.contact import Image
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 from station.whatif.stored import StoredPress
 
 _SAME_AREA, _SAME_PX = 0.02, 50
@@ -25,8 +26,9 @@ class CannotRemeasureError(StationError):
 def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> Press:
     """A press with the areas that another segmentation finds in the stored images.
 
-    Stored is the mean of a step's frames. How far the frames disagreed is known from the stored confidence alone: it
-    is a factor on the method's own, and is carried over.
+    They are measured again as the station measured them: as one press, step after step from the onset. Stored is the
+    mean of a step's frames. How far the frames disagreed is known from the stored confidence alone: it is a factor on
+    the method's own, and is carried over.
 
     Args:
         stored: with its images.
@@ -44,7 +46,7 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     missing = [step for step in range(len(press.points)) if step not in decoded]
     if reference is None or missing:
         raise CannotRemeasureError("the draft measures otherwise, and not all of its images were kept")
-    before, after = make_method([reference], own), make_method([reference], draft)
+    before, after = (PressTracker(make_method([reference], one), one.robust.least_confidence) for one in (own, draft))
     points = [_point(press, step, decoded, before, after, draft) for step in range(len(press.points))]
     if not points or points[0].area_px == 0:
         raise CannotRemeasureError("the draft sees no contact at the stored onset, so its steps would be others")
@@ -52,10 +54,15 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
 
 
 def _point(
-    press: Press, step: int, decoded: Mapping[int | None, Image], before: Method, after: Method, draft: Segmentation
+    press: Press,
+    step: int,
+    decoded: Mapping[int | None, Image],
+    before: PressTracker,
+    after: PressTracker,
+    draft: Segmentation,
 ) -> Measured:
     stored = press.points[step]
-    then, now = before.measure(decoded[step]), after.measure(decoded[step])
+    then, now = before.measure_step([decoded[step]]), after.measure_step([decoded[step]])
     if abs(then.area_px - stored.area_px) > max(_SAME_PX, _SAME_AREA * stored.area_px):
         raise CannotRemeasureError("its images do not give its stored areas: they were measured by another program")
     confidence = now.confidence

@@ -18,7 +18,7 @@ class Stub:
 
     stages: tuple[str, ...] = ()
 
-    def measure(self, image: np.ndarray, on_stage: object = None) -> Contact:
+    def measure(self, image: np.ndarray, on_stage: object = None, previous: Contact | None = None) -> Contact:
         mask = np.zeros(image.shape[:2], np.uint8)
         if image.mean() < 50:
             return Contact(mask, 0, None, frozenset({Flag.UNDECIDED}), confidence=0.0)

@@ -25,7 +25,7 @@ from station.twin.digit.press import PressOptions, PressSequence, render_press
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX
 from station.vision.methods import make_method
-from station.vision.step import measure_step
+from station.vision.press import PressTracker
 
 ROOT = Path(__file__).resolve().parents[2]
 MARKDOWN = MarkdownIt("commonmark").enable("table")
@@ -221,7 +221,16 @@ async def _inspect(folder: Path, fruit: int) -> None:
                     ended_utc_ms=began_ms + 6000,
                     duration_ms=6000,
                     curve=tuple(
-                        CurvePoint(step, shown.widths_mm[step], p.closing_mm, p.area_mm2, p.area_px, p.confidence)
+                        CurvePoint(
+                            step,
+                            shown.widths_mm[step],
+                            p.closing_mm,
+                            p.area_mm2,
+                            p.area_px,
+                            p.confidence,
+                            changed_area_mm2=p.changed_area_mm2,
+                            changed_area_px=p.changed_area_px,
+                        )
                         for step, p in enumerate(press.points)
                     ),
                     measures={"onset_mm": press.onset_mm, "onset_uncertainty_mm": press.onset_uncertainty_mm},
@@ -239,10 +248,11 @@ async def _inspect(folder: Path, fruit: int) -> None:
 def _pressed(shown: PressSequence, recipe) -> Press:
     """Measure its frames one after the other until the recipe stops the press."""
     method = make_method(shown.references, recipe.segmentation)
+    tracker = PressTracker(method, recipe.segmentation.robust.least_confidence)
     press = Press(shown.widths_mm[0], 0.1, ())
     for closing_mm, frame in zip(np.subtract(shown.closings_mm, TOUCHED_MM), shown.frames, strict=True):
-        contact = measure_step(method, [frame], recipe.segmentation.robust.least_confidence)
-        area_mm2 = contact.area_px * MM_PER_PX**2
+        contact = tracker.measure_step([frame])
+        area_mm2, changed_px = contact.area_px * MM_PER_PX**2, contact.changed_area_px
         point = Measured(
             float(closing_mm),
             area_mm2,
@@ -250,6 +260,8 @@ def _pressed(shown: PressSequence, recipe) -> Press:
             usual_uncertainty_mm2(area_mm2),
             contact.confidence,
             frozenset(Flag(flag.value) for flag in contact.flags),
+            None if changed_px is None else changed_px * MM_PER_PX**2,
+            changed_px,
         )
         press = replace(press, points=(*press.points, point))
         if early_stop(press, recipe) is not None:

@@ -127,6 +127,7 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, outcome):
         (Flag.NO_CONTACT, Reason.CONTACT_LOST),
         (Flag.UNDECIDED, Reason.LOW_CONFIDENCE),
         (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER),
+        (Flag.LOWER_BOUND, Reason.LOW_CONFIDENCE),
         (Flag.SATURATED, Reason.SATURATED),
         (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD),
     ],
@@ -180,6 +181,34 @@ def test_a_contact_cut_by_the_border_is_a_lower_bound():
     over = Press(35.0, 0.0, tuple(point(float(c), 45.0 * c, *[Flag.CUT_BY_BORDER][: c > 1]) for c in range(6)))
     assert judge(over, STRAWBERRY).outcome == "FAIL"
     assert judge(spoilt(pressed(20), 4.0, Flag.CUT_BY_BORDER), STRAWBERRY).outcome == "NO_RESULT"
+
+
+def test_a_contact_whose_edge_was_lost_proves_a_fail_and_never_carries_a_pass():
+    over = Press(35.0, 0.0, tuple(point(float(c), 45.0 * c, *[Flag.LOWER_BOUND][: c == 4]) for c in range(6)))
+    verdict = judge(over, STRAWBERRY)
+    assert verdict.outcome == "FAIL"
+    assert Reason.AREA_OVER_LIMIT in verdict.reasons
+    for closing in (2.0, 3.0, 4.0):
+        spoiled = judge(spoilt(pressed(20), closing, Flag.LOWER_BOUND), STRAWBERRY)
+        assert (spoiled.outcome, spoiled.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
+        assert "the contact is at least as large as its area" in spoiled.findings[0].sentence
+
+
+def test_an_edge_that_was_lost_and_found_again_proves_no_growth():
+    areas = {0: 0.0, 1: 20.0, 2: 30.0, 3: 75.0, 4: 120.0}
+    sound = Press(35.0, 0.0, tuple(point(float(c), area) for c, area in areas.items()))
+    grown = judge(replace(sound, points=sound.points[1:]), STRAWBERRY)
+    assert Reason.GROWTH_OVER_LIMIT in grown.reasons
+    assert grown.growth
+    assert grown.growth.trusted
+    for closing in (2.0, 3.0):  # the true area there may have been larger, and the growth after it smaller
+        verdict = judge(spoilt(sound, closing, Flag.LOWER_BOUND), STRAWBERRY)
+        assert verdict.outcome == "NO_RESULT"
+        assert verdict.growth
+        assert not verdict.growth.trusted
+    last = judge(spoilt(sound, 4.0, Flag.LOWER_BOUND), STRAWBERRY)
+    assert last.growth
+    assert last.growth.trusted
 
 
 def test_a_contact_that_is_lost_or_does_not_rise_is_no_result():

@@ -1,7 +1,10 @@
 """A database of any earlier form is brought up to date with a copy kept, and a newer one is left alone."""
 
+import csv
+import json
 import shutil
 import sqlite3
+from dataclasses import replace
 
 import pytest
 from alembic.autogenerate import compare_metadata
@@ -80,6 +83,41 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
         assert query(folder / FILE_NAME, "SELECT grower FROM inspections") == [(None,), (None,)]
 
     scenario(steps)
+
+
+def test_records_from_before_the_second_witness_read_without_it(opened, scenario, folder, trigger, passed, ask):
+    with_witness = tuple(
+        replace(point, changed_area_mm2=9.5 * point.step, changed_area_px=13_000 * point.step) for point in passed.curve
+    )
+
+    async def steps():
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), passed))
+        connection = sqlite3.connect(folder / FILE_NAME)
+        for column in ("changed_area_mm2", "changed_area_px"):
+            connection.execute(f"ALTER TABLE curve_points DROP COLUMN {column}")
+        connection.execute("UPDATE alembic_version SET version_num = '0005'")
+        connection.commit()
+        connection.close()
+        async with opened() as records:
+            await records.published(
+                await records.conclude(await records.begin(trigger), replace(passed, curve=with_witness))
+            )
+            return [(await records.inspection(sequence)).judged.curve for sequence in (1, 2)]
+
+    old, new = scenario(steps)
+    assert old == passed.curve
+    assert {(point.changed_area_mm2, point.changed_area_px) for point in old} == {(None, None)}
+    assert new == with_witness
+    (backup,) = (folder / "backups").iterdir()
+    assert backup.name.endswith("-form-0005.sqlite3")
+    assert "changed mm²" in ask("show", 1).output
+    last = ask("show", 2).output.split("changed mm²")[1].splitlines()[5].split()
+    assert last == ["4", "26.00", "4.00", "32.0", "44000", "38.0", "52000", "0.90", "-"]
+    ask("export", folder / "all.csv")
+    with (folder / "all.csv").open(newline="", encoding="utf-8") as file:
+        exported = [json.loads(row["changed_areas_mm2"]) for row in csv.DictReader(file)]
+    assert exported == [[None] * 5, [0.0, 9.5, 19.0, 28.5, 38.0]]
 
 
 def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form, head):

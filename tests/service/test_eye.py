@@ -19,6 +19,7 @@ from station.service.reference import Golden
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.vision.methods import make_method
+from station.vision.press import PressTracker
 from station.vision.step import measure_step
 
 BLUEBERRY = find_recipe("blueberry")
@@ -42,16 +43,23 @@ def step_of(frames: list[Frame]) -> GripStep:
 
 
 @pytest.fixture
-def seen_images(monkeypatch):
+def previous_contacts():
+    """The contact of the step before, for each image that was measured, in order; None for a step by itself."""
+    return []
+
+
+@pytest.fixture
+def seen_images(monkeypatch, previous_contacts):
     """The images that the eye's method was asked to measure, by their identity, in order."""
     seen: list[int] = []
 
     def counting(references, segmentation):
         method = make_method(references, segmentation)
 
-        def measure(image, on_stage=None):
+        def measure(image, on_stage=None, previous=None):
             seen.append(id(image))
-            return method.measure(image, on_stage)
+            previous_contacts.append(previous)
+            return method.measure(image, on_stage, previous)
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
@@ -98,6 +106,41 @@ def test_a_frame_that_was_begun_against_an_old_reference_is_measured_anew(tmp_pa
 
     image = asyncio.run(scenario())
     assert seen_images == [image, image]
+
+
+def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp_path, seen_images, previous_contacts):
+    steps = [[frame(100 * number + seed, 1.0 + number / 2) for seed in range(2)] for number in range(4)]
+
+    async def scenario():
+        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        try:
+            await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
+            glanced = await eye.measure(step_of(steps[0]))
+            first = await eye.measure(step_of(steps[1]))
+            await eye.follow(first.contact)
+            measuring = asyncio.ensure_future(eye.measure(step_of(steps[2])))
+            await asyncio.sleep(0)
+            for each in steps[3]:  # captured while the step before is still measured
+                eye.look_ahead(each)
+            followed = [first, await measuring, await eye.measure(step_of(steps[3]))]
+            await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
+            await eye.measure(step_of(steps[0]))
+            return glanced, followed
+        finally:
+            eye.close()
+
+    glanced, followed = asyncio.run(scenario())
+    assert glanced.contact.found
+    contacts = [seen.contact for seen in followed]
+    expected = [None] * 6 + [contacts[0]] * 3 + [contacts[1]] * 3 + [None] * 3
+    assert len(previous_contacts) == len(expected), "no frame was measured twice"
+    assert all(one is other for one, other in zip(previous_contacts, expected, strict=True))
+    median = np.median([frame(seed).image for seed in range(3)], axis=0).astype(np.uint8)
+    least = BLUEBERRY.segmentation.robust.least_confidence
+    tracker = PressTracker(make_method([median], BLUEBERRY.segmentation), least, first=contacts[0])
+    again = [tracker.measure_step([each.image for each in frames]) for frames in steps[2:]]
+    assert [one.area_px for one in again] == [one.area_px for one in contacts[1:]]
+    assert [one.confidence for one in again] == [one.confidence for one in contacts[1:]]
 
 
 class SlowGripper:

@@ -1,0 +1,82 @@
+"""Measuring order: which images are steps of one press, and the order in which they are measured."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby, pairwise
+from typing import NamedTuple
+
+from station.analysis.sources import Source
+
+
+class Run(NamedTuple):
+    """Images that are measured one after the other."""
+
+    numbers: tuple[int, ...]
+    """Of the images in the order given by the user, from 0."""
+    followed: bool
+    """They are the steps of one press: each is measured with the contact of the one before. Else it is one image."""
+
+
+def runs(sources: Sequence[Source], widths_mm: Mapping[str, float] | None, *, sequence: bool) -> list[Run]:
+    """Find the presses among images.
+
+    A video, a folder, and the files that were named one by one are a press each. Without widths the order given is the
+    order in time. With widths it is the order of falling width, unless the images come from a video, the user says that
+    they are a sequence, or a width comes back: then the order given is kept, and a press ends where the width rises.
+
+    Args:
+        sources: in the order given by the user.
+        widths_mm: the measured width by the image's name, for every image that is not refused; None without a table.
+        sequence: the user says that the images are in the order in time.
+
+    Returns:
+        Every image once, in the order of measuring.
+    """
+    found: list[Run] = []
+    places = sorted(range(len(sources)), key=lambda number: sources[number].place)
+    for _, group in groupby(places, key=lambda number: sources[number].place):
+        numbers = list(group)
+        images = [number for number in numbers if not sources[number].refused]
+        video = any(sources[number].from_video for number in images)
+        if widths_mm is not None:
+            widths = {number: widths_mm[sources[number].name] for number in images}
+            found += _by_width(images, widths, in_time=sequence or video)
+        elif sequence or video:
+            found.append(Run(tuple(images), followed=True))
+        else:
+            found += [Run((number,), followed=False) for number in images]
+        found += [Run((number,), followed=False) for number in numbers if sources[number].refused]
+    return sorted((run for run in found if run.numbers), key=lambda run: min(run.numbers))
+
+
+def singles(sources: Sequence[Source]) -> list[Run]:
+    """Every image by itself, in the order given.
+
+    Args:
+        sources: in that order.
+    """
+    return [Run((number,), followed=False) for number in range(len(sources))]
+
+
+def _by_width(numbers: Sequence[int], widths_mm: Mapping[int, float], *, in_time: bool) -> list[Run]:
+    if not in_time and not _comes_back([widths_mm[number] for number in numbers]):
+        return [Run(tuple(sorted(numbers, key=lambda number: -widths_mm[number])), followed=True)]
+    presses: list[list[int]] = []
+    for number in numbers:
+        if not presses or widths_mm[number] > widths_mm[presses[-1][-1]]:  # the jaws have opened
+            presses.append([])
+        presses[-1].append(number)
+    return [Run(tuple(press), followed=True) for press in presses]
+
+
+def _comes_back(widths_mm: Sequence[float]) -> bool:
+    """Whether a width, to a tenth of a millimetre, comes again after a narrower one: the jaws have opened in between.
+
+    In a press whose images are merely named in another order it does not, as the jaws only close.
+    """
+    rounded = [round(width, 1) for width in widths_mm]
+    places: dict[float, list[int]] = {}
+    for place, width in enumerate(rounded):
+        places.setdefault(width, []).append(place)
+    return any(
+        min(rounded[first:second]) < width for width, those in places.items() for first, second in pairwise(those)
+    )

@@ -1,0 +1,30 @@
+"""Stage pictures of a press: a method that keeps them while a press tracker measures with it."""
+
+import numpy as np
+import numpy.typing as npt
+
+from station.vision.contact import Contact, Image, Method, StageSink
+
+
+class StagedMethod:
+    """A measurement method that keeps the stage pictures of the last image. Not safe for several threads at once.
+
+    Args:
+        method: measures.
+    """
+
+    def __init__(self, method: Method) -> None:
+        self.stages, self._method = method.stages, method
+        self.pictures: dict[str, npt.NDArray[np.uint8]] = {}
+        """Of the image that was measured last, by the stages' names, in their order."""
+
+    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
+        """See `Method.measure`."""
+        self.pictures = {}
+
+        def keep(name: str, picture: npt.NDArray[np.uint8]) -> None:
+            self.pictures[name] = picture
+            if on_stage is not None:
+                on_stage(name, picture)
+
+        return self._method.measure(image, keep, previous)

@@ -1,0 +1,265 @@
+"""A press is one measurement: its images are measured in order, each with the contact of the step before."""
+
+import csv
+import random
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from station.analysis.analysis import Request, analyze
+from station.analysis.decoding import Decoded
+from station.analysis.measurement import Measured, Refused
+from station.analysis.output import OutputFolder
+from station.analysis.presses import Run, runs
+from station.analysis.sources import Source, list_sources
+from station.settings.recipe import find_recipe
+from station.settings.segmentation import Segmentation
+from station.twin.digit.press import render_press
+from station.vision.contact import Contact, Flag, StageSink, contact_from_mask
+from station.vision.methods import make_method
+from station.vision.press import PressTracker
+
+CLOSINGS_MM = (-2.0, -1.0, 0.5, 1.5, 2.5, 3.5, 4.5)
+BLUEBERRY = find_recipe("blueberry")
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A blueberry's press on the twin: the first two images show nothing."""
+    return render_press("blueberry", 5, CLOSINGS_MM)
+
+
+@pytest.fixture
+def folder(pressed, tmp_path: Path) -> Path:
+    """The press as files: reference/, step_0.png and so on, and widths.csv."""
+    (tmp_path / "reference").mkdir()
+    (tmp_path / "frames").mkdir()
+    for number, image in enumerate(pressed.references):
+        cv2.imwrite(str(tmp_path / "reference" / f"{number}.png"), image)
+    rows = ["image,width_mm"]
+    for number, (image, width_mm) in enumerate(zip(pressed.frames, pressed.widths_mm, strict=True)):
+        cv2.imwrite(str(tmp_path / "frames" / f"step_{number}.png"), image)
+        rows.append(f"step_{number}.png,{width_mm:.3f}")
+    (tmp_path / "widths.csv").write_text("\n".join(rows) + "\n")
+    return tmp_path
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def followed(references: Sequence[np.ndarray], frames: Sequence[np.ndarray]) -> list[Contact]:
+    """The contacts of frames that are measured as one press."""
+    segmentation = BLUEBERRY.segmentation
+    tracker = PressTracker(make_method(references, segmentation), segmentation.robust.least_confidence)
+    return [tracker.measure_step([frame]) for frame in frames]
+
+
+def same(rows: Sequence[dict[str, str]], contacts: Sequence[Contact]) -> bool:
+    return [(int(row["contact"]), int(row["area_px"])) for row in rows] == [
+        (int(contact.found), contact.area_px) for contact in contacts
+    ]
+
+
+def test_images_with_widths_are_one_press_in_the_order_of_falling_width(pressed, folder, analyze):
+    images = [folder / "frames" / f"step_{number}.png" for number in range(len(CLOSINGS_MM))]
+    random.Random(3).shuffle(images)
+    tables = []
+    for jobs in (1, 3):
+        out = folder / f"out{jobs}"
+        done = analyze(
+            "--reference", folder / "reference", "--recipe", "blueberry", "--widths", folder / "widths.csv",
+            "--jobs", jobs, "--out", out, *images,
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, "")
+        tables.append((out / "results.csv").read_bytes())
+    assert tables[0] == tables[1]
+    rows = read_table(folder / "out1" / "results.csv")
+    assert list(rows[0]) == ["image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags"]
+    assert [row["image"] for row in rows] == [image.name for image in images], "rows are in the order given"
+    contacts = followed(pressed.references, pressed.frames)
+    in_time = sorted(rows, key=lambda row: row["image"])
+    assert same(in_time, contacts)
+    assert [row["contact"] for row in in_time] == ["0", "0", "1", "1", "1", "1", "1"]
+    details = {row["image"]: row for row in read_table(folder / "out1" / "details.csv")}
+    assert list(details["step_3.png"]) == ["image", "confidence", "gate", "drift_levels", "changed_area_px"]
+    written = [details[f"step_{number}.png"]["changed_area_px"] for number in range(len(contacts))]
+    assert written == ["" if one.changed_area_px is None else str(one.changed_area_px) for one in contacts]
+    report = (folder / "out1" / "report.html").read_text()
+    assert "1 press of 7 images" in report
+    assert [float(row["closing_mm"]) for row in read_table(folder / "out1" / "curve.csv")] == pytest.approx(
+        [closing - 0.5 for closing in CLOSINGS_MM], abs=0.01
+    )
+
+
+def test_a_press_goes_on_after_an_image_that_cannot_be_decoded(pressed, folder, analyze):
+    (folder / "frames" / "step_3.png").write_text("no image")
+    out = folder / "out"
+    done = analyze(
+        "--reference", folder / "reference", "--recipe", "blueberry", "--sequence", "--stages", "--out", out,
+        folder / "frames",
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert [row["image"] for row in read_table(out / "errors.csv")] == ["step_3.png"]
+    rows = read_table(out / "results.csv")
+    assert [row["image"] for row in rows] == [f"step_{number}.png" for number in (0, 1, 2, 4, 5, 6)]
+    assert same(rows, followed(pressed.references, [*pressed.frames[:3], *pressed.frames[4:]]))
+    assert sorted(path.name for path in (out / "stages").glob("step_6_*"))
+    assert not (out / "curve.csv").exists()
+
+
+def test_each_video_is_a_press_of_its_own(pressed, folder, analyze):
+    videos = [folder / "first.avi", folder / "second.avi"]
+    for video in videos:
+        height, width = pressed.frames[0].shape[:2]
+        writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10, (width, height))
+        for frame in pressed.frames:
+            writer.write(frame)
+        writer.release()
+    out = folder / "out"
+    done = analyze("--reference", folder / "reference", "--recipe", "blueberry", "--out", out, *videos)
+    assert done.returncode == 0, done.stderr
+    rows = read_table(out / "results.csv")
+    capture = cv2.VideoCapture(str(videos[0]))
+    frames = [np.asarray(capture.read()[1], np.uint8) for _ in pressed.frames]
+    capture.release()
+    contacts = followed(pressed.references, frames)
+    assert same(rows[:7], contacts)
+    assert same(rows[7:], contacts)
+    assert "2 presses of 7, 7 images" in (out / "report.html").read_text()
+
+
+def source(name: str, place: int = -1, *, video: bool = False, refused: bool = False) -> Source:
+    return Source(name, name, lambda: Decoded(np.zeros((64, 64, 3), np.uint8), ()), refused, place, from_video=video)
+
+
+def by_name(sources: Sequence[Source], order: Sequence[Run]) -> list[str]:
+    """Each press's names, an exclamation mark before an image that is measured by itself."""
+    return [("" if run.followed else "!") + "".join(sources[number].name for number in run.numbers) for run in order]
+
+
+@pytest.mark.parametrize(
+    ("widths", "sequence", "expected"),
+    [
+        ((9, 8, 7, 6, 5), False, ["abcde"]),
+        ((7, 9, 8, 5, 6), False, ["bcaed"]),
+        ((5, 6, 7, 8, 9), False, ["edcba"]),
+        ((9, 8, 8, 8, 7), False, ["abcde"]),
+        ((9, 8, 7, 8, 9), False, ["abc", "d", "e"]),
+        ((9, 7, 5, 9.04, 7), False, ["abc", "de"]),
+        ((7, 9, 8, 5, 6), True, ["a", "bcd", "e"]),
+        (None, True, ["abcde"]),
+        (None, False, ["!a", "!b", "!c", "!d", "!e"]),
+    ],
+)
+def test_a_press_ends_where_the_jaws_open(widths, sequence, expected):
+    sources = [source(name) for name in "abcde"]
+    table = None if widths is None else dict(zip("abcde", widths, strict=True))
+    assert by_name(sources, runs(sources, table, sequence=sequence)) == expected
+
+
+def test_videos_folders_and_files_are_presses_of_their_own():
+    sources = [
+        source("a"), source("B", 1), source("C", 1), source("d"), source("?", refused=True), source("E", 3, video=True),
+        source("F", 3, video=True),
+    ]  # fmt: skip
+    assert by_name(sources, runs(sources, None, sequence=False)) == ["!a", "!B", "!C", "!d", "!?", "EF"]
+    assert by_name(sources, runs(sources, None, sequence=True)) == ["ad", "BC", "!?", "EF"]
+    table = dict(zip("aBCdEF", (4, 5, 6, 9, 2, 3), strict=True))
+    assert by_name(sources, runs(sources, table, sequence=False)) == ["da", "CB", "!?", "E", "F"]
+
+
+class Stub:
+    """A method whose contact grows with the image's brightness, and whose edge is lost in the brightest."""
+
+    stages: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[int, int | None]] = []
+        """The brightness, and the area of the step before."""
+
+    def measure(self, image: np.ndarray, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
+        level = int(image[0, 0, 0])
+        self.calls.append((level, None if previous is None else previous.area_px))
+        mask = np.zeros(image.shape[:2], np.uint8)
+        mask[20 : 20 + level // 10, 20:30] = 255
+        flags = frozenset({Flag.LOWER_BOUND}) if level > 150 else frozenset[Flag]()
+        return contact_from_mask(mask, flags, confidence=0.9, changed_area_px=2 * level)
+
+
+def test_the_report_shows_the_changed_area_and_marks_lower_bounds(tmp_path: Path, monkeypatch):
+    for number, level in enumerate((0, 50, 100, 200)):
+        cv2.imwrite(str(tmp_path / f"step_{number}.png"), np.full((64, 64, 3), level, np.uint8))
+    stub = Stub()
+    monkeypatch.setattr("station.analysis.analysis.make_method", lambda *_: stub)
+    request = Request(
+        sources=list_sources([tmp_path]).sources,
+        references=[Decoded(np.zeros((64, 64, 3), np.uint8), ())],
+        reference_name="reference",
+        segmentation=Segmentation(),
+        recipe=None,
+        widths_mm={f"step_{number}.png": 40.0 - number for number in range(4)},
+        out=tmp_path / "out",
+        stages=False,
+        jobs=2,
+    )
+    assert analyze(request, lambda: None).measured == 4
+    assert stub.calls == [(0, None), (50, 0), (100, 50), (200, 100)]
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert report.count("at least this large") == 1
+    assert report.count("<span>at least ") == 1
+    assert report.count(">changed area ") == 4
+    plot = (tmp_path / "out" / "curve.svg").read_text()
+    assert "changed area" in plot
+    assert "lower bound: the contact is at least this large" in plot
+    results = read_table(tmp_path / "out" / "results.csv")
+    assert [row["flags"] for row in results] == ["no_contact", "", "", "lower_bound"]
+    assert [row["contact"] for row in results] == ["0", "1", "1", "1"]
+    details = read_table(tmp_path / "out" / "details.csv")
+    assert [row["changed_area_px"] for row in details] == ["0", "100", "200", "400"]
+
+
+def test_paper_measures_each_image_by_itself(tmp_path: Path, monkeypatch):
+    for number, level in enumerate((50, 100, 120)):
+        cv2.imwrite(str(tmp_path / f"step_{number}.png"), np.full((64, 64, 3), level, np.uint8))
+    stub = Stub()
+    monkeypatch.setattr("station.analysis.analysis.make_method", lambda *_: stub)
+    request = Request(
+        sources=list_sources([tmp_path]).sources,
+        references=[Decoded(np.zeros((64, 64, 3), np.uint8), ())],
+        reference_name="reference",
+        segmentation=Segmentation(method="paper"),
+        recipe=None,
+        widths_mm=None,
+        out=tmp_path / "out",
+        stages=False,
+        jobs=1,
+        sequence=True,
+    )
+    assert analyze(request, lambda: None).measured == 3
+    assert stub.calls == [(50, None), (100, None), (120, None)]
+
+
+def test_rows_come_in_the_order_given_and_none_is_lost_where_the_run_ends_early(tmp_path: Path):
+    def measured(number: int) -> Measured:
+        image = np.zeros((64, 64, 3), np.uint8)
+        return Measured(source(f"{number}.png"), number, image, contact_from_mask(image[:, :, 0]), ())
+
+    out = tmp_path / "out"
+
+    def called_off() -> None:
+        with OutputFolder(out) as output:
+            for number in (3, 1):
+                output.add(measured(number), 0.0)
+            assert not (out / "results.csv").exists()
+            output.leave_out(Refused(source("0.png"), 0, "no image"))
+            assert [row["image"] for row in read_table(out / "results.csv")] == ["1.png"]
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        called_off()
+    assert [row["image"] for row in read_table(out / "results.csv")] == ["1.png", "3.png"]
