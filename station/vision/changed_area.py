@@ -38,15 +38,17 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
 def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
     """How far a contact's contour agrees with the changed area in size, 0 to 1.
 
-    A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing.
-    The reverse says little: a flat centre and a weak contact change less than the threshold.
+    A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing;
+    one that hardly holds any change has been drawn around nothing. Between the two says little: a halo changes, and a
+    flat centre does not.
 
     Args:
         contact_px: the contact area.
         changed_px: the changed area, in the same unit.
-        constants: the ratio beyond which they disagree.
+        constants: the two shares beyond which they disagree.
     """
-    return float(min(1.0, constants.witness_ratio * contact_px / max(changed_px, 1.0)) ** 2)
+    share = max(changed_px, 1.0) / max(contact_px, 1.0)
+    return float(min(1.0, constants.witness_most / share, share / constants.witness_least) ** 2)
 
 
 def agreement_of_growth(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:

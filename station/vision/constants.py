@@ -142,9 +142,10 @@ class Constants:
     )
     confirmed_growth: float = constant(2.5, "", "and that has grown at most by this factor", "fit")
     # Witness
-    changed_levels: float = constant(8.0, "grey level", "a place has changed from here on", "fit")
+    changed_levels: float = constant(4.0, "grey level", "a place has changed from here on", "fit")
     changed_blur: float = constant(1.5, "px", "smoothing before", "fit", "half")
-    witness_ratio: float = constant(4.0, "", "more changed than so many contact areas is a disagreement", "fit")
+    witness_most: float = constant(4.5, "of the contact area", "more changed than this is a disagreement", "fit")
+    witness_least: float = constant(0.1, "of the contact area", "less changed than this is a disagreement", "fit")
     # Confidence
     reliable_ratio: float = constant(4.0, "times the noise", "drop at which the confidence is one half", "fit")
     visible_ratio: float = constant(2.0, "times the noise", "drop from which a ray supports the edge", "fit")
