@@ -47,7 +47,7 @@ class Background:
     coefficients: Coefficients
     """For the press's next step."""
     load_levels: float
-    """Root mean square of what the frame differs by from the expected model: contact, and all that load changes."""
+    """Root mean square of what the frame differs by from the reference: contact, and all else that the load changes."""
 
 
 class BackgroundModel:
@@ -118,10 +118,10 @@ class BackgroundModel:
         p = self._constants
         samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
         expected = np.zeros((3, self._coarse.shape[2], 1), np.float32) if before is None else before
+        load = float(np.sqrt(np.mean(samples**2)))
         # The fit is of what has changed since the expected model, so that the prior draws towards that model.
         expected_levels = (self._coarse @ expected)[..., 0]
         samples -= expected_levels
-        load = float(np.sqrt(np.mean(samples**2)))
         weight = resized(first_guess, self._grid).ravel()
         trust = p.late_weight + (1 - p.late_weight) * weight
         # The less background there is, the more of a contact's own slopes the shapes could explain.

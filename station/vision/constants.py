@@ -34,6 +34,7 @@ class Constants:
 
     # Reference and input
     lit_share: float = constant(0.25, "of the brightest colour's mean", "a colour below it has no light", "fit")
+    most_drift_share: float = constant(0.35, "of the light", "more drift than this is another light", "fit")
     saturated_share: float = constant(
         0.05, "of a contact", "from here on it is flagged as saturated", "measured: none on real presses"
     )
@@ -65,6 +66,9 @@ class Constants:
         0.35, "grey level/px", "the background's curvature is never taken as larger", "measured: the noise of 20 units"
     )
     sure_gate: float = constant(2.0, "of the threshold", "from here on contact is sure", "fit")
+    wide_share: float = constant(0.3, "of the frame", "a body so large curves the gel evenly", "fit")
+    wide_levels: float = constant(6.0, "grey level", "and moves so much of it as far", "measured: drift reaches 0.5")
+    wide_threshold: float = constant(0.6, "of the threshold", "is enough for such a body", "fit")
     # Candidates
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
     candidate_share: float = constant(0.5, "of the strong level", "a place from here on belongs to a candidate", "fit")
@@ -84,9 +88,14 @@ class Constants:
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
-    smooth_small: float = constant(0.64, "", "coherence from which a small body is smooth", "fit")
-    smooth_at_one: float = constant(1.333, "", "the same, extrapolated to a radius of one pixel", "fit")
+    skin_left_out: float = constant(0.25, "of the region", "the weakest places say nothing of the texture", "fit")
+    smooth_small: float = constant(0.68, "", "coherence from which a small body is smooth", "fit")
+    smooth_at_one: float = constant(1.373, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
+    halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
+    halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
+    curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
+    curved_share: float = constant(0.28, "of that", "where the curved region ends", "fit")
     fine_on_skin: float = constant(
         0.105, "grey level/px", "fine share times curvature, from which a body without background is skin", "fit"
     )

@@ -123,7 +123,17 @@ def contact_from_mask(
     area_px = cv2.countNonZero(mask)
     if area_px == 0:
         nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
-        return Contact(mask, 0, None, flags | nothing, confidence, gate, drift_levels, changed_area_px=changed_area_px)
+        return Contact(
+            mask,
+            0,
+            None,
+            flags | nothing,
+            confidence,
+            gate,
+            drift_levels,
+            changed_area_px=changed_area_px,
+            trace=trace,
+        )
     left, top, width, height = cv2.boundingRect(mask)
     moments = cv2.moments(mask[top : top + height, left : left + width], binaryImage=True)
     centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)

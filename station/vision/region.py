@@ -128,7 +128,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, agreed, coherence = start, p.candidate_share, 0.0, 0.0
+    mask, share, coherence, skin = start, p.candidate_share, 0.0, 0.0
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
@@ -139,7 +139,7 @@ def find_region(
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
         if last:
-            agreed = _coherence(moved, mask, p.coherence_window * radius)
+            agreed, skin = _coherence(moved, mask, p.coherence_window * radius, p.skin_left_out)
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
@@ -158,8 +158,28 @@ def find_region(
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
-    textured = is_textured(moved, mask, agreed, p) if texture is None else texture
+    textured = is_textured(moved, mask, skin, p) if texture is None else texture
+    if textured and moved.share < p.known_share / 2:
+        mask, radii = _curved(moved, mask, rays, radii, p)
+        if floor is not None:
+            mask |= floor
     return Region(mask, rays, radii, level, spread, coherence, textured)
+
+
+def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants: Constants) -> tuple[Mask, _Floats]:
+    """The part of a textured body's region that curves, and its radii, or the region where none does.
+
+    Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
+    """
+    p = constants
+    least = quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
+    floor = min(p.halo_over_least * least, p.halo_curvature)
+    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(floor**2), 0), dtype=np.float32)
+    cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
+    gain = np.minimum(curvature * np.float32(1 / cap), 1) - np.float32(p.curved_share)
+    curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
+    curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
+    return (curved, curved_radii) if curved.any() else (region, radii)
 
 
 def is_textured(moved: Movement, region: Mask, coherence: float, constants: Constants) -> bool:
@@ -194,6 +214,20 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
     return fine / max(whole, _LEAST_LEVEL)
 
 
+def has_moved_widely(moved: Movement, constants: Constants) -> bool:
+    """Whether much of the frame has moved far beyond what drift leaves over.
+
+    A large smooth body curves the gel evenly and leaves its halo for background, above whose curvature it hardly stands
+    out. On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² 15.
+
+    Args:
+        moved: from `movement`.
+        constants: how much of the frame, and how far.
+    """
+    level, _ = level_of(moved, constants.level_window)
+    return quantile(thinned(level), 1 - constants.wide_share) > constants.wide_levels
+
+
 def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     """The change's root mean square over a window above the background's, and that root's spread in the background.
 
@@ -213,10 +247,11 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
+def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float) -> tuple[float, float]:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
-    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over.
+    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
+    second value is without the share of the region that has moved least: of noise directions do not agree.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
     change, squared, weight = moved.change, moved.squared, moved.weight
@@ -238,7 +273,8 @@ def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
     whole = np.maximum(whole, _LEAST_LEVEL)
-    return quantile(agreed / whole, 0.5)
+    share = agreed / whole
+    return quantile(share, 0.5), quantile(share[whole >= quantile(whole, left_out)], 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:

@@ -23,7 +23,15 @@ from station.vision.curvature import calm, curvature, curvature_noise
 from station.vision.debris import Debris
 from station.vision.outline import Outline, find_outline
 from station.vision.reference_check import ReferenceCheck
-from station.vision.region import Movement, Region, find_region, flat_field_correction, movement, radius_of
+from station.vision.region import (
+    Movement,
+    Region,
+    find_region,
+    flat_field_correction,
+    has_moved_widely,
+    movement,
+    radius_of,
+)
 from station.vision.weak_contact import WeakContactDetector
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
 
@@ -149,6 +157,7 @@ class RobustMethod:
         self._reference = working_image(reference)
         self._check = ReferenceCheck(self._reference)
         self._light = clipped(self._reference)
+        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         half = self._reduced(self._light, _FINE_STEP)
         self._flat_field = flat_field_correction(half, constants)
         if "flat field" in without:
@@ -280,6 +289,8 @@ class RobustMethod:
         noise = curvature_noise(response, state.background, self._constants)
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
         state.moved = movement(state.half, state.background, self._flat_field, response)
+        if response.max() <= state.threshold and has_moved_widely(state.moved, self._constants):
+            state.threshold *= self._constants.wide_threshold
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
@@ -372,13 +383,17 @@ class RobustMethod:
             state.mask = np.zeros((height, width), np.uint8)
             for outline in state.outlines:
                 state.mask |= outline.drawn(height, width)
-        if state.floor is not None:
-            floor = cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST)
+        if state.floor is not None and state.before is not None:
+            lost = Flag.LOWER_BOUND in state.flags and state.before.floor is not None
+            kept = state.before.floor if lost and state.before.floor is not None else state.floor
+            floor = cv2.resize(kept, (width, height), interpolation=cv2.INTER_NEAREST)
             state.mask |= np.asarray(floor * 255, np.uint8)
 
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
         p, flags, work = self._constants, state.flags, state.work
+        if state.background.strength_levels > p.most_drift_share * self._light_levels:
+            flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
@@ -423,13 +438,13 @@ class RobustMethod:
         smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None
-        if state.floor is not None or state.weak_at is not None:
+        if state.floor is not None:
             return outline
         sure = state.gate > p.sure_gate
-        support = p.support_least if outline.edge.seen.all() else p.support_cut
-        if self._one_colour(state, outline, sure=sure) or not (sure or outline.confidence >= support):
+        if self._one_colour(state, outline, sure=sure):
             return None
-        return outline
+        support = p.support_least if outline.edge.seen.all() else p.support_cut
+        return outline if sure or state.weak_at is not None or outline.confidence >= support else None
 
     def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
         """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
@@ -463,7 +478,9 @@ class RobustMethod:
         height, width = self._debris.clean.shape
         return self._weak.response(resized(clipped(state.work), (width, height)))
 
-    def _trace(self, state: State) -> Trace:
+    def _trace(self, state: State) -> Trace | None:
+        if not state.outlines and state.floor is None:
+            return None  # a press begins with its first contact: what drifted before says little about its light
         before, background = state.before, state.background
         known = background.share >= self._constants.known_share / 2
         shape = state.changed.shape

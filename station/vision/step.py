@@ -35,9 +35,9 @@ def measure_step(
     """
     if not frames:
         raise ValueError("no frame to measure: a step needs at least one")
-    if len(frames) == 1:
-        return method.measure(frames[0], previous=previous)
     known = known or {}
+    if len(frames) == 1:
+        return known.get(id(frames[0])) or method.measure(frames[0], previous=previous)
     alone = [known.get(id(frame)) or method.measure(frame, previous=previous) for frame in frames]
     contact = method.measure(mean_image(frames), previous=previous)
     if contact.confidence is None:

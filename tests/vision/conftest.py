@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from station.vision.background import Background
+
 LIGHTS = np.array([[-0.2, 1.0], [-0.9, -0.4], [1.0, -0.5]])
 """What a slope of one along x and along y changes in B, G and R."""
 
@@ -89,5 +91,17 @@ def noisy_again() -> Callable[[np.ndarray, int], np.ndarray]:
         y = np.linspace(0, np.pi, image.shape[0])[:, None, None]
         slow = generator.normal(size=3) * np.cos(x) + generator.normal(size=3) * np.cos(y)
         return noisy(image + generator.normal(size=3) * 1.5 + 2 * slow, generator)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def background_of() -> Callable[[np.ndarray], Background]:
+    """A background that takes nothing off, of a weight for each place."""
+
+    def make(weight: np.ndarray) -> Background:
+        levels = np.zeros((*weight.shape, 3), np.float32)
+        coefficients = np.zeros((3, 1, 1), np.float32)
+        return Background(levels, np.asarray(weight, np.float32), float(weight.mean()), 1.0, 0.0, coefficients, 0.0)
 
     return make

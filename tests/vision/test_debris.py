@@ -1,4 +1,4 @@
-"""Crumbs on the gel, and an LED that is dead: the gel and the light as they are in a working station."""
+"""Debris on the gel, and an LED that is dead: the gel and the light as they are in a working station."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition
-from station.vision.debris import Crumbs
+from station.vision.debris import Debris
 from station.vision.robust import RobustMethod
 
 SHAPE = (320, 240)
@@ -26,54 +26,62 @@ def light():
     return np.stack([70 + 40 * rows, 90 + 50 * columns, 120 - 50 * columns * rows], axis=-1).astype(np.float32)
 
 
-def test_a_gel_without_crumbs_is_left_as_it_is():
-    crumbs = Crumbs(light())
+def test_a_gel_without_debris_is_left_as_it_is():
+    debris = Debris(light())
     change = np.random.default_rng(1).normal(size=(*SHAPE, 3)).astype(np.float32)
-    assert crumbs.clean.all()
-    assert crumbs.bridged(change) is change
+    assert debris.clean.all()
+    assert debris.bridged(change) is change
 
 
-def test_a_crumb_that_a_contact_hides_does_not_show_in_the_change():
-    crumb = bump(10, 45).astype(np.float32)
-    crumbs = Crumbs(light() + crumb)
+def test_a_particle_that_a_contact_hides_does_not_show_in_the_change():
+    particle = bump(10, 45).astype(np.float32)
+    debris = Debris(light() + particle)
     contact = np.full((*SHAPE, 3), 3.0, np.float32)
-    seen = (contact - crumb).astype(np.float32)
-    assert (crumbs.clean == 0).any()
+    seen = (contact - particle).astype(np.float32)
+    assert (debris.clean == 0).any()
     before = np.abs(seen - contact).max()
-    assert np.abs(crumbs.bridged(seen) - contact).max() < before / 3
+    assert np.abs(debris.bridged(seen) - contact).max() < before / 3
 
 
-def test_a_crumb_that_still_stands_out_is_filled_from_around():
-    crumb = bump(10, 45).astype(np.float32)
-    crumbs = Crumbs(light() + crumb)
+def test_a_particle_that_still_stands_out_is_filled_from_around():
+    debris = Debris(light() + bump(10, 45).astype(np.float32))
     seen = np.full((*SHAPE, 3), 3.0, np.float32)
     rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
     seen[np.hypot(columns - 120, rows - 160) < 13] = 0
-    assert crumbs.bridged(seen)[160, 120] == pytest.approx(3.0, abs=1.0)
+    assert debris.bridged(seen)[160, 120] == pytest.approx(3.0, abs=1.0)
 
 
-def test_two_crumbs_side_by_side_are_no_edge_of_a_beam_of_light():
+def test_two_particles_side_by_side_are_no_edge_of_a_beam_of_light():
     pair = bump(12, 45, x=104) + bump(12, 45, x=134)
-    clean = Crumbs((light() + pair).astype(np.float32)).clean
+    clean = Debris((light() + pair).astype(np.float32)).clean
     assert clean[80, 52] == clean[80, 67] == 0
     beam = np.where(np.abs(np.indices(SHAPE)[1] - 120) < 2, np.float32(45), np.float32(0))[..., None]
-    assert Crumbs(light() + beam * (np.indices(SHAPE)[0] < 160)[..., None]).clean.all()
+    assert Debris(light() + beam * (np.indices(SHAPE)[0] < 160)[..., None]).clean.all()
 
 
-@pytest.mark.parametrize(("kind", "seed", "closing_mm"), [("blueberry", 1406, 0.4), ("strawberry", 1407, 0.3)])
-def test_a_contact_on_a_crumb_is_measured_without_it(kind, seed, closing_mm):
-    press = render_press(kind, seed, (closing_mm,), PressOptions(condition=Condition(dirt=3)))
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
-    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)
+@pytest.mark.parametrize(("kind", "first_seed", "closing_mm"), [("blueberry", 1406, 0.4), ("strawberry", 1407, 0.3)])
+def test_a_contact_on_debris_is_measured_without_it(kind, first_seed, closing_mm):
+    ratios = []
+    for seed in range(first_seed, first_seed + 5):
+        press = render_press(kind, seed, (closing_mm,), PressOptions(condition=Condition(dirt=3)))
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+        ratios.append(contact.area_px / np.count_nonzero(press.true_masks[0]))
+    assert np.median(ratios) == pytest.approx(1, rel=0.25)
 
 
 def test_with_a_dead_led_a_contact_over_most_of_the_field_is_not_taken_for_drift():
-    press = render_press("rubber_ball", 0, (7.0,), PressOptions(condition=Condition(dead_led="red")))
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
-    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.1)
+    ratios = []
+    for seed in range(5):
+        press = render_press("rubber_ball", seed, (7.0,), PressOptions(condition=Condition(dead_led="red")))
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+        ratios.append(contact.area_px / np.count_nonzero(press.true_masks[0]))
+    assert np.median(ratios) == pytest.approx(1, rel=0.1)
 
 
 def test_a_blueberry_over_most_of_the_field_is_not_taken_for_drift():
-    press = member("blueberry", 2025, 93).press()
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[16])
-    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[16]), rel=0.1)
+    ratios = []
+    for number in range(91, 96):
+        press = member("blueberry", 2025, number).press()
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[16])
+        ratios.append(contact.area_px / np.count_nonzero(press.true_masks[16]))
+    assert np.median(ratios) == pytest.approx(1, rel=0.1)

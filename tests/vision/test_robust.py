@@ -1,6 +1,7 @@
-"""The robust method on golden spheres and on real presses."""
+"""The robust method: golden spheres, presses of the twin, drift without a contact, real presses."""
 
 import csv
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,13 +12,17 @@ from hypothesis import strategies as st
 from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.contact import FruitOnGel, Pose
+from station.twin.digit.loaded import band_share
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
+from station.twin.soft.body import Foundation, SoftBody, SoftKind
+from station.twin.soft.contact import SoftOnGel
 from station.twin.squeeze import Squeeze
+from station.vision.constants import CONSTANTS
 from station.vision.contact import Flag
-from station.vision.robust import RobustMethod
+from station.vision.robust import STAGES, RobustMethod
 from station.vision.step import mean_image
 
 FEW = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -31,6 +36,15 @@ def read(path):
 
 def measure(reference, image, **parameters):
     return RobustMethod([reference], RobustParameters(**parameters)).measure(image)
+
+
+def ratios(presses, place=-1):
+    """Areas over the truth's of one step of some presses, each measured as a single image."""
+    found = []
+    for press in presses:
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[place])
+        found.append(contact.area_px / np.count_nonzero(press.true_masks[place]))
+    return found
 
 
 @FEW
@@ -117,20 +131,20 @@ def test_a_contact_cut_by_the_border_is_a_lower_bound(sphere_press, overlap):
     assert overlap(contact.mask, press.truth) > 0.75
 
 
+@pytest.mark.parametrize("closing_mm", [5.0, 7.0])
 @pytest.mark.parametrize(("x_px", "y_px"), [(0, 320), (30, 320), (450, 320), (240, 40)])
-def test_of_a_large_contact_that_the_border_cuts_the_visible_part_is_measured(x_px, y_px):
-    press = render_press("blueberry", 2602, (5.0, 7.0), PressOptions(pose=Pose(x_px, y_px)))
-    method = RobustMethod(press.references, RobustParameters())
-    for frame, truth in zip(press.frames, press.true_masks, strict=True):
-        contact = method.measure(frame)
-        assert Flag.CUT_BY_BORDER in contact.flags
-        assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.12)
+def test_of_a_large_contact_that_the_border_cuts_the_visible_part_is_measured(x_px, y_px, closing_mm):
+    options = PressOptions(pose=Pose(x_px, y_px))
+    presses = [render_press("blueberry", seed, (closing_mm,), options) for seed in range(2600, 2605)]
+    for press in presses:
+        assert Flag.CUT_BY_BORDER in measure(press.references[0], press.frames[0]).flags
+    assert np.median(ratios(presses)) == pytest.approx(1, abs=0.12)
 
 
-def test_a_contact_as_wide_as_the_image_is_not_mirrored_at_its_upper_border():
-    press = render_press("blueberry", 50000, (6.0, 8.0, 10.0), PressOptions(pose=Pose(225, 295), unit=50000))
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[-1])
-    assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[-1]), rel=0.1)
+def test_a_contact_as_wide_as_the_image_ends_at_its_upper_border():
+    options = PressOptions(pose=Pose(225, 295), unit=50000)
+    presses = [render_press("blueberry", seed, (10.0,), options) for seed in range(50000, 50005)]
+    assert np.median(ratios(presses)) == pytest.approx(1, abs=0.1)
 
 
 def test_two_contacts_are_found_where_the_recipe_expects_several(sphere_press, overlap):
@@ -164,25 +178,19 @@ def test_no_contact_is_the_less_sure_the_nearer_the_gate(sphere_press):
     assert confidences[-1] < 0.5
 
 
-def test_a_large_soft_contact_that_bends_the_gel_little_is_whole():
-    press = render_press("rubber_ball", 0, (7.0, 8.0))
-    method = RobustMethod(press.references, RobustParameters())
-    for frame, truth in zip(press.frames, press.true_masks, strict=True):
-        contact = method.measure(frame)
-        assert contact.gate is not None
-        assert contact.gate < 2
-        assert contact.area_px == pytest.approx(np.count_nonzero(truth), rel=0.15)
+@pytest.mark.parametrize("closing_mm", [7.0, 8.0])
+def test_a_large_soft_contact_that_curves_the_gel_little_is_whole(closing_mm):
+    presses = [render_press("rubber_ball", seed, (closing_mm,)) for seed in range(5)]
+    gates = [RobustMethod(press.references, RobustParameters()).measure(press.frames[0]).gate for press in presses]
+    assert np.median([gate or 0.0 for gate in gates]) < 2
+    assert np.median(ratios(presses)) == pytest.approx(1, abs=0.15)
 
 
 @pytest.mark.parametrize(("kind", "closing_mm", "rel"), [("strawberry", 3.0, 0.2), ("raspberry", 4.0, 0.15)])
 def test_a_bruised_fruit_over_half_of_the_field_is_whole(kind, closing_mm, rel):
-    ratios = []
-    for seed in (900, 901, 902):
-        press = render_press(draw_fruit(kind, seed, bruised=True), seed, (closing_mm,))
-        truth = np.count_nonzero(press.true_masks[0])
-        assert truth > 0.45 * press.true_masks[0].size
-        ratios.append(RobustMethod(press.references, RobustParameters()).measure(press.frames[0]).area_px / truth)
-    assert np.median(ratios) == pytest.approx(1, abs=rel)
+    presses = [render_press(draw_fruit(kind, seed, bruised=True), seed, (closing_mm,)) for seed in range(900, 905)]
+    assert np.median([press.true_masks[0].mean() / 255 for press in presses]) > 0.45
+    assert np.median(ratios(presses)) == pytest.approx(1, abs=rel)
 
 
 def test_a_contact_that_fills_the_field_is_a_lower_bound_and_not_sure():
@@ -203,62 +211,47 @@ def test_a_contact_that_fills_the_field_is_a_lower_bound_and_not_sure():
     ],
 )
 def test_a_contact_that_leaves_hardly_any_background_ends_at_its_edge(kind, number, from_mm2, rel):
-    press = member(kind, 2025, number).press()
-    method = RobustMethod(press.references, RobustParameters())
-    truths = [np.count_nonzero(mask) for mask in press.true_masks]
-    deep = [place for place, truth in enumerate(truths) if truth * MM_PER_PX**2 > from_mm2]
-    assert len(deep) >= 3
-    ratios = [method.measure(press.frames[place]).area_px / truths[place] for place in deep]
-    assert ratios == pytest.approx([1.0] * len(deep), abs=rel)
+    found = []
+    for one in range(number, number + 3):
+        press = member(kind, 2025, one).press()
+        method = RobustMethod(press.references, RobustParameters())
+        truths = [np.count_nonzero(mask) for mask in press.true_masks]
+        deep = [place for place, truth in enumerate(truths) if truth * MM_PER_PX**2 > from_mm2]
+        found += [method.measure(press.frames[place]).area_px / truths[place] for place in deep]
+    assert len(found) >= 3
+    assert np.median(found) == pytest.approx(1.0, abs=rel)
 
 
-@pytest.mark.parametrize(("number", "image"), [(91, 11), (148, 13), (262, 14)])
-def test_a_contact_of_which_the_border_cuts_only_the_skirt_is_not_mirrored(number, image):
-    press = member("blueberry", 1, number).press()
-    truth = np.count_nonzero(press.true_masks[image])
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[image])
-    assert contact.area_px == pytest.approx(truth, rel=0.1)
+def test_a_contact_of_which_the_border_cuts_only_the_halo_ends_at_its_edge():
+    found = []
+    for number, image in ((91, 11), (148, 13), (262, 14)):
+        press = member("blueberry", 1, number).press()
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[image])
+        found.append(contact.area_px / np.count_nonzero(press.true_masks[image]))
+    assert np.median(found) == pytest.approx(1, abs=0.1)
 
 
-def untouched(unit, drift, after_s, dead_led=None):
-    """A method prepared for a unit of the twin, and its last mean image of those times, with nothing touching."""
+def untouched(unit, drift, after_s=3.0, dead_led=None):
+    """What is measured on a unit of the twin some time after its reference, with nothing touching."""
     condition = Condition(dead_led=dead_led)
     sensor = DigitSensor(unit, unit, drift=drift)
     references = [sensor.frame(None, frame / 30, condition) for frame in range(5)]
-    means = [
-        mean_image([sensor.frame(None, began_s + frame / 30, condition) for frame in range(3)]) for began_s in after_s
-    ]
-    return RobustMethod(references, RobustParameters()), means[-1]
+    image = mean_image([sensor.frame(None, after_s + frame / 30, condition) for frame in range(3)])
+    return RobustMethod(references, RobustParameters()).measure(image)
 
 
-def test_drift_in_a_corner_without_light_that_opens_the_gate_a_little_is_not_sure():
-    method, image = untouched(30017, 1.0, (1.0, 3.0))
-    contact = method.measure(image)
-    assert contact.gate is not None
-    assert 1 < contact.gate < 2
-    assert Flag.CUT_BY_BORDER in contact.flags
-    assert Flag.LOW_CONFIDENCE in contact.flags
+@pytest.mark.parametrize(("drift", "dead_led"), [(1.0, None), (2.0, None), (1.0, "red")])
+def test_drift_is_no_contact(drift, dead_led):
+    contacts = [untouched(unit, drift, dead_led=dead_led) for unit in range(31000, 31025)]
+    assert sum(contact.found for contact in contacts) <= 1
+    assert not any(contact.found and Flag.LOW_CONFIDENCE not in contact.flags for contact in contacts)
+    for contact in contacts:
+        opened = contact.gate is not None and contact.gate > 1
+        assert contact.found or (Flag.UNDECIDED if opened else Flag.NO_CONTACT) in contact.flags
 
 
-@pytest.mark.parametrize(
-    ("unit", "drift", "dead_led", "after_s"),
-    [
-        (31009, 2.0, None, (1.0, 3.0, 5.0)),
-        (31021, 2.0, None, (1.0, 3.0, 5.0)),
-        (30020, 1.0, "red", (1.0, 3.0, 5.0)),
-    ],
-)
-def test_drift_that_opens_the_gate_is_no_contact_where_the_gel_shows_no_slopes(unit, drift, dead_led, after_s):
-    method, image = untouched(unit, drift, after_s, dead_led)
-    contact = method.measure(image)
-    assert contact.gate is not None
-    assert contact.gate > 1
-    assert contact.area_px == 0
-    assert Flag.UNDECIDED in contact.flags
-
-
-@pytest.mark.parametrize(("kind", "seed"), [("blueberry", 502), ("raspberry", 501), ("rubber_ball", 507)])
-def test_a_touch_lighter_than_the_gate_is_found_and_not_sure(kind, seed):
+def weak_touch(kind, seed, without=frozenset()):
+    """What is measured of a contact of 1 mm², and its area over the truth's."""
     fruit, gel = draw_fruit(kind, seed), Gel()
     on_gel, squeeze = FruitOnGel(fruit, Pose(), gel), Squeeze(fruit, gel)
     closings = np.geomspace(0.002, 1.0, 40)
@@ -266,31 +259,121 @@ def test_a_touch_lighter_than_the_gate_is_found_and_not_sure(kind, seed):
     sensor = DigitSensor(seed)
     references = [sensor.frame(None, frame / 30) for frame in range(5)]
     image = mean_image([sensor.frame(seen.dent, 1.0 + frame / 30) for frame in range(3)])
-    contact = RobustMethod(references, RobustParameters()).measure(image)
-    assert contact.gate is not None
-    assert contact.gate < 1
-    assert 0.5 < contact.area_px / seen.true_area_px < 2
-    assert contact.found
-    assert not contact.is_firm
-    assert Flag.LOW_CONFIDENCE in contact.flags
+    contact = RobustMethod(references, RobustParameters(), without=without).measure(image)
+    return contact, contact.area_px / seen.true_area_px
 
 
-def test_an_area_that_only_the_slopes_support_is_not_judged():
+@pytest.mark.parametrize("kind", ["blueberry", "raspberry", "rubber_ball"])
+def test_a_touch_below_the_detection_threshold_is_found_and_not_sure(kind):
+    touches = [weak_touch(kind, seed) for seed in range(500, 508)]
+    assert np.median([contact.gate or 0.0 for contact, _ in touches]) < 1
+    found = [(contact, ratio) for contact, ratio in touches if contact.found]
+    assert len(found) >= 3
+    assert 0.5 < np.median([ratio for _, ratio in found]) < 2
+    for contact, _ in found:
+        assert contact.is_light
+        assert not contact.is_firm
+        assert Flag.LOW_CONFIDENCE in contact.flags
+
+
+def test_without_the_weak_contact_detector_such_a_touch_is_not_found():
+    touches = [weak_touch("blueberry", seed, frozenset({"weak contact"}))[0] for seed in range(500, 504)]
+    assert not any(contact.found for contact in touches)
+
+
+def test_of_a_contact_whose_middle_lies_at_the_border_no_wrong_area_is_judged():
     options = PressOptions(pose=Pose(257, 647), unit=20)
-    press = render_press("blueberry", 60013, (0.8, 1.2, 2.5, 5.0, 7.0), options)
-    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[-1])
-    assert 0 < contact.area_px < 0.75 * np.count_nonzero(press.true_masks[-1])
-    assert {Flag.LOW_CONFIDENCE, Flag.CUT_BY_BORDER} <= contact.flags
-    assert contact.gate is not None
-    assert contact.gate > 1
-    assert not contact.is_firm
+    for seed in range(60010, 60016):
+        press = render_press("blueberry", seed, (7.0,), options)
+        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+        assert contact.found
+        if Flag.LOW_CONFIDENCE not in contact.flags:
+            assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)
 
 
-def test_a_crown_is_not_taken_for_its_blueberry():
-    press = render_press(draw_fruit("blueberry", 7002, bruised=True), 7002, (4.0, 6.5))
-    method = RobustMethod(press.references, RobustParameters())
-    for frame, truth in zip(press.frames, press.true_masks, strict=True):
-        assert method.measure(frame).area_px == pytest.approx(np.count_nonzero(truth), rel=0.15)
+@pytest.mark.parametrize("closing_mm", [4.0, 6.5])
+def test_a_calyx_is_not_taken_for_its_blueberry(closing_mm):
+    fruit = [draw_fruit("blueberry", seed, bruised=True) for seed in range(7000, 7005)]
+    presses = [render_press(one, 7000 + number, (closing_mm,)) for number, one in enumerate(fruit)]
+    assert np.median(ratios(presses)) == pytest.approx(1, abs=0.15)
+
+
+@pytest.mark.parametrize("radius_mm", [1.5, 3.0])
+def test_a_cylinder_across_the_field_is_measured_along_its_length(overlap, radius_mm):
+    overlaps = []
+    for seed in range(5):
+        turn_deg = float(np.random.default_rng(seed).uniform(0, 180))
+        rod = SoftBody(SoftKind.LONG, seed, (radius_mm, radius_mm), Foundation(0.5, 0.5, 0.5))
+        seen = SoftOnGel(rod, Pose(turn_deg=turn_deg)).pressed(0.5)
+        sensor = DigitSensor(seed, 700 + seed)
+        references = [sensor.frame(None, frame / 30) for frame in range(5)]
+        contact = RobustMethod(references, RobustParameters()).measure(sensor.frame(seen.dent, 1.0))
+        overlaps.append(overlap(contact.mask, seen.true_mask > 0))
+    # On rays of equal length all around it was 0.2.
+    assert np.median(overlaps) > 0.45
+
+
+@pytest.mark.parametrize("levels", [10.0, 30.0])
+def test_bands_that_brighten_at_the_border_are_no_contact(levels):
+    even = np.full((320, 240), 0.3, np.float32)
+    for unit in range(31000, 31008):
+        sensor = DigitSensor(unit, unit)
+        references = [sensor.frame(None, frame / 30) for frame in range(5)]
+        condition = Condition(bands=levels / band_share(0.3))
+        frames = [sensor.frame(even, 1.0 + frame / 30, condition) for frame in range(3)]
+        contact = RobustMethod(references, RobustParameters()).measure(mean_image(frames))
+        assert not contact.found or Flag.LOW_CONFIDENCE in contact.flags
+        assert contact.area_px < 0.05 * contact.mask.size
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_stage_can_be_left_out(sphere_press, overlap, stage):
+    press = sphere_press(levels=60)
+    method = RobustMethod([press.reference], RobustParameters(), without=frozenset({stage}))
+    first = method.measure(press.image)
+    assert overlap(first.mask, press.truth) > 0.8
+    assert overlap(method.measure(press.image, previous=first).mask, press.truth) > 0.8
+    assert method.measure(press.reference).area_px == 0
+
+
+def test_a_stage_that_there_is_not_is_refused(sphere_press):
+    with pytest.raises(ValueError, match="no such stage: polish"):
+        RobustMethod([sphere_press().reference], RobustParameters(), without=frozenset({"polish"}))
+
+
+def test_without_following_an_image_is_measured_by_itself(sphere_press):
+    press, smaller = sphere_press(), sphere_press(radius_px=50)
+    method = RobustMethod([press.reference], RobustParameters(), without=frozenset({"following"}))
+    assert method.measure(smaller.image, previous=method.measure(press.image)).mask.tolist() == (
+        method.measure(smaller.image).mask.tolist()
+    )
+
+
+def test_what_was_in_contact_at_the_last_step_still_is(sphere_press):
+    press, narrower = sphere_press(levels=45), sphere_press(levels=45, radius_px=55)
+    method = RobustMethod([press.reference], RobustParameters())
+    first = method.measure(press.image)
+    alone, followed = (method.measure(narrower.image, previous=previous) for previous in (None, first))
+    assert alone.area_px < 0.75 * first.area_px
+    assert followed.area_px > 0.85 * first.area_px
+
+
+def test_the_changed_area_is_given_beside_the_contact_area(sphere_press):
+    press = sphere_press(levels=60)
+    contact, nothing = (measure(press.reference, image) for image in (press.image, press.reference))
+    assert nothing.changed_area_px == 0
+    assert contact.changed_area_px is not None
+    assert 0.5 * contact.area_px < contact.changed_area_px < CONSTANTS.witness_most * contact.area_px
+
+
+def test_other_constants_change_the_measurement(sphere_press):
+    press = sphere_press(levels=60)
+    strict = replace(CONSTANTS, changed_levels=60.0)
+    fewer = RobustMethod([press.reference], RobustParameters(), strict).measure(press.image).changed_area_px
+    more = measure(press.reference, press.image).changed_area_px
+    assert fewer is not None
+    assert more is not None
+    assert fewer < more
 
 
 def test_confidence_falls_with_the_contrast(sphere_press):
@@ -331,17 +414,17 @@ def test_real_presses_reach_the_contact_edge(real_images, overlap):
     folder = real_images / "digit_presses"
     method = RobustMethod([read(str(folder / "reference.jpg"))], RobustParameters())
     y, x = np.mgrid[:640, :480]
-    overlaps, ratios = [], []
+    overlaps, found = [], []
     for row in csv.DictReader((folder / "contacts.csv").read_text().splitlines()):
         truth = np.hypot(x - float(row["centre_x_px"]), y - float(row["centre_y_px"])) <= float(row["radius_px"])
         contact = method.measure(read(str(folder / row["image"])))
         overlaps.append(overlap(contact.mask, truth))
-        ratios.append(contact.area_px / np.count_nonzero(truth))
+        found.append(contact.area_px / np.count_nonzero(truth))
     assert np.median(overlaps) >= 0.88
     assert np.percentile(overlaps, 10) >= 0.82
-    assert 0.93 <= np.median(ratios) <= 1.07
-    assert np.percentile(ratios, 10) >= 0.85
-    assert np.percentile(ratios, 90) <= 1.15
+    assert 0.93 <= np.median(found) <= 1.07
+    assert np.percentile(found, 10) >= 0.85
+    assert np.percentile(found, 90) <= 1.15
 
 
 def test_real_backgrounds_show_no_contact(real_images, noisy_again):

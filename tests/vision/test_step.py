@@ -1,4 +1,4 @@
-"""A width step measured from all of its frames."""
+"""The contact of one width step, from all of its frames."""
 
 import numpy as np
 import pytest
@@ -57,3 +57,44 @@ def test_a_step_without_frames_is_refused(sphere_press):
     method = RobustMethod([sphere_press().reference], RobustParameters())
     with pytest.raises(ValueError, match="at least one"):
         measure_step(method, [], 0.5)
+
+
+class Counting:
+    """A method that counts its measurements."""
+
+    def __init__(self, method):
+        self.method, self.stages, self.measured = method, method.stages, []
+
+    def measure(self, image, on_stage=None, previous=None):
+        self.measured.append((image, previous))
+        return self.method.measure(image, on_stage, previous)
+
+
+def test_frames_that_are_measured_already_are_not_measured_again(sphere_press):
+    frames = [sphere_press(seed=seed).image for seed in range(3)]
+    method = RobustMethod([sphere_press().reference], RobustParameters())
+    counting = Counting(method)
+    known = {id(frame): method.measure(frame) for frame in frames[:2]}
+    step = measure_step(counting, frames, 0.5, known=known)
+    whole = measure_step(method, frames, 0.5)
+    assert len(counting.measured) == 2
+    assert counting.measured[0][0] is frames[2]
+    assert (step.area_px, step.confidence, step.flags) == (whole.area_px, whole.confidence, whole.flags)
+
+
+def test_a_lone_frame_that_is_measured_already_is_not_measured_again(sphere_press):
+    frame = sphere_press().image
+    method = RobustMethod([sphere_press().reference], RobustParameters())
+    counting = Counting(method)
+    contact = measure_step(counting, [frame], 0.5, known={id(frame): method.measure(frame)})
+    assert contact.found
+    assert counting.measured == []
+
+
+def test_every_measurement_of_a_step_follows_the_step_before(sphere_press):
+    frames = [sphere_press(seed=seed).image for seed in range(3)]
+    counting = Counting(RobustMethod([sphere_press().reference], RobustParameters()))
+    before = counting.method.measure(frames[0])
+    measure_step(counting, frames, 0.5, before)
+    assert len(counting.measured) == 4
+    assert all(previous is before for _, previous in counting.measured)

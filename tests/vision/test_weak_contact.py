@@ -1,10 +1,11 @@
-"""The matched filter for touches lighter than drift: what noise, drift, dents, dead LEDs and blind places give."""
+"""Weak-contact detector: what noise, drift, dents, dead LEDs and places at an end of the scale give."""
 
 import cv2
 import numpy as np
 import pytest
 
-from station.vision.weak_contact import LightTouch, gate
+from station.vision.constants import CONSTANTS
+from station.vision.weak_contact import WeakContactDetector
 
 SHAPE = (160, 120)
 GATE_RATIO = 3.0
@@ -16,9 +17,9 @@ def reference(level=100.0):
     return np.full((*SHAPE, 3), level, np.float32)
 
 
-def looking(level=100.0, lit=(True, True, True), clean=None):
+def detector(level=100.0, lit=(True, True, True), clean=None, gate_ratio=GATE_RATIO):
     clean = np.ones(SHAPE, np.float32) if clean is None else clean
-    return LightTouch(reference(level), np.array(lit), clean)
+    return WeakContactDetector(reference(level), np.array(lit), clean, CONSTANTS, gate_ratio)
 
 
 def noise(generator, levels=(1.0, 1.0, 1.0), blur_px=0.8):
@@ -46,21 +47,21 @@ def dent(levels, place=PLACE, sigma_px=3.0):
 
 @pytest.mark.parametrize("levels", [(1.0, 1.0, 1.0), (0.2, 3.0, 1.0)])
 def test_noise_follows_the_chi_distribution_whatever_its_levels_and_common_parts(levels):
-    touch = looking()
+    weak = detector()
     responses = [
-        touch.response(reference() + noise(np.random.default_rng(seed), levels))[12:-12, 12:-12] for seed in range(6)
+        weak.response(reference() + noise(np.random.default_rng(seed), levels))[12:-12, 12:-12] for seed in range(6)
     ]
     assert np.mean(np.square(responses)) == pytest.approx(6.0, rel=0.16)
-    assert all(touch.place(response, GATE_RATIO) is None for response in responses)
+    assert all(weak.place(response) is None for response in responses)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_faint_dent_is_found_under_drift_that_hides_it(seed):
     generator = np.random.default_rng(seed)
     frame = reference() + noise(generator) + drift(generator, levels=8.0)
-    touch = looking()
-    assert touch.place(touch.response(frame), GATE_RATIO) is None
-    place = touch.place(touch.response(frame + dent(levels=2.5)), GATE_RATIO)
+    weak = detector()
+    assert weak.place(weak.response(frame)) is None
+    place = weak.place(weak.response(frame + dent(levels=2.5)))
     assert place == pytest.approx(PLACE, abs=3)
 
 
@@ -72,61 +73,68 @@ def test_a_pattern_of_light_that_gains_or_moves_does_not_hide_or_feign_a_touch(g
     pattern = np.stack([100 + 60 * spot, 100 - 40 * spot, 100 + 30 * spot], axis=2).astype(np.float32)
     shift = np.array([[1, 0, moved_px], [0, 1, moved_px]], np.float32)
     moved = gain * cv2.warpAffine(pattern, shift, SHAPE[::-1], borderMode=cv2.BORDER_REPLICATE)
-    touch = LightTouch(pattern, np.ones(3, bool), np.ones(SHAPE, np.float32))
+    weak = WeakContactDetector(pattern, np.ones(3, bool), np.ones(SHAPE, np.float32), CONSTANTS, GATE_RATIO)
     frame = moved + noise(np.random.default_rng(5))
-    assert touch.place(touch.response(frame), GATE_RATIO) is None
-    assert touch.place(touch.response(frame + dent(levels=2.5)), GATE_RATIO) == pytest.approx(PLACE, abs=3)
+    assert weak.place(weak.response(frame)) is None
+    assert weak.place(weak.response(frame + dent(levels=2.5))) == pytest.approx(PLACE, abs=3)
 
 
 def test_noise_that_the_colours_have_in_common_does_not_hide_a_touch():
     generator = np.random.default_rng(6)
     flicker = cv2.GaussianBlur(generator.standard_normal(SHAPE), (0, 0), 0.8)[..., None]
     frame = reference() + noise(generator, (0.3, 0.3, 0.3)) + (3 * flicker / flicker.std()).astype(np.float32)
-    touch = looking()
-    assert touch.place(touch.response(frame), GATE_RATIO) is None
-    assert touch.place(touch.response(frame + dent(levels=2.5)), GATE_RATIO) == pytest.approx(PLACE, abs=3)
+    weak = detector()
+    assert weak.place(weak.response(frame)) is None
+    assert weak.place(weak.response(frame + dent(levels=2.5))) == pytest.approx(PLACE, abs=3)
 
 
-def test_a_higher_gate_asks_for_a_stronger_touch():
-    touch = looking()
-    response = touch.response(reference() + noise(np.random.default_rng(0)) + dent(levels=2.5))
-    assert touch.place(response, GATE_RATIO) is not None
-    assert touch.place(response, 2 * GATE_RATIO) is None
+def test_a_higher_gate_ratio_needs_a_stronger_touch():
+    weak, strict = detector(), detector(gate_ratio=2 * GATE_RATIO)
+    response = weak.response(reference() + noise(np.random.default_rng(0)) + dent(levels=2.5))
+    assert weak.place(response) is not None
+    assert strict.place(response) is None
 
 
-def test_a_lower_gate_does_not_let_noise_through():
-    assert gate(GATE_RATIO / 2) == gate(GATE_RATIO)
+def test_a_lower_gate_ratio_does_not_let_noise_through():
+    assert detector(gate_ratio=GATE_RATIO / 2).threshold == detector().threshold == CONSTANTS.weak_threshold
 
 
-def test_a_colour_without_light_is_not_asked():
-    touch = looking(lit=(True, True, False))
+def test_the_surroundings_of_a_place_end_at_the_border():
+    weak = detector()
+    whole, corner = (np.zeros(SHAPE)[weak.near(place)].shape for place in ((60, 80), (0, 159)))
+    assert whole[0] == whole[1]
+    assert corner == ((whole[0] + 1) // 2,) * 2
+
+
+def test_a_colour_without_light_adds_nothing():
+    weak = detector(lit=(True, True, False))
     flicker = dent(levels=40.0) * np.array([0, 0, 1], np.float32)
-    response = touch.response(reference() + noise(np.random.default_rng(1)) + flicker)
-    assert touch.place(response, GATE_RATIO) is None
+    response = weak.response(reference() + noise(np.random.default_rng(1)) + flicker)
+    assert weak.place(response) is None
 
 
 @pytest.mark.parametrize("level", [3.0, 250.0])
-def test_a_reference_at_an_end_of_the_scale_says_nothing(level):
-    touch = looking(level)
-    response = touch.response(reference(level) + noise(np.random.default_rng(2)) + dent(levels=20.0))
+def test_a_reference_at_an_end_of_the_scale_decides_nothing(level):
+    weak = detector(level)
+    response = weak.response(reference(level) + noise(np.random.default_rng(2)) + dent(levels=20.0))
     assert response.max() == 0
     region = np.zeros(SHAPE, np.uint8)
     region[80:100, 60:80] = 1
-    assert touch.shows(region, response, GATE_RATIO)
+    assert weak.supports(region, response)
 
 
-def test_nothing_is_seen_where_a_crumb_lies():
+def test_nothing_is_found_where_debris_lies():
     clean = np.ones(SHAPE, np.float32)
     clean[PLACE[1] - 2 : PLACE[1] + 3, PLACE[0] - 2 : PLACE[0] + 3] = 0
-    touch = looking(clean=clean)
-    assert touch.response(reference() + dent(levels=20.0))[PLACE[1], PLACE[0]] == 0
+    weak = detector(clean=clean)
+    assert weak.response(reference() + dent(levels=20.0))[PLACE[1], PLACE[0]] == 0
 
 
-def test_a_region_shows_where_the_gel_is_dented_and_not_where_light_drifts():
+def test_a_region_is_supported_where_the_gel_is_dented_and_not_where_light_drifts():
     generator = np.random.default_rng(3)
-    touch = looking()
-    response = touch.response(reference() + noise(generator) + drift(generator, levels=8.0) + dent(levels=2.0))
-    for x, shown in ((PLACE[0], True), (PLACE[0] - 45, False)):
+    weak = detector()
+    response = weak.response(reference() + noise(generator) + drift(generator, levels=8.0) + dent(levels=2.0))
+    for x, supported in ((PLACE[0], True), (PLACE[0] - 45, False)):
         region = np.zeros(SHAPE, np.uint8)
         cv2.circle(region, (x, PLACE[1]), 8, 1, cv2.FILLED)
-        assert touch.shows(region, response, GATE_RATIO) == shown
+        assert weak.supports(region, response) == supported

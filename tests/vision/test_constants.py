@@ -1,0 +1,38 @@
+"""Every constant of the robust method states its unit, grid, meaning and origin, and is used."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+
+import station.vision
+from station.vision.constants import CONSTANTS, Constants
+
+SOURCES = {
+    path.name: path.read_text()
+    for folder in station.vision.__path__
+    for path in Path(folder).glob("*.py")
+    if path.name != "constants.py"
+}
+ORIGINS = ("fit", "formula", "measured", "paper", "resolution")
+
+
+@pytest.mark.parametrize("one", fields(Constants), ids=lambda one: one.name)
+def test_a_constant_states_unit_meaning_and_origin(one):
+    assert set(one.metadata) == {"unit", "grid", "meaning", "origin"}
+    assert one.metadata["meaning"]
+    assert one.metadata["origin"].startswith(ORIGINS)
+    assert one.metadata["grid"] in {"working", "half", "quarter", ""}
+    assert (one.metadata["unit"] == "px") == bool(one.metadata["grid"])
+    assert isinstance(one.default, int | float)
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(Constants)])
+def test_a_constant_is_used(name):
+    assert any(f".{name}" in source for source in SOURCES.values())
+
+
+def test_constants_are_changed_by_making_others():
+    changed = replace(CONSTANTS, known_share=0.3)
+    assert changed.known_share == 0.3
+    assert CONSTANTS.known_share != 0.3
