@@ -88,9 +88,12 @@ class Constants:
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
+    skin_window: float = constant(
+        0.11, "of the radius", "window of the coherence that separates skin from smooth", "fit"
+    )
     skin_left_out: float = constant(0.25, "of the region", "the weakest places say nothing of the texture", "fit")
-    smooth_small: float = constant(0.68, "", "coherence from which a small body is smooth", "fit")
-    smooth_at_one: float = constant(1.373, "", "the same, extrapolated to a radius of one pixel", "fit")
+    smooth_small: float = constant(0.7, "", "coherence from which a small body is smooth", "fit")
+    smooth_at_one: float = constant(1.393, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
     halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")

@@ -22,7 +22,7 @@ from station.vision.working import length_squared, resized
 _CHANGE_BLUR_PX = 1.0
 _STEPS = 80
 _FIRST_EVERY = 2
-_HALF_FROM_PX = 1.5
+_HALF_FROM_PX = 2.5
 _LEAST_LEVEL = 1e-3
 _FLOOR_QUANTILE = 0.03
 """Of a field without background: nearly its least."""
@@ -128,7 +128,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, coherence, skin = start, p.candidate_share, 0.0, 0.0
+    mask, share, coherence = start, p.candidate_share, 0.0
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
@@ -139,7 +139,7 @@ def find_region(
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
         if last:
-            agreed, skin = _coherence(moved, mask, p.coherence_window * radius, p.skin_left_out)
+            agreed = _coherence(moved, mask, p.coherence_window * radius)
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
@@ -158,7 +158,7 @@ def find_region(
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
-    textured = is_textured(moved, mask, skin, p) if texture is None else texture
+    textured = is_textured(moved, mask, p) if texture is None else texture
     if textured and moved.share < p.known_share / 2:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
@@ -182,7 +182,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     return (curved, curved_radii) if curved.any() else (region, radii)
 
 
-def is_textured(moved: Movement, region: Mask, coherence: float, constants: Constants) -> bool:
+def is_textured(moved: Movement, region: Mask, constants: Constants) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
 
     Without background directions say little: there skin is what is finer than the body's own slopes, times how much
@@ -191,14 +191,14 @@ def is_textured(moved: Movement, region: Mask, coherence: float, constants: Cons
     Args:
         moved: from `movement`.
         region: at half the working size, 0 or 1, not empty.
-        coherence: of the change's directions in the region, 0 to 1.
         constants: windows and limits.
     """
     p = constants
     if moved.share < p.known_share / 2:
         return _fine_share(moved.change, region, p) * quantile(moved.curvature[region > 0], 0.9) > p.fine_on_skin
-    smooth_from = p.smooth_at_one - p.smooth_per_size * float(np.log(radius_of(region)))
-    return coherence < min(p.smooth_small, smooth_from)
+    radius = radius_of(region)
+    coherence = _coherence(moved, region, p.skin_window * radius, p.skin_left_out)
+    return coherence < min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
@@ -247,11 +247,11 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float) -> tuple[float, float]:
+def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
     The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
-    second value is without the share of the region that has moved least: of noise directions do not agree.
+    share of the region that has moved least is left out: noise has no direction.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
     change, squared, weight = moved.change, moved.squared, moved.weight
@@ -273,8 +273,8 @@ def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float)
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
     whole = np.maximum(whole, _LEAST_LEVEL)
-    share = agreed / whole
-    return quantile(share, 0.5), quantile(share[whole >= quantile(whole, left_out)], 0.5)
+    kept = whole >= quantile(whole, left_out)
+    return quantile(agreed[kept] / whole[kept], 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:
