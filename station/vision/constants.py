@@ -142,6 +142,12 @@ class Constants:
     weak_threshold: float = constant(
         6.9, "of the noise", "a touch stands out by this", "measured: none of 11,040 untouched frames"
     )
+    weak_most_of_fine: float = constant(
+        0.25,
+        "",
+        "variance of the slopes over that of the fine noise, from which on compression shows",
+        "measured: a DIGIT's noise 0.16, with a contact of 5 mm² 0.3, compressed images 0.4 and more",
+    )
     weak_least_curvature: float = constant(0.3, "of the threshold", "curvature that a weak contact shows too", "fit")
     weak_support: float = constant(
         6.0, "of the noise", "a doubtful outline shows at least this somewhere", "measured: none of 3,600 contacts less"

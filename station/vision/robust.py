@@ -32,7 +32,7 @@ from station.vision.region import (
     movement,
     radius_of,
 )
-from station.vision.weak_contact import WeakContactDetector
+from station.vision.weak_contact import WeakContactDetector, WeakResponse
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
 
 PRINTED_LONG_SIDE_PX = 640
@@ -235,7 +235,8 @@ class RobustMethod:
         Raises:
             ValueError: as `measure`.
         """
-        return self._weak_response(self._begun(image, None)), self._weak.threshold
+        response = self._weak_response(self._begun(image, None))
+        return response.field, self._weak.threshold * response.compression
 
     def _begun(self, image: Image, previous: Contact | None) -> State:
         if image.shape != self._shape or image.dtype != np.uint8:
@@ -339,7 +340,7 @@ class RobustMethod:
         if not doubtful or state.floor is not None or state.gate >= 10 or "support" in self._without:
             return
         response = self._weak_response(state)
-        size = (response.shape[1], response.shape[0])
+        size = (response.field.shape[1], response.field.shape[0])
         places = [cv2.resize(one.inside, size, interpolation=cv2.INTER_NEAREST) for one in doubtful]
         dropped = [
             one
@@ -474,7 +475,7 @@ class RobustMethod:
             agreed *= agreement_of_growth((before_px, contact_px), (state.before.changed_px, changed_px))
         return agreed
 
-    def _weak_response(self, state: State) -> FloatImage:
+    def _weak_response(self, state: State) -> WeakResponse:
         height, width = self._debris.clean.shape
         return self._weak.response(resized(clipped(state.work), (width, height)))
 
@@ -516,6 +517,7 @@ class RobustMethod:
         return resized(field_, (-(-width // step), -(-height // step)))
 
     def _show(self, on_stage: StageSink, state: State, difference: FloatImage) -> None:
+        response = self._weak_response(state)
         pictures.emit(
             on_stage,
             self.stages,
@@ -523,8 +525,8 @@ class RobustMethod:
             change=state.difference,
             curvature=state.moved.curvature,
             threshold=state.threshold,
-            response=self._weak_response(state),
-            response_threshold=self._weak.threshold,
+            response=response.field,
+            response_threshold=self._weak.threshold * response.compression,
             candidates=state.candidates,
             edges=[outline.edge for outline in state.outlines],
             mask=state.mask,

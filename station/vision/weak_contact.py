@@ -9,6 +9,8 @@ Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root of the sum
 chi distribution with six degrees of freedom, whatever the sensor's noise.
 """
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +33,18 @@ _LONG_SIDE_PX = 160
 _GATE_RATIO = 3.0
 """The recipe's default `gate_ratio`; a higher one raises the detector's thresholds too."""
 _LEAST_VALID, _RIM_PX = 0.5, 9
+_LARGE_SHARE = 0.1
+"""Of the frame."""
+
+
+class WeakResponse(NamedTuple):
+    """The matched filter's response to one frame."""
+
+    field: FloatImage
+    """How far the slopes stand out of the noise, shape (height, width): the chi distribution's six degrees of freedom
+    are two of each lit colour. 0 where the reference is not valid, at an end of the scale or under debris."""
+    compression: float
+    """By how much a codec's blocks make the noise's tails longer, 1 where there is none: thresholds rise by it."""
 
 
 class WeakContactDetector:
@@ -59,6 +73,7 @@ class WeakContactDetector:
         self.threshold = constants.weak_threshold * strictness
         """What the response has to reach."""
         self._support = constants.weak_support * strictness
+        self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
         sigma_px = constants.dent_sigma * min(1.0, max(height, width) / _LONG_SIDE_PX)
         self._reach_px = int(np.ceil(_REACH * sigma_px))
@@ -100,31 +115,34 @@ class WeakContactDetector:
         colours -= self._known @ (self._known.transpose(0, 2, 1) @ colours)
         return np.ascontiguousarray(colours[..., 0].T).reshape(left.shape)
 
-    def response(self, frame: FloatImage) -> FloatImage:
-        """How far the slopes stand out of the noise.
+    def response(self, frame: FloatImage) -> WeakResponse:
+        """Compute how far the slopes stand out of the noise.
 
         Args:
             frame: at half the working size, shape (height, width, 3), grey levels.
-
-        Returns:
-            Shape (height, width): the chi distribution's six degrees of freedom are two of each lit colour. 0 where the
-            reference is not valid, since it is at an end of the scale or debris lies there.
         """
         left = self._without_known(self._without_slow((frame - self._reference) * self._lit))
+        fine = _fine_noise(left)
         total = np.zeros(left.shape[:2], np.float32)
+        of_fine: list[float] = []
         for across, down in ((self._slope, self._dent), (self._dent, self._slope)):
-            slopes = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
-            total += _in_units_of_noise(np.asarray(slopes, np.float32))
-        return np.sqrt(total) * self._valid
+            filtered = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
+            slopes = np.asarray(filtered, np.float32)
+            spread = _spread(_inner(slopes))
+            total += _in_units_of_noise(slopes, spread)
+            of_fine += list(np.square(spread / fine)[self._lit > 0])
+        # A codec removes the fine noise and leaves blocks, whose slopes have longer tails than noise of their size.
+        compression = max(1.0, float(np.mean(of_fine)) / self._most_of_fine)
+        return WeakResponse(np.sqrt(total) * self._valid, compression)
 
-    def place(self, response: FloatImage) -> tuple[int, int] | None:
+    def place(self, response: WeakResponse) -> tuple[int, int] | None:
         """Find where something touches: x and y, or None where nothing stands out.
 
         Args:
             response: from `response`.
         """
-        _, strongest, _, (x, y) = cv2.minMaxLoc(response)
-        return (x, y) if strongest > self.threshold else None
+        _, strongest, _, (x, y) = cv2.minMaxLoc(response.field)
+        return (x, y) if strongest > self.threshold * response.compression else None
 
     def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
         """Rows and columns within the dent's reach of a place.
@@ -136,7 +154,7 @@ class WeakContactDetector:
         reach_px = self._reach_px
         return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
-    def supports(self, region: Mask, response: FloatImage) -> bool:
+    def supports(self, region: Mask, response: WeakResponse) -> bool:
         """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
 
         Args:
@@ -146,19 +164,39 @@ class WeakContactDetector:
         if np.mean(self._valid[region > 0]) < _LEAST_VALID:
             return True
         with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
-        return float(response[with_rim].max()) > self._support
+        # A large contact's own slopes are what raises the ratio, and no codec.
+        compression = response.compression if np.mean(region > 0) < _LARGE_SHARE else 1.0
+        return float(response.field[with_rim].max()) > self._support * compression
 
 
-def _in_units_of_noise(slopes: FloatImage) -> FloatImage:
+def _inner(field: FloatImage) -> FloatImage:
+    """Every second place away from the border, shape (places, 3)."""
+    border_px = min(_BORDER_PX, min(field.shape[:2]) // 4)
+    inner = slice(border_px, -border_px or None, _EVERY)
+    return field[inner, inner].reshape(-1, 3)
+
+
+def _spread(values: FloatImage) -> FloatImage:
+    """Each colour's standard deviation by its median size, shape (3,): a contact takes little of the frame."""
+    spread = NORMAL_OF_MEDIAN * np.median(np.abs(values), axis=0)
+    return np.maximum(spread, _LEAST_NOISE_LEVELS).astype(np.float32)
+
+
+def _fine_noise(left: FloatImage) -> FloatImage:
+    """Standard deviation of what changes from one place to the next in both directions, shape (3,).
+
+    Of white noise it is the noise's own: the mixed second difference of four places, halved.
+    """
+    across = left[:, :-1] - left[:, 1:]
+    return _spread(_inner(np.asarray((across[:-1] - across[1:]) / 2, np.float32)))
+
+
+def _in_units_of_noise(slopes: FloatImage, spread: FloatImage) -> FloatImage:
     """The squared length of what the colours show, once their noise has the spread 1 and nothing in common.
 
     A contact takes little of the frame, and is cut off before the noise is counted.
     """
-    border_px = min(_BORDER_PX, min(slopes.shape[:2]) // 4)
-    inner = slice(border_px, -border_px or None, _EVERY)
-    few = slopes[inner, inner].reshape(-1, 3)
-    spread = np.maximum(NORMAL_OF_MEDIAN * np.median(np.abs(few), axis=0), _LEAST_NOISE_LEVELS)
-    noise = np.clip(few / spread, -_WINSORISED, _WINSORISED)
+    noise = np.clip(_inner(slopes) / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
     size = np.sqrt(np.maximum(common.diagonal(), _LEAST_NOISE_LEVELS))
     common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)

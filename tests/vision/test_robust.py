@@ -286,7 +286,7 @@ def test_of_a_contact_whose_middle_lies_at_the_border_no_wrong_area_is_judged():
     for seed in range(60010, 60016):
         press = render_press("blueberry", seed, (7.0,), options)
         contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
-        assert contact.found
+        assert contact.found or Flag.UNDECIDED in contact.flags
         if Flag.LOW_CONFIDENCE not in contact.flags:
             assert contact.area_px == pytest.approx(np.count_nonzero(press.true_masks[0]), rel=0.25)
 

@@ -1,0 +1,186 @@
+"""Fit of the robust method's constants, and what defends them: sensitivity, stages, reliability.
+
+Run with `./run bench fit` for the search alone, `--all` for everything (under an hour on two cores) or one of the other
+parts. Each part writes its section of `docs/robust-constants.md`. `--check NAME=VALUE ...` prints what changed
+constants cost and writes nothing. Images are rendered once and kept in `--cache`.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import cv2
+from fit import document
+from fit.cost import costs
+from fit.evaluation import Trial
+from fit.parts import groups
+from fit.progress import report
+from fit.reliability import PICTURE, reliability
+from fit.runner import Runner
+from fit.search import fitted_names, found_table, search
+from fit.sensitivity import ERRORS, LEAST_EFFECT, far_table, sensitivity, store, stored, table, trial, values
+from fit.stages import stages_table
+
+ROOT = Path(__file__).resolve().parents[1]
+COST = """
+The data sets have two parts: one to fit on, and one held back, on which nothing is chosen. Real presses and real
+backgrounds are split into even and odd numbers; the twin's presses have seeds of their own in each part. All images are
+at the method's working size. Fruit, border contacts and real presses are measured one by one; soft bodies are followed
+from step to step, from before the first touch.
+
+| data set | what it shows |
+|---|---|
+| real ball | presses of a ball on a real sensor, against hand-annotated circles |
+| untouched | real backgrounds against themselves, with measured noise and drift |
+| untouched, compressed | the same with JPEG of quality 30 to 60 and with MPEG-4 video |
+| untouched twin | units of the twin 5 and 11 s after their reference: plain, drift doubled, dead LED, dirt |
+| moved debris | untouched twin; some specks of debris have moved since the reference |
+| other unit | untouched real unit against another unit's reference |
+| weak contact | contacts of about 0.7 to 2 mm² of four fruits, three frames a step |
+| fruit, bruised | fruit of the twin in seven conditions, from the first touch to a firm grip |
+| border | contacts that the border cuts, against their visible part |
+| soft ball ... long | the twin's soft bodies, from no touch to a full field |
+
+A data set's cost is the sum of these means; a perfect measurement has 0.
+
+- Over contacts above 2 mm²: the error of the area, at most 1; 1 more for a judged area that is wrong by 35 % or
+  more, rising from nothing at 15 %; 0.05 more for one that is not judged; 0.5 more for a drop, a judged area more than
+  25 % under an earlier judged one of its press. An area is worth judging if it is wrong in fewer than one of twenty
+  cases.
+- Over untouched frames: 1 for a false area, 1 more if it is judged. Against another unit's reference, 1 for what is
+  judged.
+- Over weak contacts: 1 for one that is not found.
+- Over followed presses: 0.1 for a Spearman correlation of measured and true area under 0.99.
+
+The cost is the weighted mean over the data sets. An effect is a difference of two costs on the same images. Its
+standard error (after ±) comes from 400 redraws of the presses, each of its own seed: smaller effects are the choice of
+seeds.
+"""
+
+
+def evaluate(runner: Runner) -> None:
+    """Write the shipped constants' results on both parts."""
+    lines = [COST.strip()]
+    for part, name in enumerate(("To fit on", "Held back")):
+        lines += ["", f"### {name}", "", *document.evaluation_table(runner.shipped(part), runner.parts[part])]
+    document.write_section("Data sets and cost", lines)
+
+
+def constants(runner: Runner, cache: Path) -> None:
+    """Write the sensitivity, for the document and for the search."""
+    found = sensitivity(runner)
+    store(cache / "sensitivity.json", found)
+    lines = [
+        "Change of the cost, on the part to fit on, when one constant is changed; the recipe's parameters are at their",
+        f"defaults. `*` marks an effect above {LEAST_EFFECT:g} and above {ERRORS:g} standard errors. What suffers is",
+        "the data set with the largest share, with the change of its own cost.",
+        "",
+        *table(found),
+        "",
+        "### Changed far",
+        "",
+        *far_table(found),
+    ]
+    document.write_section("Constants", lines)
+
+
+def stages(runner: Runner) -> None:
+    """Write the stages' table."""
+    lines = [
+        "First the cost with all stages, then its change when one stage is left out: positive is what the stage earns.",
+        "Data sets: mean of both parts; empty where nothing changes.",
+        "",
+        *stages_table(runner),
+    ]
+    document.write_section("Stages", lines)
+
+
+def fit(runner: Runner, cache: Path) -> None:
+    """Search for better values and write them beside the shipped ones."""
+    found = stored(cache / "sensitivity.json")
+    if found is None:
+        constants(runner, cache)
+        found = stored(cache / "sensitivity.json") or []
+    names = fitted_names(found)
+    report(f"{len(names)} constants: {', '.join(names)}")
+    moved = search(runner, names)
+    lines = [
+        "Coordinate search on the part to fit on, over the constants of origin `fit` that matter when changed by a",
+        "fifth: 0.7, 0.85, 1.2 and 1.4 times the value, in two rounds at most; a move has to gain more than one",
+        "standard error. Constants are only changed by hand, and only where the part",
+        "that is held back gains as well.",
+        "",
+        *found_table(runner, moved),
+    ]
+    document.write_section("Fit", lines)
+
+
+def check(runner: Runner, changes: list[str]) -> None:
+    """Print what changed constants cost, on both parts."""
+    changed = Trial()
+    for change in changes:
+        name, _, text = change.partition("=")
+        known = values()
+        key = name if name in known else f"recipe: {name}"
+        if key not in known:
+            raise SystemExit(f"{name}: no such constant; there are {', '.join(known)}")
+        try:
+            value = type(known[key])(text)
+        except ValueError as error:
+            raise SystemExit(
+                f"{change}: the value is no number; write {name}={known[key]:g} or another number"
+            ) from error
+        changed = trial(key, value, changed)
+    for part, name in enumerate(("to fit on", "held back")):
+        before = runner.shipped(part)
+        print(f"\n{name}")
+        if not changes:
+            print("\n".join(document.evaluation_table(before, runner.parts[part])))
+            continue
+        after = runner.shipped(part, changed)
+        old, new = costs(before, runner.parts[part]), costs(after, runner.parts[part])
+        for key in old:
+            print(f"  {key:22} {old[key]:.4f} -> {new[key]:.4f}  {new[key] - old[key]:+.4f}")
+        effect, error = runner.effect(after, before, part)
+        print(f"  all: {effect:+.4f} ± {error:.4f} (negative is better)")
+
+
+def main() -> None:
+    """Run the parts that are wanted."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--images", type=Path, default=ROOT.parent / "shared" / "data")
+    parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "station-fit")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--all", action="store_true", help="every part")
+    parser.add_argument("--evaluate", action="store_true", help="the shipped constants on every data set")
+    parser.add_argument("--sensitivity", action="store_true", help="what changing each constant costs")
+    parser.add_argument("--stages", action="store_true", help="what each stage earns")
+    parser.add_argument("--fit", action="store_true", help="search for better values; what runs without any option")
+    parser.add_argument("--reliability", action="store_true", help="wrong areas by the least confidence")
+    parser.add_argument("--check", nargs="*", metavar="NAME=VALUE", help="print what changes cost; write nothing")
+    wanted = parser.parse_args()
+    cv2.setNumThreads(1)
+    parts = [groups(part, wanted.images, wanted.cache) for part in ("fit", "held back")]
+    with Runner(parts, wanted.processes) as runner:
+        if wanted.check is not None:
+            check(runner, wanted.check)
+            return
+        only_fit = not (wanted.evaluate or wanted.sensitivity or wanted.stages or wanted.reliability)
+        if wanted.evaluate or wanted.all:
+            evaluate(runner)
+        if wanted.stages or wanted.all:
+            stages(runner)
+        if wanted.sensitivity or wanted.all:
+            constants(runner, wanted.cache)
+        if wanted.fit or wanted.all or only_fit:
+            fit(runner, wanted.cache)
+        if wanted.reliability or wanted.all:
+            lines = reliability(runner.parts[1], wanted.images, wanted.processes)
+            document.write_section("Reliability", lines)
+            report(f"curve in {PICTURE}")
+    report(f"{document.DOCUMENT} is written")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
