@@ -12,7 +12,7 @@ from station.vision.constants import CONSTANTS, Constants
 
 GRID = (0.7, 0.85, 1.2, 1.4)
 ROUNDS = 2
-GAIN_ERRORS = 1.0
+GAIN_ERRORS = 2.0
 """A move has to gain this many standard errors: less is the choice of seeds."""
 
 
