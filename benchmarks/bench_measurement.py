@@ -9,9 +9,13 @@ import csv
 import itertools
 import os
 import statistics
+import sys
 import time
 import tracemalloc
 from collections import defaultdict
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -116,6 +120,22 @@ def beside_contacts(folder: Path) -> list[Beside]:
         row["far"] = str(UNTOUCHED_RADII * float(row["outline_radius_px"]))
     keys = ("outline_x_px", "outline_y_px", "far")
     return [(reference, read(folder / row["image"]), ~circle(row, keys)) for row in rows]
+
+
+def weak_contacts(folder: Path) -> list[str]:
+    """The weak contacts' table, with what is seen beside real presses."""
+    return detection_table(beside_contacts(folder))
+
+
+def in_two_processes(sections: Mapping[str, Callable[[], list[str]]]) -> dict[str, list[str]]:
+    """The tables by their names; each is made on one thread."""
+    with ProcessPoolExecutor(2, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+        made = {name: pool.submit(make) for name, make in sections.items()}
+        found: dict[str, list[str]] = {}
+        for name, table in made.items():
+            found[name] = table.result()
+            print(f"{name}: done", file=sys.stderr, flush=True)
+    return found
 
 
 def draw_worst(
@@ -266,13 +286,30 @@ def spread(values: Floats) -> str:
 
 
 def main() -> None:
-    """Measure everything on one thread and write the document."""
+    """Measure everything in two processes of one thread each, and write the document."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--images", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--worst", type=Path, help="folder outside the project for pictures of the ten worst presses")
     parser.add_argument("--draws", type=int, default=25, help="per background and size")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
+    images, draws = arguments.images, arguments.draws
+    tables = in_two_processes(
+        {
+            "presses": partial(presses_table, images / "digit_presses", arguments.worst),
+            "no_contact": partial(no_contact_table, images, draws),
+            "compressed": partial(compressed_table, images, draws),
+            "reference": partial(reference_table, images),
+            "validation": partial(validation_table, images),
+            "twin": twin_table,
+            "untouched": untouched_table,
+            "border": border_table,
+            "bruised": bruised_table,
+            "peers": peers_table,
+            "detection": partial(weak_contacts, images / "digit_presses"),
+        }
+    )
+    tables["soft"] = soft_table()
     lines = [
         "# How well the contact is measured",
         "",
@@ -283,21 +320,21 @@ def main() -> None:
         "",
         "## Thirty real presses of a ball, against circles annotated by hand",
         "",
-        *presses_table(arguments.images / "digit_presses", arguments.worst),
+        *tables["presses"],
         "",
         "## Nothing touching: real backgrounds with measured noise, streaks, offsets and slow drift",
         "",
-        *no_contact_table(arguments.images, arguments.draws),
+        *tables["no_contact"],
         "",
         "## The same in compressed images",
         "",
         "Reference and frames are compressed alike: each as a JPEG of that quality, or all as one MPEG-4 video.",
         "",
-        *compressed_table(arguments.images, arguments.draws),
+        *tables["compressed"],
         "",
         "## A reference that does not belong to the frame",
         "",
-        *reference_table(arguments.images),
+        *tables["reference"],
         "",
         "## Soft bodies, from before the first touch to a full field",
         "",
@@ -307,7 +344,7 @@ def main() -> None:
         "grey level that noise does not hide. How many steps over 2 mm² have no area is a column of its own.",
         "No seed was chosen on.",
         "",
-        *soft_table(),
+        *tables["soft"],
         "",
         f"## Does it hang on the choice of presses? {SPLITS} random splits, both ways",
         "",
@@ -316,7 +353,7 @@ def main() -> None:
         "IoU with the contact edge, median / p10, beside that of the defaults on the same half. PyTouch's idea has",
         "none of these parameters: its rows are in the two tables above.",
         "",
-        *validation_table(arguments.images),
+        *tables["validation"],
         "",
         "## The robust method on the twin",
         "",
@@ -324,30 +361,30 @@ def main() -> None:
         "result. Half of the presses have seeds on which nothing was chosen. An area that stays 0, as PyTouch's mostly",
         "does, never falls: its rank correlation is 1.",
         "",
-        *twin_table(),
+        *tables["twin"],
         "",
-        *untouched_table(),
+        *tables["untouched"],
         "",
         "## Contacts that the border cuts",
         "",
         "Four fruits at the places named, on three units, with seeds on which nothing was chosen.",
         "",
-        *border_table(),
+        *tables["border"],
         "",
         "## Bruised fruit on the twin",
         "",
         "The same conditions with bruises, which make fruit softer: they touch more of the gel, and less firmly. Half",
         "of the presses have seeds on which nothing was chosen.",
         "",
-        *bruised_table(),
+        *tables["bruised"],
         "",
         "## The three methods on the same images of the twin",
         "",
-        *peers_table(),
+        *tables["peers"],
         "",
         "## The lightest touch: each fruit at five places on two units",
         "",
-        *detection_table(beside_contacts(arguments.images / "digit_presses")),
+        *tables["detection"],
         "",
         f"Peak memory of the robust method over a press of 20 frames: {peak_memory_mb():.0f} MB beside the frames.",
         "",
