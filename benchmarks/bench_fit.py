@@ -138,7 +138,7 @@ def check(runner: Runner, changes: list[str]) -> None:
         if not changes:
             print("\n".join(document.evaluation_table(before, runner.parts[part])))
             continue
-        after = runner.shipped(part, changed)
+        after = runner.scores(changed, part)
         old, new = costs(before, runner.parts[part]), costs(after, runner.parts[part])
         for key in old:
             print(f"  {key:22} {old[key]:.4f} -> {new[key]:.4f}  {new[key] - old[key]:+.4f}")

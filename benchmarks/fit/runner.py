@@ -27,6 +27,7 @@ class Runner:
     def __init__(self, parts: Sequence[Groups], processes: int) -> None:
         self.parts = list(parts)
         self.redrawn = [Redrawn(groups) for groups in parts]
+        self._shipped: dict[int, Scores] = {}
         _shared[:] = parts
         context = multiprocessing.get_context("fork")
         self._pool = context.Pool(processes, cv2.setNumThreads, (1,)) if processes > 1 else None
@@ -55,11 +56,17 @@ class Runner:
                 report(f"{name}: {len(found)} of {len(jobs)}")
         return found
 
-    def shipped(self, part: int = 0, trial: Trial | None = None) -> Scores:
-        """The scores of the shipped constants, or of another trial that makes a method."""
-        (scores,) = self.run("shipped" if trial is None else "compared", [trial or Trial()], part)
+    def shipped(self, part: int = 0) -> Scores:
+        """The scores of the shipped constants, measured once."""
+        if part not in self._shipped:
+            self._shipped[part] = self.scores(Trial(), part)
+        return self._shipped[part]
+
+    def scores(self, trial: Trial, part: int) -> Scores:
+        """The scores of one trial."""
+        (scores,) = self.run("one trial", [trial], part)
         if scores is None:
-            raise SystemExit("these constants make no method")
+            raise SystemExit("no method can be made with these constants")
         return scores
 
     def effect(self, scores: Scores | None, base: Scores, part: int = 0) -> tuple[float, float]:
@@ -78,5 +85,5 @@ def _measure(job: _Job) -> Scores | None:
     part, trial, base = job
     try:
         return measure(_shared[part], trial, base)
-    except (ValueError, IndexError, cv2.error):  # such as a quantile above 1 or a window of no pixel
+    except (ValueError, IndexError, ArithmeticError, cv2.error):  # such as a quantile above 1, a window of no pixel
         return None
