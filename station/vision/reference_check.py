@@ -22,8 +22,9 @@ _KNOWN_LEVELS_SQUARED = 3.0
 """One grey level squared per colour, what noise and compression leave in a cell. A pattern as weak as that decides
 nothing: this much is counted as found, everywhere."""
 _MOST_MISSING = 0.3
-"""Of the pattern. A unit against itself stays below on real images under noise, compression, drift and presses up to
-the whole field (667 of 667); pairs of other real units are above it (12,044 of 12,122)."""
+"""Of the pattern. Chosen on these same images, none held back: a unit against itself stays below on real images under
+noise, compression, drift and presses up to the whole field (787 of 787), pairs of other real units are above it (14,429
+of 14,522 draws of 19 units). The twin's units share a few modes of light: there 85 of 100 pairs are above it."""
 _LEAST_LIGHT_CHANGE_LEVELS = 5.0
 """Standard deviation over the frame. Between real units it is 8 and more; without it, compression that wipes out a
 weak pattern would pass for another unit."""
