@@ -106,10 +106,9 @@ def fit(runner: Runner, cache: Path) -> None:
     report(f"{len(names)} constants: {', '.join(names)}")
     moved = search(runner, names)
     lines = [
-        "Coordinate search on the part to fit on, over the constants of origin `fit` that matter when changed by a",
-        "fifth: 0.7, 0.85, 1.2 and 1.4 times the value, in two rounds at most; a move has to gain more than two",
-        "standard errors. Constants are only changed by hand, and only where the part",
-        "that is held back gains as well.",
+        "Coordinate search on the part to fit on, over the constants of origin `fit` that gain a standard error when",
+        "changed by a fifth: 0.7, 0.85, 1.2 and 1.4 times the value, in two rounds at most; a move has to gain more",
+        "than two standard errors. Constants are changed by hand, and only where the part held back gains as well.",
         "",
         *found_table(runner, moved),
     ]

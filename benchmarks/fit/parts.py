@@ -171,7 +171,7 @@ def other_units(backgrounds: list[Image]) -> list[PressData]:
     return found
 
 
-def untouched_twin(seed: int, units: int = 8) -> list[PressData]:
+def untouched_twin(seed: int, units: int = 6) -> list[PressData]:
     """Untouched units of the twin as they drift away from their reference, in four conditions."""
     found: list[PressData] = []
     for unit in range(seed, seed + units):
@@ -223,11 +223,11 @@ def weak_contacts(seed: int) -> list[PressData]:
 
 
 def border(seed: int) -> list[PressData]:
-    """Contacts that the border cuts, at the places of `at_the_border`: the truth is their visible part."""
+    """Contacts that the border cuts, two fruits at each place of `at_the_border`: the truth is their visible part."""
     found: list[PressData] = []
     for place, middles in PLACES.items():
         for number, (x_px, y_px) in enumerate(middles):
-            for kind in on_the_twin.FRUITS:
+            for kind in on_the_twin.FRUITS[number % 2 :: 2]:
                 options = PressOptions(pose=Pose(x_px, y_px), unit=number or None)
                 references, images, truths = on_the_twin.squeezed_with_masks(
                     kind, seed + number, options, closings_mm=BORDER_CLOSINGS_MM

@@ -17,9 +17,10 @@ GAIN_ERRORS = 2.0
 
 
 def fitted_names(found: Sequence[Sensitivity]) -> list[str]:
-    """The constants that the search moves: of origin `fit`, and of those that matter, the most important first."""
+    """The constants that the search moves: of origin `fit`, and of those that gain when changed by a fifth."""
     origin = {one.name: one.metadata["origin"] for one in fields(Constants)}
-    return [row.name for row in found if row.matters and origin.get(row.name, "").startswith("fit")]
+    promising = [row for row in found if any(one.effect < -max(LEAST_EFFECT, one.error) for one in row.near)]
+    return [row.name for row in promising if origin.get(row.name, "").startswith("fit")]
 
 
 def search(runner: Runner, names: Sequence[str]) -> dict[str, float]:

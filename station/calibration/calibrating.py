@@ -190,8 +190,7 @@ class Calibrating:
             self._pressed.append(step)
             contact = step.contact
             where = f"place {number + 1}, {place.x_mm:g},{place.y_mm:g} mm"
-            bound = step.point.cut or step.point.lower_bound
-            if contact.centroid_px is None or bound or figures.roundness(contact) > ROUNDEST:
+            if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
                 raise RefusedError(
                     f"{where}: at {step.width_mm:.1f} mm no whole contact is seen: lay the ball nearer to the "
                     "gel's middle, as high as before"

@@ -158,7 +158,4 @@ def verification_checks(
 
 
 def _fallen(one: PressPoint, other: PressPoint) -> str:
-    areas = f"the area goes from {one.area_px} to {other.area_px} px"
-    if other.lower_bound:
-        areas = f"the area goes from {one.area_px} to at least {other.area_px} px: its edge was lost"
-    return f"from {one.width_mm:.1f} to {other.width_mm:.1f} mm {areas}"
+    return f"from {one.width_mm:.1f} to {other.width_mm:.1f} mm the area goes from {one.area_px} to {other.area_px} px"

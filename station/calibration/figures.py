@@ -105,16 +105,12 @@ def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale
 
 
 def falls(curve: Sequence[PressPoint]) -> tuple[PressPoint, PressPoint] | None:
-    """The first two neighbours between which the area does not surely rise; None where it rises all the way.
-
-    A press's areas hold what was in contact before, so a contact that shrinks is seen as an edge that was lost.
+    """The first two neighbours between which the area does not rise; None where it rises all the way.
 
     Args:
         curve: in order of closing, from the first contact on.
     """
-    return next(
-        ((one, other) for one, other in pairwise(curve) if other.lower_bound or other.area_px <= one.area_px), None
-    )
+    return next(((one, other) for one, other in pairwise(curve) if other.area_px <= one.area_px), None)
 
 
 def judged(curve: Sequence[PressPoint], onset_mm: float, closing_mm: float) -> list[PressPoint]:

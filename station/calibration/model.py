@@ -43,8 +43,6 @@ class PressPoint(Stored):
     """The image's border cuts the contact: the area is a lower bound."""
     contrast_levels: Annotated[float, Field(ge=0.0)]
     """How much the ball changes the image, grey levels; 0 where nothing touches."""
-    lower_bound: bool = False
-    """The edge was lost where the press so far had it: a ball that slips or rolls looks like this."""
 
 
 class PlacePoint(Stored):

@@ -69,14 +69,12 @@ def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px:
     sure, doubted = [], []
     for index, point in enumerate(curve):
         lost = index > first and not point.area_px
-        doubtful = (
-            point.cut or point.lower_bound or lost or (point.confidence is not None and point.confidence < _DOUBTFUL)
-        )
+        doubtful = point.cut or lost or (point.confidence is not None and point.confidence < _DOUBTFUL)
         (doubted if doubtful else sure).append((point.width_mm, point.area_px * mm_per_px**2))
     if sure:
         axes.plot(*zip(*sure, strict=True), color=colour, marker="o", markersize=4, linewidth=1.5, label=label)
     if doubted:
-        hollow = f"{label}: not sure, lost or a lower bound"
+        hollow = f"{label}: not sure, lost or cut by the border"
         axes.plot(
             *zip(*doubted, strict=True),
             color=colour,

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
 import cv2
 import numpy as np
@@ -14,7 +13,6 @@ from station.calibration.model import PressPoint
 from station.settings.recipe import Recipe
 from station.vision.contact import Contact, Flag, Image, Method
 from station.vision.methods import make_method, median_image
-from station.vision.press import PressTracker
 from station.vision.step import mean_image, measure_step
 
 FINEST_STEP_MM = 0.4
@@ -44,7 +42,6 @@ class Step:
             confidence=None if self.contact.confidence is None else round(self.contact.confidence, 3),
             cut=Flag.CUT_BY_BORDER in self.contact.flags,
             contrast_levels=round(self.contrast_levels, 2),
-            lower_bound=Flag.LOWER_BOUND in self.contact.flags,
         )
 
 
@@ -60,11 +57,7 @@ class BallPress:
     def __init__(self, bench: Bench, recipe: Recipe, gate_factor: float = 1.0) -> None:
         self._bench, self._recipe = bench, recipe
         self._segmentation = gated(recipe.segmentation, gate_factor)
-        self._least_confidence = recipe.segmentation.robust.least_confidence
         self._method: Method | None = None
-        self._tracker: PressTracker | None = None
-        self._last_mm = inf
-        """The width of the last step against this reference."""
         self.reference: Image | None = None
 
     async def take_reference(self, number: int) -> Sequence[Image]:
@@ -76,28 +69,27 @@ class BallPress:
         frames = await self._bench.untouched(number)
         self.reference = await asyncio.to_thread(median_image, frames)
         self._method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
-        self._tracker, self._last_mm = None, inf
         return frames
 
     async def measure(self, frames: Sequence[Image]) -> Contact:
-        """Measure frames of one width by themselves.
+        """Measure frames of one width.
 
         Args:
             frames: of the reference's shape.
         """
-        return await asyncio.to_thread(measure_step, self._prepared(), frames, self._least_confidence)
+        if self._method is None:
+            raise RuntimeError("a press is measured before its reference was taken")
+        least = self._recipe.segmentation.robust.least_confidence
+        return await asyncio.to_thread(measure_step, self._method, frames, least)
 
     async def step(self, width_mm: float) -> Step:
-        """Go to a width and measure there, as the next step of one press while the jaws only close.
+        """Go to a width and measure there.
 
         Args:
             width_mm: the width to ask for.
         """
         pressed: Pressed = await self._bench.press_to(width_mm)
-        if self._tracker is None or pressed.width_mm > self._last_mm:  # the jaws have opened: another press begins
-            self._tracker = PressTracker(self._prepared(), self._least_confidence)
-        self._last_mm = pressed.width_mm
-        contact = await asyncio.to_thread(self._tracker.measure_step, pressed.frames)
+        contact = await self.measure(pressed.frames)
         image = mean_image(pressed.frames)
         assert self.reference is not None  # noqa: S101 (measured against it just now)
         strength = await asyncio.to_thread(contrast, image, self.reference, contact)
@@ -117,11 +109,6 @@ class BallPress:
                 return step.width_mm
             width_mm -= FINEST_STEP_MM
         return touched_mm
-
-    def _prepared(self) -> Method:
-        if self._method is None:
-            raise RuntimeError("a press is measured before its reference was taken")
-        return self._method
 
 
 def contrast(image: Image, reference: Image, contact: Contact) -> float:

@@ -118,10 +118,7 @@ def test_an_area_that_falls_is_refused(drawn_ball, calibrate_drawn):
                 await super().press_to(width_mm + (3.0 if abs(width_mm - 38) < 0.5 else 0.0)), width_mm=width_mm
             )
 
-    with pytest.raises(
-        RefusedError,
-        match=r"rising: from 39\.0 to 38\.0 mm the area goes from \d+ to at least \d+ px: its edge was lost",
-    ):
+    with pytest.raises(RefusedError, match=r"rising: from 39\.0 to 38\.0 mm the area goes from"):
         calibrate_drawn(Slipping(1))
 
 
