@@ -73,6 +73,8 @@ _REASONS: Mapping[Reason, str] = {
     Reason.RECORDS_FAULT: "The result could not be stored",
     Reason.STATION_LOST: "The station stopped answering or was restarted",
     Reason.INTERNAL_FAULT: "A fault of the software, see the log",
+    Reason.NEAR_LIMIT: "The area or its growth is too near to a limit to decide",
+    Reason.SIZE_UNKNOWN: "The fruit's size is missing, impossible or contradicts itself",
 }
 REASON_BITS = _bits(*((reason.value, _REASONS[reason]) for reason in Reason))
 """In the order of `Reason`, bit 0 first."""

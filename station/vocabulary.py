@@ -31,6 +31,10 @@ class Reason(StrEnum):
     STATION_LOST = "station_lost"
     """The station stopped answering, or was restarted, before the outcome was the PLC's."""
     INTERNAL_FAULT = "internal_fault"
+    NEAR_LIMIT = "near_limit"
+    """The area or its growth is nearer to a limit than the measurement is certain."""
+    SIZE_UNKNOWN = "size_unknown"
+    """The recipe needs the fruit's size, and it is missing, impossible, or length and class contradict each other."""
 
 
 class Refusal(StrEnum):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
+from station.inspection.fruit_size import FruitSize
 from station.vocabulary import Reason
 
 RELATIVE_NOISE = 0.05
@@ -69,3 +70,5 @@ class Press:
     """In any order."""
     interruptions: tuple[Reason, ...] = ()
     """What ended the steps or spoilt them from outside the measurement: a fault, called off, late, a bad reference."""
+    size: FruitSize = FruitSize()
+    """What the line's PLC told of the fruit."""
