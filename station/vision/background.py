@@ -22,9 +22,13 @@ _HIGHEST_COSINE = 4
 _ITERATIONS = 3
 _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
+_LEAST_SPREAD_LEVELS = 0.01
+"""No division by the spread of an image without noise."""
 _STRIP_PX = 10
 _MEDIAN_SIDE = 20
 _NO_PRIOR = 1e-3
+_FREE = 10.0
+"""So wide a prior only keeps the equations solvable, where a reference has no light."""
 
 Coefficients = npt.NDArray[np.float32]
 """A fitted model, shape (3, shapes, 1), dtype float32, one row for each colour."""
@@ -100,12 +104,12 @@ class BackgroundModel:
         self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
         self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
         prior = [
-            constants.gain_prior,
-            *(constants.cosine_prior / (1 + i * i + j * j) for i, j in orders),
-            *([constants.band_prior] * (len(places) - len(orders))),
+            _FREE,  # the gain: a contact resembles no gain of the whole light
+            *(constants.light_prior / (1 + i * i + j * j) for i, j in orders),
+            *([constants.light_prior] * (len(places) - len(orders))),
             *([constants.displacement_prior] * (len(slopes) * len(stretches))),
         ]
-        self._ridge = np.diag((constants.cell_noise / np.array(prior)) ** 2).astype(np.float32)
+        self._ridge = np.diag(np.array(prior) ** -2.0).astype(np.float32)
 
     def fit(self, difference: FloatImage, first_guess: FloatImage, before: Coefficients | None = None) -> Background:
         """Find the background of a frame.
@@ -122,13 +126,10 @@ class BackgroundModel:
         # The fit is of what has changed since the expected model, so that the prior draws towards that model.
         expected_levels = (self._coarse @ expected)[..., 0]
         samples -= expected_levels
-        weight = resized(first_guess, self._grid).ravel()
-        trust = p.late_weight + (1 - p.late_weight) * weight
+        trust = weight = resized(first_guess, self._grid).ravel()
         # The less background there is, the more of a contact's own slopes the shapes could explain.
         known = float(np.clip(weight.mean() / p.known_share, _LEAST_KNOWN, 1))
         ridge = self._ridge / known**3
-        if before is not None:  # from step to step the light drifts by less than since the reference
-            ridge = ridge / p.step_share**2
         spread = p.most_spread / 2
         change = np.zeros_like(expected)
         fitted = np.zeros_like(samples)
@@ -138,7 +139,7 @@ class BackgroundModel:
             fitted = (self._coarse @ change)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             if weight.sum() >= _LEAST_KNOWN * weight.size:
-                spread = float(np.clip(weighted_median(residual, weight), p.least_spread, p.most_spread))
+                spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, p.most_spread))
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         coefficients = expected + change
         strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
@@ -205,7 +206,7 @@ def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: C
     known = np.clip(float(background.mean()) / constants.known_share, _LEAST_KNOWN, 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
-    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), constants.least_spread**2)
+    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)
 

@@ -59,26 +59,16 @@ def find_outline(
     region = np.asarray(cv2.resize(body.mask, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
     scale = width / body.mask.shape[1], height / body.mask.shape[0]
     rays, radii = body.rays.scaled(scale), body.radii * scale[0]
-    noise = texture.noise_level(length, background, constants) if texture.has_room_for_few(region, constants) else 0.0
-    if not body.textured and not _is_faint_skin(length, region, body, noise, constants):
+    if not body.textured:
         edge = find_edge(length, region, rays, radii, stiffness, constants, floor)
         confidence = edge_confidence(edge, background_spread(length, background.weight), constants)
         return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
     points = rays.points(radii)
     edge = Edge(points, inside_image(points, (height, width)), _fall(body))
-    level = texture.element_level(length, region, body, noise, constants)
-    inside, sure = texture.union(length, region, level, noise, constants)
+    level = texture.element_level(length, region, body.coherence, constants)
+    inside, sure = texture.union(length, region, level, constants)
     confidence = sure * edge_confidence(edge, body.spread_levels, constants)
     return Outline(edge, inside, textured=True, confidence=confidence)
-
-
-def _is_faint_skin(length: FloatImage, region: Mask, body: Region, noise: float, constants: Constants) -> bool:
-    """Whether a body that passes for smooth stands so little out of the noise that the edge found may be an achene's.
-
-    Not where directions agree as they hardly do on skin. Where the noise is not known, directions say little.
-    """
-    faint = texture.strength(length, region) < constants.faint_noises * noise
-    return body.coherence < constants.faint_coherence and faint
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:

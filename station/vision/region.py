@@ -144,7 +144,7 @@ def find_region(
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
             share = p.share_random + p.share_coherent * coherence + p.share_field * float(mask.mean())
-            share = float(np.clip(share, p.share_least, p.share_most))
+            share = min(share, p.share_most)
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
         # A flat centre has not moved; it lies within what has, and costs nothing.
         np.maximum(gain, 0, out=gain, where=inner > 0)
@@ -172,9 +172,8 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    least = quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
-    floor = min(p.halo_over_least * least, p.halo_curvature)
-    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(floor**2), 0), dtype=np.float32)
+    halo = p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
+    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
     gain = np.minimum(curvature * np.float32(1 / cap), 1) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
@@ -197,8 +196,8 @@ def is_textured(moved: Movement, region: Mask, constants: Constants) -> bool:
     if moved.share < p.known_share / 2:
         return _fine_share(moved.change, region, p) * quantile(moved.curvature[region > 0], 0.9) > p.fine_on_skin
     radius = radius_of(region)
-    coherence = _coherence(moved, region, p.skin_window * radius, p.skin_left_out)
-    return coherence < min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
+    coherence = _coherence(moved, region, p.coherence_window * radius)
+    return coherence < p.smooth_at_one - p.smooth_per_size * float(np.log(radius))
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
@@ -212,20 +211,6 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
         return 0.0
     fine, whole = (quantile(length_squared(one)[inside], 0.5) for one in (elements - slopes, elements))
     return fine / max(whole, _LEAST_LEVEL)
-
-
-def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift leaves over.
-
-    A large smooth body curves the gel evenly and leaves its halo for background, above whose curvature it hardly stands
-    out. On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² 15.
-
-    Args:
-        moved: from `movement`.
-        constants: how much of the frame, and how far.
-    """
-    level, _ = level_of(moved, constants.level_window)
-    return quantile(thinned(level), 1 - constants.wide_share) > constants.wide_levels
 
 
 def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
@@ -247,11 +232,10 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
+def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
-    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
-    share of the region that has moved least is left out: noise has no direction.
+    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
     change, squared, weight = moved.change, moved.squared, moved.weight
@@ -272,9 +256,7 @@ def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float 
     within = smooth[inside]
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
-    whole = np.maximum(whole, _LEAST_LEVEL)
-    kept = whole >= quantile(whole, left_out)
-    return quantile(agreed[kept] / whole[kept], 0.5)
+    return quantile(agreed / np.maximum(whole, _LEAST_LEVEL), 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:

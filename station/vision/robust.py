@@ -28,9 +28,7 @@ from station.vision.region import (
     Region,
     find_region,
     flat_field_correction,
-    has_moved_widely,
     movement,
-    radius_of,
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
@@ -53,7 +51,6 @@ STAGES = (
     "flat field",
     "weak contact",
     "support",
-    "one colour",
     "texture",
     "following",
     "witness",
@@ -157,7 +154,6 @@ class RobustMethod:
         self._reference = working_image(reference)
         self._check = ReferenceCheck(self._reference)
         self._light = clipped(self._reference)
-        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         half = self._reduced(self._light, _FINE_STEP)
         self._flat_field = flat_field_correction(half, constants)
         if "flat field" in without:
@@ -270,12 +266,11 @@ class RobustMethod:
         state.difference *= self._unsaturated
 
     def _destripe(self, state: State) -> None:
-        """Take rows' and columns' noise off, as far as what is calm is background too."""
+        """Take rows' and columns' noise off, by what is calm."""
         if "destriping" in self._without:
             return
         size = (state.calm.shape[1], state.calm.shape[0])
-        fits = resized(state.background.weight, size)
-        trusted = np.minimum(state.calm * resized(self._debris.clean, size), self._constants.calm_trust + fits)
+        trusted = state.calm * resized(self._debris.clean, size)
         state.difference = destriped(state.difference, trusted, self._constants)
 
     def _bridge_debris(self, state: State) -> None:
@@ -287,11 +282,9 @@ class RobustMethod:
         """Compute the curvature response and the threshold from which on something touches."""
         state.half = self._reduced(state.difference, _FINE_STEP)
         response = curvature(state.half, _FINE_STEP, self._constants)
-        noise = curvature_noise(response, state.background, self._constants)
+        noise = curvature_noise(response, state.background)
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
         state.moved = movement(state.half, state.background, self._flat_field, response)
-        if response.max() <= state.threshold and has_moved_widely(state.moved, self._constants):
-            state.threshold *= self._constants.wide_threshold
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
@@ -304,11 +297,7 @@ class RobustMethod:
             return
         if state.background.load_levels < self._constants.released_share * before.floor_load_levels:
             return
-        room_px = self._constants.floor_erosion * radius_of(before.floor)
-        side = 2 * round(room_px) + 1
-        framed = cv2.copyMakeBorder(before.floor, side, side, side, side, cv2.BORDER_REPLICATE)
-        eroded = cv2.erode(framed, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
-        state.floor = np.ascontiguousarray(eroded[side:-side, side:-side], np.uint8)
+        state.floor = before.floor
 
     def _find_candidates(self, state: State) -> None:
         """Find where contacts may lie."""
@@ -354,8 +343,7 @@ class RobustMethod:
         if state.outlines or "weak contact" in self._without:
             return
         place = self._weak.place(self._weak_response(state))
-        least = self._constants.weak_least_curvature * state.threshold
-        if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
+        if place is None:
             return
         state.weak_at = place
         state.candidates = around(place, state.moved, self._constants)
@@ -393,8 +381,6 @@ class RobustMethod:
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
         p, flags, work = self._constants, state.flags, state.work
-        if state.background.strength_levels > p.most_drift_share * self._light_levels:
-            flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
@@ -430,8 +416,7 @@ class RobustMethod:
         """The outline of a region, or None where the image does not support it."""
         p = self._constants
         height, width = state.difference.shape[:2]
-        scale = width / body.mask.shape[1]
-        length = change_length(state.difference, state.half, body.radius_px * scale, p)
+        length = change_length(state.half, (width, height), p)
         floor = None
         if state.floor is not None:
             floor = np.asarray(cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
@@ -442,23 +427,7 @@ class RobustMethod:
         if state.floor is not None:
             return outline
         sure = state.gate > p.sure_gate
-        if self._one_colour(state, outline, sure=sure):
-            return None
-        support = p.support_least if outline.edge.seen.all() else p.support_cut
-        return outline if sure or state.weak_at is not None or outline.confidence >= support else None
-
-    def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
-        """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
-
-        Not of a sure contact that the border cuts: its other slopes may lie outside.
-        """
-        if "one colour" in self._without or (sure and not outline.edge.seen.all()):
-            return False
-        half = state.half
-        inside = cv2.resize(outline.inside, (half.shape[1], half.shape[0]), interpolation=cv2.INTER_NEAREST)
-        mean, deviation = cv2.meanStdDev(half, mask=inside)
-        power = float((mean**2).sum())
-        return power > self._constants.one_colour * (power + float((deviation**2).sum()))
+        return outline if sure or state.weak_at is not None or outline.confidence >= p.support_least else None
 
     def _sureness(self, outline: Outline, state: State) -> float:
         """An outline's confidence, less where the border cuts it and the gel hardly curves: drift resembles that."""
@@ -504,10 +473,9 @@ class RobustMethod:
         return Trace(coefficients, floor, load_levels, mask, cv2.countNonZero(state.changed), textured)
 
     def _confirms(self, contact: Mask, before: Mask) -> bool:
-        """Whether a contact holds nearly all of the last step's and has not grown too much: chance does neither."""
+        """Whether a contact holds nearly all of the last step's: chance does not."""
         area_px = cv2.countNonZero(before)
-        kept = cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
-        return area_px > 0 and kept and cv2.countNonZero(contact) <= self._constants.confirmed_growth * area_px
+        return area_px > 0 and cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
 
     def _at_input_size(self, half_px: int, state: State) -> int:
         return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
