@@ -24,7 +24,8 @@ _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
 _LEAST_SPREAD_LEVELS = 0.01
 """No division by the spread of an image without noise."""
-_STRIP_PX = 10
+_STRIP_PX = 5
+"""At half the working size."""
 _MEDIAN_SIDE = 20
 _NO_PRIOR = 1e-3
 _FREE = 10.0
@@ -39,9 +40,9 @@ class Background:
     """The background found in one frame."""
 
     levels: FloatImage
-    """What to take off the difference, shape (height, width, 3), grey levels."""
+    """What to take off the difference, shape (height, width, 3) of half the working size, grey levels."""
     weight: FloatImage
-    """How surely a place is background, shape (height, width), 0 to 1."""
+    """How surely a place is background, shape (height, width) of half the working size, 0 to 1."""
     share: float
     """Mean of the weight: how much of the frame is background, 0 to 1. The one measure of that for every stage."""
     spread_levels: float
@@ -67,11 +68,11 @@ class BackgroundModel:
         self._constants = constants
         height, width = reference.shape[:2]
         cell = max(height, width) / _GRID_LONG_SIDE
-        self._size = (width, height)
         self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
-        self._half = ((width + 1) // 2, (height + 1) // 2)
-        self._light = clipped(reference)
-        pattern = cv2.GaussianBlur(self._light, (0, 0), constants.pattern_blur)
+        self._half = (-(-width // 2), -(-height // 2))
+        light = clipped(reference)
+        self._light = resized(light, self._half)
+        pattern = cv2.GaussianBlur(light, (0, 0), constants.pattern_blur)
         # Cosines and bands are products of a function of x and one of y: each is drawn as two short matrices.
         orders = [
             (i, j)
@@ -93,7 +94,7 @@ class BackgroundModel:
         shared = [resized(shape, self._grid).ravel() for shape in separable]
         grids: list[FloatImage] = []
         for channel in range(3):
-            gained = resized(self._light[..., channel], self._grid).ravel()
+            gained = resized(light[..., channel], self._grid).ravel()
             moved = [
                 resized(slope[..., channel] * stretch, self._grid).ravel() for slope in slopes for stretch in stretches
             ]
@@ -115,7 +116,7 @@ class BackgroundModel:
         """Find the background of a frame.
 
         Args:
-            difference: frame minus reference, shape (height, width, 3), float32, grey levels.
+            difference: frame minus reference, any size, shape (height, width, 3), float32, grey levels.
             first_guess: where nothing touches, any size, float32, 0 to 1.
             before: the press's last step; the model is then expected to have changed little.
         """
@@ -143,13 +144,13 @@ class BackgroundModel:
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         coefficients = expected + change
         strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
-        certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._size)
+        certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._half)
         return Background(
             self._drawn(coefficients[..., 0]), certain, float(weight.mean()), spread, strength, coefficients, load
         )
 
     def _drawn(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
-        """The model at the reference's size: its smooth parts drawn at half of it and enlarged, its gain exactly."""
+        """The model at half the working size."""
         end = 1 + self._places.shape[1]
         waves = np.zeros((3, len(self._upward), len(self._along)), np.float32)
         waves[:, self._places[1], self._places[0]] = coefficients[:, 1:end]
@@ -158,9 +159,8 @@ class BackgroundModel:
             displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
             still, along, up = np.tile(displaced, self._half[0]).astype(np.float32)
             lines += slope * ((still + along * self._across) + up * self._down)
-        levels = resized(lines.reshape(self._half[1], self._half[0], 3), self._size)
-        _rows(levels)[:] += _rows(self._light) * np.tile(coefficients[:, 0], self._size[0]).astype(np.float32)
-        return levels
+        lines += _rows(self._light) * np.tile(coefficients[:, 0], self._half[0]).astype(np.float32)
+        return lines.reshape(self._half[1], self._half[0], 3)
 
 
 def _profiles(length: int, band_reach: float) -> npt.NDArray[np.float32]:
@@ -182,7 +182,7 @@ def destriped(change: FloatImage, background: FloatImage, constants: Constants) 
     pull it; a line of which little is background is corrected by less.
 
     Args:
-        change: shape (height, width, 3), grey levels.
+        change: at half the working size, shape (height, width, 3), grey levels.
         background: any size, 0 to 1.
         constants: the prior of an offset.
 

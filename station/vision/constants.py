@@ -87,12 +87,12 @@ class Constants:
     element_random: float = constant(
         0.04, "of the strong change", "level of an element where directions are random", "fit"
     )
-    element_coherent: float = constant(0.8, "of the strong change", "how much higher per unit of coherence", "fit")
+    element_coherent: float = constant(0.72, "of the strong change", "how much higher per unit of coherence", "fit")
     half_sure: float = constant(
-        0.315, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
+        0.45, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
     )
     # Contour
-    contour_blur: float = constant(2.0, "px", "smoothing before the edge", "fit", "working")
+    contour_blur: float = constant(1.0, "px", "smoothing before the edge", "fit", "half")
     strong_quantile: float = constant(0.75, "", "quantile of the rays' falls that is called strong", "fit")
     least_steepness: float = constant(0.4, "of a strong fall", "a fall below it is no edge", "fit")
     highest_harmonic: float = constant(3.0, "", "of the start's radius around the circle", "fit")

@@ -26,7 +26,7 @@ _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
 _ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
 """Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
-_REACH_STEP_PX = 2.0
+_REACH_STEP_PX = 1.0
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -91,15 +91,6 @@ class Rays(NamedTuple):
         """
         return self.middle + (self.axes @ (_CIRCLE * radii)).T
 
-    def scaled(self, scale: tuple[float, float]) -> Self:
-        """The same rays in an image of another size; distances grow by the first factor.
-
-        Args:
-            scale: of that size over this, along x and y, nearly equal.
-        """
-        middle = ((self.middle[0] + 0.5) * scale[0] - 0.5, (self.middle[1] + 0.5) * scale[1] - 0.5)
-        return self._replace(middle=middle)
-
     def moved_to(self, points: _Floats, shape: tuple[int, int]) -> tuple[Self, _Floats]:
         """Rays from the middle of a closed line, and that line's distances on them.
 
@@ -133,21 +124,18 @@ class Edge:
     """Shape (64,): by how much the change falls across the edge there, grey levels."""
 
 
-def change_length(half: FloatImage, size: tuple[int, int], constants: Constants) -> FloatImage:
-    """The change's smoothed length over the channels, at the working size.
+def change_length(change: FloatImage, constants: Constants) -> FloatImage:
+    """The change's smoothed length over the channels.
 
     Args:
-        half: the change at half the working size, shape (height, width, 3), grey levels: so much smoothing leaves
-            nothing that half the size does not show.
-        size: width and height of the working size.
+        change: without background, at half the working size, shape (height, width, 3), grey levels.
         constants: how much is smoothed.
 
     Returns:
         Shape (height, width), grey levels.
     """
-    smooth = cv2.GaussianBlur(half, (0, 0), constants.contour_blur / 2)
-    length = cv2.sqrt(length_squared(np.asarray(smooth, np.float32)))
-    return np.asarray(cv2.resize(length, size, interpolation=cv2.INTER_LINEAR), np.float32)
+    smooth = cv2.GaussianBlur(change, (0, 0), constants.contour_blur)
+    return np.asarray(cv2.sqrt(length_squared(np.asarray(smooth, np.float32))), np.float32)
 
 
 def find_edge(

@@ -38,6 +38,7 @@ PRINTED_IMAGE_PX = 640 * 480
 """The image for which the recipe's parameters in pixels are given; they scale with the image."""
 
 _COARSE_STEP, _FINE_STEP = 4, 2
+"""By how much the fields of the first guess and of all else are smaller than the working image."""
 _WEAK_REACHES_PX, _REACHED = (18, 36, 72), 0.9
 """How far a weak contact may reach, at half the working size; the next where its region fills the one before."""
 _WEAK_DOUBT = 0.5
@@ -81,14 +82,14 @@ class State:
 
     work: Image
     """The frame at the working size, shape (height, width, 3), dtype uint8."""
+    frame: FloatImage
+    """Cut off where it saturates, at half the working size, shape (height, width, 3), grey levels."""
     difference: FloatImage
-    """Frame minus reference, shape (height, width, 3), grey levels; afterwards without its background: the change."""
+    """Frame minus reference, shape of `frame`; afterwards without its background: the change."""
     before: Trace | None
     calm: FloatImage = field(init=False)
     """First guess of the background, at a quarter of the working size, 0 to 1."""
     background: Background = field(init=False)
-    half: FloatImage = field(init=False)
-    """The change averaged down to half the working size."""
     moved: Movement = field(init=False)
     threshold: float = field(init=False)
     """The detection threshold of the curvature, grey levels per pixel."""
@@ -153,21 +154,23 @@ class RobustMethod:
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
         self._check = ReferenceCheck(self._reference)
-        self._light = clipped(self._reference)
-        half = self._reduced(self._light, _FINE_STEP)
-        self._flat_field = flat_field_correction(half, constants)
+        self._model = BackgroundModel(self._reference, constants)
+        light = clipped(self._reference)
+        height, width = light.shape[:2]
+        self._half = (-(-width // 2), -(-height // 2))
+        self._light = resized(light, self._half)
+        self._flat_field = flat_field_correction(self._light, constants)
         if "flat field" in without:
             self._flat_field = np.ones_like(self._flat_field)
-        self._model = BackgroundModel(self._reference, constants)
-        means = np.asarray(cv2.mean(self._light)[:3])
+        means = np.asarray(cv2.mean(light)[:3])
         lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
-        self._debris = Debris(self._light)
+        self._debris = Debris(light)
         # The detector needs the mean of the references: a median's noise is not that of the frames.
-        halves = [resized(clipped(working_image(one)), (half.shape[1], half.shape[0])) for one in references]
+        halves = [resized(clipped(working_image(one)), self._half) for one in references]
         mean = np.asarray(np.mean(halves, axis=0), np.float32)
         self._weak = WeakContactDetector(mean, lit, self._debris.clean, constants, parameters.gate_ratio)
-        unsaturated = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
-        self._unsaturated = np.repeat(unsaturated, 3, axis=2).astype(np.float32)
+        unsaturated = (self._reference < SATURATED_LEVEL).all(axis=2).astype(np.float32)
+        self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
         least = float(np.mean(lit)) * parameters.least_bend
         self._least_curvature = least * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
@@ -241,9 +244,8 @@ class RobustMethod:
             )
         before = previous.trace if previous is not None and "following" not in self._without else None
         work = working_image(image)
-        difference = clipped(work)
-        difference -= self._light
-        return State(work, difference, before if isinstance(before, Trace) else None)
+        frame = resized(clipped(work), self._half)
+        return State(work, frame, frame - self._light, before if isinstance(before, Trace) else None)
 
     # The stages
 
@@ -254,7 +256,8 @@ class RobustMethod:
 
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
-        quarter = self._reduced(state.difference, _COARSE_STEP)
+        width, height = self._half
+        quarter = resized(state.difference, (-(-width // 2), -(-height // 2)))
         state.calm = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
         before = state.before
         if before is not None and before.floor is not None:
@@ -280,11 +283,10 @@ class RobustMethod:
 
     def _respond(self, state: State) -> None:
         """Compute the curvature response and the threshold from which on something touches."""
-        state.half = self._reduced(state.difference, _FINE_STEP)
-        response = curvature(state.half, _FINE_STEP, self._constants)
+        response = curvature(state.difference, _FINE_STEP, self._constants)
         noise = curvature_noise(response, state.background)
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
-        state.moved = movement(state.half, state.background, self._flat_field, response)
+        state.moved = movement(state.difference, state.background, self._flat_field, response)
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
@@ -415,13 +417,9 @@ class RobustMethod:
     def _outlined(self, state: State, body: Region) -> Outline | None:
         """The outline of a region, or None where the image does not support it."""
         p = self._constants
-        height, width = state.difference.shape[:2]
-        length = change_length(state.half, (width, height), p)
-        floor = None
-        if state.floor is not None:
-            floor = np.asarray(cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, floor)
-        smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
+        length = change_length(state.difference, p)
+        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, state.floor)
+        smallest_px = self._parameters.smallest_contact_px * outline.inside.size / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None
         if state.floor is not None:
@@ -445,8 +443,7 @@ class RobustMethod:
         return agreed
 
     def _weak_response(self, state: State) -> WeakResponse:
-        height, width = self._debris.clean.shape
-        return self._weak.response(resized(clipped(state.work), (width, height)))
+        return self._weak.response(state.frame)
 
     def _trace(self, state: State) -> Trace | None:
         if not state.outlines and state.floor is None:
@@ -479,10 +476,6 @@ class RobustMethod:
 
     def _at_input_size(self, half_px: int, state: State) -> int:
         return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
-
-    def _reduced(self, field_: FloatImage, step: int) -> FloatImage:
-        height, width = field_.shape[:2]
-        return resized(field_, (-(-width // step), -(-height // step)))
 
     def _show(self, on_stage: StageSink, state: State, difference: FloatImage) -> None:
         response = self._weak_response(state)
