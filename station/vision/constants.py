@@ -61,7 +61,7 @@ class Constants:
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
     candidate_share: float = constant(0.5, "of the strong level", "a place from here on belongs to a candidate", "fit")
     # Region
-    region_window: float = constant(0.08, "of the radius", "window of the level", "fit")
+    region_window: float = constant(0.06, "of the radius", "window of the level", "fit")
     cap_quantile: float = constant(0.38, "", "quantile of the region's level at which the gain is capped", "fit")
     share_random: float = constant(0.33, "of the cap", "the region's end where directions are random", "fit")
     share_coherent: float = constant(1.6, "of the cap", "how much higher it is per unit of coherence", "fit")
@@ -74,7 +74,7 @@ class Constants:
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
-    smooth_at_one: float = constant(1.33, "", "the same, extrapolated to a radius of one pixel", "fit")
+    smooth_at_one: float = constant(1.3, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
     curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
@@ -89,7 +89,7 @@ class Constants:
     )
     element_coherent: float = constant(0.72, "of the strong change", "how much higher per unit of coherence", "fit")
     half_sure: float = constant(
-        0.45, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
+        0.38, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
     )
     # Contour
     contour_blur: float = constant(1.0, "px", "smoothing before the edge", "fit", "half")

@@ -17,7 +17,7 @@ from station.vision.background import Background, quantile, thinned, weighted_me
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
-from station.vision.working import length_squared, resized
+from station.vision.working import blurred, length_squared, resized
 
 _CHANGE_BLUR_PX = 1.0
 _STEPS = 80
@@ -29,6 +29,7 @@ _FLOOR_QUANTILE = 0.03
 _LEAST_BACKGROUND = 0.02
 _LEAST_WINDOW_PX = 1.5
 _LEAST_RADIUS_PX = 3.0
+_STRONG_QUANTILE = 0.9
 _SUBPIXEL_BITS = 4
 
 _Floats = npt.NDArray[np.float64]
@@ -128,7 +129,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, coherence = start, p.candidate_share, 0.0
+    mask, share, coherence, is_skin = start, p.candidate_share, 0.0, False
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
@@ -140,6 +141,8 @@ def find_region(
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
         if last:
             agreed = _coherence(moved, mask, p.coherence_window * radius)
+            # The larger the body, the more places there are to disagree.
+            is_skin = agreed < p.smooth_at_one - p.smooth_per_size * float(np.log(radius))
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
@@ -152,14 +155,15 @@ def find_region(
             gain[others > 0] = -share
         if floor is not None:
             gain[floor > 0] = 1 - share
-        rays = Rays.about(inner | mask)._replace(axes=Rays.about(mask | start).axes)
+        rays = Rays.about(inner | mask)
         every = 1 if last else _FIRST_EVERY
         radii = _most_gained(gain, rays, p.region_span * rays.reach(inner | mask), every, p.path_stiffness)
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
-    textured = is_textured(moved, mask, p) if texture is None else texture
-    if textured and moved.share < p.known_share / 2:
+    is_known = moved.share >= p.known_share / 2
+    textured = texture if texture is not None else is_skin if is_known else _is_skin_by_curvature(moved, mask, p)
+    if textured and not is_known:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
             mask |= floor
@@ -181,23 +185,13 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     return (curved, curved_radii) if curved.any() else (region, radii)
 
 
-def is_textured(moved: Movement, region: Mask, constants: Constants) -> bool:
-    """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
+def _is_skin_by_curvature(moved: Movement, region: Mask, constants: Constants) -> bool:
+    """Whether a region is skin where there is hardly any background, so that directions say little.
 
-    Without background directions say little: there skin is what is finer than the body's own slopes, times how much
-    the strongest tenth curves.
-
-    Args:
-        moved: from `movement`.
-        region: at half the working size, 0 or 1, not empty.
-        constants: windows and limits.
+    Skin is what is finer than the body's own slopes, times how much the strongest tenth curves.
     """
-    p = constants
-    if moved.share < p.known_share / 2:
-        return _fine_share(moved.change, region, p) * quantile(moved.curvature[region > 0], 0.9) > p.fine_on_skin
-    radius = radius_of(region)
-    coherence = _coherence(moved, region, p.coherence_window * radius)
-    return coherence < p.smooth_at_one - p.smooth_per_size * float(np.log(radius))
+    strong = quantile(moved.curvature[region > 0], _STRONG_QUANTILE)
+    return _fine_share(moved.change, region, constants) * strong > constants.fine_on_skin
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
@@ -223,7 +217,7 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     Returns:
         Shape (height, width) and the spread, grey levels.
     """
-    mean = cv2.GaussianBlur(moved.squared, (0, 0), window_px)
+    mean = blurred(moved.squared, window_px)
     few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.weight)
     seen = moved.share >= _LEAST_BACKGROUND
     floor = weighted_median(few, weight) if seen else quantile(few, _FLOOR_QUANTILE)
