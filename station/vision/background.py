@@ -51,8 +51,6 @@ class Background:
     """Root mean square of the model over places and channels."""
     coefficients: Coefficients
     """For the press's next step."""
-    load_levels: float
-    """Root mean square of what the frame differs by from the reference: contact, and all else that the load changes."""
 
 
 class BackgroundModel:
@@ -123,7 +121,6 @@ class BackgroundModel:
         p = self._constants
         samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
         expected = np.zeros((3, self._coarse.shape[2], 1), np.float32) if before is None else before
-        load = float(np.sqrt(np.mean(samples**2)))
         # The fit is of what has changed since the expected model, so that the prior draws towards that model.
         expected_levels = (self._coarse @ expected)[..., 0]
         samples -= expected_levels
@@ -145,9 +142,8 @@ class BackgroundModel:
         coefficients = expected + change
         strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
         certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._half)
-        return Background(
-            self._drawn(coefficients[..., 0]), certain, float(weight.mean()), spread, strength, coefficients, load
-        )
+        share = float(weight.mean())
+        return Background(self._drawn(coefficients[..., 0]), certain, share, spread, strength, coefficients)
 
     def _drawn(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
         """The model at half the working size."""

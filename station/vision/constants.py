@@ -34,6 +34,9 @@ class Constants:
 
     # Reference and input
     lit_share: float = constant(0.25, "of the brightest colour's mean", "a colour below it has no light", "fit")
+    most_drift_share: float = constant(
+        0.35, "of the light", "more drift is another light: an LED is off, or the camera", "measured: drift 0.05"
+    )
     saturated_share: float = constant(
         0.05, "of a contact", "from here on it is flagged as saturated", "measured: none on real presses"
     )
@@ -42,7 +45,7 @@ class Constants:
         5.0, "of a cell's noise", "prior standard deviation of the lowest cosine and of a border band", "fit"
     )
     displacement_prior: float = constant(
-        1.0, "px per grey level of a cell's noise", "the same of the pattern's displacement", "fit", "working"
+        1.0, "px", "the same of the pattern's displacement, for each grey level of a cell's noise", "fit", "working"
     )
     band_reach: float = constant(0.07, "of the side", "a border band falls by e over this length", "fit")
     known_share: float = constant(0.2, "of the frame", "with less background the priors are drawn in", "fit")
@@ -74,9 +77,12 @@ class Constants:
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
-    smooth_at_one: float = constant(1.3, "", "the same, extrapolated to a radius of one pixel", "fit")
+    skin_left_out: float = constant(0.25, "of the region", "the weakest places say nothing of the texture", "fit")
+    smooth_small: float = constant(0.7, "", "coherence from which a small body is smooth", "fit")
+    smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
+    halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
     curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
     curved_share: float = constant(0.28, "of that", "where the curved region ends", "fit")
     fine_on_skin: float = constant(
@@ -123,6 +129,7 @@ class Constants:
     # Confidence
     reliable_ratio: float = constant(4.0, "times the noise", "drop at which the confidence is one half", "fit")
     support_least: float = constant(0.03, "", "confidence below which an outline is dropped", "fit")
+    one_colour: float = constant(0.85, "of the change's power", "a change of one colour is dirt or shadow", "fit")
 
 
 CONSTANTS = Constants()

@@ -129,7 +129,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, coherence, is_skin = start, p.candidate_share, 0.0, False
+    mask, share, coherence = start, p.candidate_share, 0.0
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
@@ -141,8 +141,6 @@ def find_region(
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
         if last:
             agreed = _coherence(moved, mask, p.coherence_window * radius)
-            # The larger the body, the more places there are to disagree.
-            is_skin = agreed < p.smooth_at_one - p.smooth_per_size * float(np.log(radius))
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
@@ -162,12 +160,13 @@ def find_region(
         if not mask.any():
             return None
     is_known = moved.share >= p.known_share / 2
-    textured = texture if texture is not None else is_skin if is_known else _is_skin_by_curvature(moved, mask, p)
-    if textured and not is_known:
+    if texture is None:
+        texture = _is_skin(moved, mask, p) if is_known else _is_skin_by_curvature(moved, mask, p)
+    if texture and not is_known:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
             mask |= floor
-    return Region(mask, rays, radii, level, spread, coherence, textured)
+    return Region(mask, rays, radii, level, spread, coherence, texture)
 
 
 def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants: Constants) -> tuple[Mask, _Floats]:
@@ -176,13 +175,20 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    halo = p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
+    halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
     gain = np.minimum(curvature * np.float32(1 / cap), 1) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
     curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
     return (curved, curved_radii) if curved.any() else (region, radii)
+
+
+def _is_skin(moved: Movement, region: Mask, constants: Constants) -> bool:
+    """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
+    p, radius = constants, radius_of(region)
+    smooth = min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
+    return _coherence(moved, region, p.coherence_window * radius, p.skin_left_out) < smooth
 
 
 def _is_skin_by_curvature(moved: Movement, region: Mask, constants: Constants) -> bool:
@@ -226,10 +232,11 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
+def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
-    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over.
+    The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
+    share of the region that has moved least is left out: noise has no direction.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
     change, squared, weight = moved.change, moved.squared, moved.weight
@@ -250,7 +257,9 @@ def _coherence(moved: Movement, region: Mask, window_px: float) -> float:
     within = smooth[inside]
     agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
     whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
-    return quantile(agreed / np.maximum(whole, _LEAST_LEVEL), 0.5)
+    whole = np.maximum(whole, _LEAST_LEVEL)
+    kept = whole >= quantile(whole, left_out)
+    return quantile(agreed[kept] / whole[kept], 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:

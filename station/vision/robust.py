@@ -52,6 +52,7 @@ STAGES = (
     "flat field",
     "weak contact",
     "support",
+    "one colour",
     "texture",
     "following",
     "witness",
@@ -87,6 +88,11 @@ class State:
     difference: FloatImage
     """Frame minus reference, shape of `frame`; afterwards without its background: the change."""
     before: Trace | None
+    """Of the press's last step; None of a single image, and once the body has been let go."""
+    quarter: FloatImage = field(init=False)
+    """The difference averaged down to a quarter of the working size."""
+    load_levels: float = 0.0
+    """Root mean square of the difference: contact, and all else that the load changes."""
     calm: FloatImage = field(init=False)
     """First guess of the background, at a quarter of the working size, 0 to 1."""
     background: Background = field(init=False)
@@ -159,6 +165,7 @@ class RobustMethod:
         height, width = light.shape[:2]
         self._half = (-(-width // 2), -(-height // 2))
         self._light = resized(light, self._half)
+        self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._flat_field = flat_field_correction(self._light, constants)
         if "flat field" in without:
             self._flat_field = np.ones_like(self._flat_field)
@@ -179,12 +186,12 @@ class RobustMethod:
         """The stages in their order."""
         return (
             self._check_reference,
+            self._follow,
             self._subtract_background,
             self._destripe,
             self._bridge_debris,
             self._respond,
             self._see_what_changed,
-            self._follow,
             self._find_candidates,
             self._outline_candidates,
             self._drop_unsupported,
@@ -256,14 +263,14 @@ class RobustMethod:
 
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
-        width, height = self._half
-        quarter = resized(state.difference, (-(-width // 2), -(-height // 2)))
-        state.calm = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
+        state.calm = calm(
+            curvature(state.quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants
+        )
         before = state.before
-        if before is not None and before.floor is not None:
+        if state.floor is not None:
             size = (state.calm.shape[1], state.calm.shape[0])
-            state.calm *= 1 - resized(before.floor.astype(np.float32), size)
-        state.background = self._model.fit(quarter, state.calm, None if before is None else before.coefficients)
+            state.calm *= 1 - resized(state.floor.astype(np.float32), size)
+        state.background = self._model.fit(state.quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
             state.difference = state.difference - state.background.levels
         state.difference *= self._unsaturated
@@ -293,13 +300,17 @@ class RobustMethod:
         state.changed = changed(state.moved, state.background.spread_levels, self._constants)
 
     def _follow(self, state: State) -> None:
-        """Take over what was in contact at the last trusted step, unless the body has been let go."""
+        """Take over what was in contact at the last trusted step; once the body has been let go the press is over."""
+        width, height = self._half
+        state.quarter = resized(state.difference, (-(-width // 2), -(-height // 2)))
+        state.load_levels = float(np.sqrt(np.mean(np.square(state.quarter))))
         before = state.before
         if before is None or before.floor is None or self._parameters.contacts == "several":
             return
-        if state.background.load_levels < self._constants.released_share * before.floor_load_levels:
-            return
-        state.floor = before.floor
+        if state.load_levels < self._constants.released_share * before.floor_load_levels:
+            state.before = None
+        else:
+            state.floor = before.floor
 
     def _find_candidates(self, state: State) -> None:
         """Find where contacts may lie."""
@@ -383,6 +394,8 @@ class RobustMethod:
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
         p, flags, work = self._constants, state.flags, state.work
+        if state.background.strength_levels > p.most_drift_share * self._light_levels:
+            flags.add(Flag.REFERENCE_MISMATCH)
         inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
         blue, green, red = cv2.split(work)
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
@@ -418,14 +431,29 @@ class RobustMethod:
         """The outline of a region, or None where the image does not support it."""
         p = self._constants
         length = change_length(state.difference, p)
+        sure = state.gate > p.sure_gate
         outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, state.floor)
         smallest_px = self._parameters.smallest_contact_px * outline.inside.size / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None
         if state.floor is not None:
             return outline
-        sure = state.gate > p.sure_gate
+        if self._one_colour(state, outline, sure=sure):
+            return None
         return outline if sure or state.weak_at is not None or outline.confidence >= p.support_least else None
+
+    def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
+        """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
+
+        Not of a sure contact that the border cuts: its other slopes may lie outside.
+        """
+        if "one colour" in self._without or (sure and not outline.edge.seen.all()):
+            return False
+        change = state.difference
+        inside = cv2.resize(outline.inside, (change.shape[1], change.shape[0]), interpolation=cv2.INTER_NEAREST)
+        mean, deviation = cv2.meanStdDev(change, mask=inside)
+        power = float((mean**2).sum())
+        return power > self._constants.one_colour * (power + float((deviation**2).sum()))
 
     def _sureness(self, outline: Outline, state: State) -> float:
         """An outline's confidence, less where the border cuts it and the gel hardly curves: drift resembles that."""
@@ -458,10 +486,10 @@ class RobustMethod:
         if contact_px and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
             # Together with what was known: each step may seem to shrink a little, and many must not add up.
             known_before = None if before is None or state.floor is None else before.floor
-            floor, load_levels = mask if known_before is None else mask | known_before, background.load_levels
+            floor, load_levels = mask if known_before is None else mask | known_before, state.load_levels
         elif before is not None and self._confirms(mask, before.contact):
             floor = before.contact if floor is None else floor | before.contact
-            load_levels = max(load_levels, background.load_levels)
+            load_levels = max(load_levels, state.load_levels)
         textured = None if before is None else before.textured
         if state.outlines and known:
             textured = state.outlines[0].textured
