@@ -176,7 +176,7 @@ class RobustMethod:
         halves = [resized(clipped(working_image(one)), self._half) for one in references]
         mean = np.asarray(np.mean(halves, axis=0), np.float32)
         self._weak = WeakContactDetector(mean, lit, self._debris.clean, constants, parameters.gate_ratio)
-        unsaturated = (self._reference < SATURATED_LEVEL).all(axis=2).astype(np.float32)
+        unsaturated = np.asarray((self._reference < SATURATED_LEVEL).all(axis=2), np.float32)
         self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
         least = float(np.mean(lit)) * parameters.least_bend
         self._least_curvature = least * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
