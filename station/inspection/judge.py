@@ -71,6 +71,8 @@ class Verdict:
     """A result's closing was not reached; where the steps end when decided, a damage threshold's."""
     stopped: Stop | None
     """Why the steps ended early, also where the fruit passes: what was left is no criterion."""
+    limit_factor: float
+    """By which the limits for this fruit differ from the recipe's."""
     budget: Budget
     """Of the area at the last damage threshold's closing."""
     summary: str
@@ -146,6 +148,7 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         growth=max(evidence.growths, key=lambda growth: growth.mm2_per_mm, default=None),
         partial=partial,
         stopped=stopped,
+        limit_factor=case.limits.factor,
         budget=evidence.budget_at(last_mm),
         summary=_summary(case),
     )

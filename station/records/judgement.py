@@ -7,6 +7,7 @@ from station.inspection.judge import Verdict
 from station.inspection.uncertainty import COMPONENTS
 
 _SENTENCE, _FACTOR, _COMBINED, _SHARE = "judgement", "coverage_factor", "uncertainty", "uncertainty_"
+_LIMITS = "limit_factor"
 
 
 def judgement_measures(verdict: Verdict) -> dict[str, float | str]:
@@ -18,8 +19,18 @@ def judgement_measures(verdict: Verdict) -> dict[str, float | str]:
     if not verdict.summary:
         return {}
     shares = {_SHARE + each.name: round(each.relative, 5) for each in verdict.budget.components}
-    combined = round(verdict.budget.combined, 5)
-    return {_SENTENCE: verdict.summary, **shares, _COMBINED: combined, _FACTOR: round(verdict.budget.factor, 4)}
+    combined, factor = round(verdict.budget.combined, 5), round(verdict.budget.factor, 4)
+    scaled = {} if verdict.limit_factor == 1 else {_LIMITS: round(verdict.limit_factor, 5)}
+    return {_SENTENCE: verdict.summary, **scaled, **shares, _COMBINED: combined, _FACTOR: factor}
+
+
+def limit_factor(measures: Mapping[str, Any]) -> float:
+    """By which the fruit's limits differ from its recipe's.
+
+    Args:
+        measures: an inspection's.
+    """
+    return float(measures.get(_LIMITS) or 1.0)
 
 
 def is_judgement(measure: str) -> bool:
