@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from station.cli import cli
 from station.errors import BadInputError, StationError
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Measured, Press
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
@@ -26,6 +26,7 @@ from station.settings.recipe_model import Recipe
 from station.settings.records import RecordsSettings
 from station.vocabulary import Reason
 
+RECIPES = Path(__file__).parents[1] / "recipes_history" / "golden" / "form_1"
 MM_PER_PX = 0.03
 ONSET_MM = 35.0
 
@@ -45,7 +46,7 @@ class Orchard:
             area_mm2 = max(4.0, growth * step) * (1 + 0.002 * random.standard_normal())
             area_px = round(area_mm2 / MM_PER_PX**2)
             area_mm2 = area_px * MM_PER_PX**2
-            points.append(Measured(float(step), area_mm2, area_px, usual_uncertainty_mm2(area_mm2), 0.9))
+            points.append(Measured(float(step), area_mm2, area_px, 0.9))
             press = replace(press, points=tuple(points))
             if early_stop(press, self.recipe) is not None:
                 break
@@ -69,7 +70,7 @@ class Orchard:
 
     async def _one(self, records: Records, press: Press, images: tuple[Image, ...] | None, lot: str) -> int:
         snapshot = RecipeSnapshot.of(self.recipe.model_dump(mode="json"), "1")
-        sequence = await records.begin(Trigger(1, 0, lot, 1_700_000_000_000, snapshot, simulated=True))
+        sequence = await records.begin(Trigger(1, 0, lot, 1_700_000_000_000, snapshot, True, *_size(press)))
         verdict = judge(press, self.recipe)
         last = press.points[-1] if press.points else None
         await records.conclude(
@@ -90,16 +91,27 @@ class Orchard:
                     CurvePoint(step, ONSET_MM - p.closing_mm, p.closing_mm, p.area_mm2, p.area_px, p.confidence)
                     for step, p in enumerate(press.points)
                 ),
-                measures={"onset_mm": press.onset_mm, "onset_uncertainty_mm": press.onset_uncertainty_mm},
+                measures={
+                    "onset_mm": press.onset_mm,
+                    "onset_uncertainty_mm": press.onset_uncertainty_mm,
+                    "scale_uncertainty": press.scale_uncertainty,
+                    "gripper_resolution_mm": press.resolution_mm,
+                },
                 images=images or (),
             ),
         )
         return sequence
 
 
+def _size(press: Press) -> tuple[int, int]:
+    """As the PLC writes it."""
+    return round(10 * (press.size.length_mm or 0.0)), press.size.size_class or 0
+
+
 @pytest.fixture
 def orchard(tmp_path: Path) -> Orchard:
-    return Orchard(tmp_path / "home" / "records", find_recipe("strawberry"))
+    """By a release's recipe, which no later tuning of the shipped ones changes."""
+    return Orchard(tmp_path / "home" / "records", find_recipe("strawberry", RECIPES))
 
 
 def with_values(recipe: Recipe, **changes: object) -> Recipe:
@@ -134,6 +146,7 @@ def draft(tmp_path: Path, orchard: Orchard) -> Callable[..., Path]:
 @pytest.fixture
 def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
     """Call the command line: its exit code, and what it said."""
+    monkeypatch.setenv("STATION_RECIPES_FOLDER", str(RECIPES))
     monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
 
     def call(*arguments: object) -> tuple[int, str]:
