@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Measured, Press
 from station.records.database import reading
 from station.records.direct import writing
 from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
@@ -37,7 +37,7 @@ def pressed(recipe: Recipe, random: np.random.Generator) -> Press:
     for step in range(recipe.steps.number + 1):
         area_px = round(max(4.0, growth * step) * (1 + 0.002 * random.standard_normal()) / MM_PER_PX**2)
         area_mm2 = area_px * MM_PER_PX**2
-        points.append(Measured(float(step), area_mm2, area_px, usual_uncertainty_mm2(area_mm2), 0.9))
+        points.append(Measured(float(step), area_mm2, area_px, 0.9))
         press = replace(press, points=tuple(points))
         if early_stop(press, recipe) is not None:
             break

@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby, pairwise
+from math import hypot
 from statistics import median
 
 from station.inspection.monotone import wrong_frames
 from station.inspection.press import RELATIVE_NOISE, Flag, Measured, Press
-from station.settings.recipe_model import Recipe
+from station.inspection.sized_limits import SizedLimits
+from station.inspection.uncertainty import Budget, budget_at
 
 LIGHT_TOUCH = 0.5
 """Below this share of the first damage threshold's closing a contact is too light to say anything for or against: a
@@ -38,6 +40,8 @@ class Growth:
     uncertainty_mm2_per_mm: float
     from_closing_mm: float
     to_closing_mm: float
+    few: bool
+    """Over fewer steps than show it well: it may prove, and is no ground for doubt."""
     trusted: bool
     """It is at least a lower bound: every point in it is trusted, and no area before the last is one whose edge was
     lost, from which the growth would seem larger than it is."""
@@ -54,11 +58,11 @@ class Growth:
 
 
 class Evidence:
-    """A press in the order of its closing, beside its recipe."""
+    """A press in the order of its closing, beside the limits for its fruit."""
 
-    def __init__(self, press: Press, recipe: Recipe) -> None:
-        self._recipe = recipe
-        self._onset_uncertainty_mm = press.onset_uncertainty_mm
+    def __init__(self, press: Press, limits: SizedLimits) -> None:
+        self._press, self._limits = press, limits
+        recipe = self._recipe = limits.recipe
         named_mm = [threshold.closing_mm for threshold in recipe.damage.area]
         self.points = _in_order([_at(point, named_mm) for point in press.points])
 
@@ -90,7 +94,8 @@ class Evidence:
             return []
         last, thresholds = self.needed[-1], self._recipe.damage.area
         reached = last.closing_mm >= thresholds[-1].closing_mm
-        kept = last.area_mm2 + last.area_uncertainty_mm2 <= min(threshold.area_mm2 for threshold in thresholds)
+        most_mm2 = last.area_mm2 + self._uncertainty_mm2(last)
+        kept = most_mm2 <= min(threshold.area_mm2 for threshold in thresholds)
         if not reached or not kept or self.doubts(last) or last in self.falling:
             return []
         return [point for point in self.needed if self.doubts(point) == {Flag.LOW_CONFIDENCE}]
@@ -117,33 +122,51 @@ class Evidence:
         return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, RELATIVE_NOISE, least_noise)]
 
     def area_at(self, closing_mm: float) -> tuple[float, float] | None:
-        """Area and uncertainty between the two points around a closing, mm²; None where it was not reached.
+        """Area and expanded uncertainty between the two points around a closing, mm²; None where it was not reached.
 
         Args:
-            closing_mm: where.
+            closing_mm: where, more than 0.
         """
-        return _between(self.points, closing_mm)
+        found = _between(self.points, closing_mm)
+        return None if found is None else self._with_uncertainty(closing_mm, *found)
+
+    def budget_at(self, closing_mm: float) -> Budget:
+        """What the uncertainty of an area at a closing is made of.
+
+        Args:
+            closing_mm: where, more than 0.
+        """
+        return budget_at(closing_mm, self._press, self._limits)
+
+    def _with_uncertainty(self, closing_mm: float, area_mm2: float, scatter_mm2: float) -> tuple[float, float]:
+        return area_mm2, max(area_mm2 * self.budget_at(closing_mm).expanded, scatter_mm2)
+
+    def _uncertainty_mm2(self, point: Measured) -> float:
+        """Expanded, of a judged point's area."""
+        return self._with_uncertainty(point.closing_mm, point.area_mm2, point.area_scatter_mm2)[1]
 
     def least_area_mm2(self, closing_mm: float) -> float | None:
         """The area that is surely reached at a closing; None where nothing trusted was measured up to it.
 
-        The true closing may be more than the measured one by the onset's uncertainty, so it is looked for that much
-        sooner. Beyond the last trusted point the area is at least that point's, since it rises.
+        The first contact was seen too late, by half of the onset's interval on the average: a true closing is that much
+        more than the measured one, so the area is looked for that much sooner; how far it may differ from the average
+        is in the budget. Beyond the last trusted point the area is at least that point's, since it rises.
 
         Args:
             closing_mm: where.
         """
-        place_mm = closing_mm - self._onset_uncertainty_mm
+        place_mm = closing_mm - self._press.onset_uncertainty_mm / 2
         for before, after in pairwise(self.judged):
             if before.closing_mm <= place_mm <= after.closing_mm and self.bounds(before) and self.bounds(after):
-                area, uncertainty = _between((before, after), place_mm) or (0.0, 0.0)
+                found = _between((before, after), place_mm) or (0.0, 0.0)
+                area, uncertainty = self._with_uncertainty(place_mm, *found)
                 return area - uncertainty
         trusted = [point for point in self.judged if point.closing_mm <= place_mm and self.bounds(point)]
-        return trusted[-1].area_mm2 - trusted[-1].area_uncertainty_mm2 if trusted else None
+        return trusted[-1].area_mm2 - self._uncertainty_mm2(trusted[-1]) if trusted else None
 
     @cached_property
     def growths(self) -> list[Growth]:
-        """The growth over every run of judged steps."""
+        """The growth over every run of judged steps; over all of them where they are too few for a run."""
         return [self._growth(window) for window in _windows(self.judged)]
 
     @property
@@ -165,20 +188,31 @@ class Evidence:
             begins.append(_begins_at_mm([*(point for point in self.needed if self.bounds(point)), *beyond[:1]]))
         return None if None in begins else max(begin for begin in begins if begin is not None)
 
-    def _growth(self, window: Sequence[Measured]) -> Growth:
-        """Theil and Sen's slope; its uncertainty is that of a fitted line through points equally uncertain.
+    def _step_uncertainty_mm2(self, point: Measured) -> float:
+        """Of a point's area against its neighbours'; what they share shifts them alike."""
+        if point.closing_mm <= 0:  # the light touch of the onset
+            return point.area_scatter_mm2
+        share = self.budget_at(point.closing_mm).expanded_of("repeatability", "gripper")
+        return max(point.area_mm2 * share, point.area_scatter_mm2)
 
+    def _growth(self, window: Sequence[Measured]) -> Growth:
+        """Theil and Sen's slope, with the uncertainty of a fitted line through points equally uncertain.
+
+        What an uncertain scale and size make of it comes on top.
         Sen, Journal of the American Statistical Association 63 (1968) 1379.
         """
         slope = median(_slopes(window))
         middle_mm = sum(point.closing_mm for point in window) / len(window)
         spread_mm = sum((point.closing_mm - middle_mm) ** 2 for point in window) ** 0.5
-        uncertainty = max(point.area_uncertainty_mm2 for point in window) / spread_mm
+        of_points = max(self._step_uncertainty_mm2(point) for point in window) / spread_mm
+        of_scale = abs(slope) * self.budget_at(_WINDOW_MM).expanded_of("scale", "size")  # at any closing alike
+        uncertainty = hypot(of_points, of_scale)
         # What the border cuts off grows too, so a difference of cut areas is a lower bound of the growth. An edge that
         # was lost may be found again: the difference from its area would count what was there before as growth.
         lost = any(Flag.LOWER_BOUND in point.flags for point in window[:-1])
         trusted = not lost and all(self.bounds(point) for point in window)
-        return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, trusted)
+        few = len(window) < _WINDOW_POINTS or window[-1].closing_mm - window[0].closing_mm < _WINDOW_MM
+        return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, few, trusted)
 
 
 def _begins_at_mm(points: Sequence[Measured]) -> float | None:
@@ -207,21 +241,22 @@ def _one(points: list[Measured]) -> Measured:
     confidences = [point.confidence for point in points]
     return replace(
         largest,
-        area_uncertainty_mm2=max(*(point.area_uncertainty_mm2 for point in points), max(areas) - min(areas)),
+        area_scatter_mm2=max(areas) - min(areas),
         confidence=None if None in confidences else min(c for c in confidences if c is not None),
         flags=frozenset[Flag]().union(*(point.flags for point in points)),
     )
 
 
 def _between(points: Sequence[Measured], closing_mm: float) -> tuple[float, float] | None:
+    """Area and scatter, mm²."""
     for point in points:
         if point.closing_mm == closing_mm:
-            return point.area_mm2, point.area_uncertainty_mm2
+            return point.area_mm2, point.area_scatter_mm2
     for before, after in pairwise(points):
         if before.closing_mm < closing_mm < after.closing_mm:
             share = (closing_mm - before.closing_mm) / (after.closing_mm - before.closing_mm)
             area = before.area_mm2 + share * (after.area_mm2 - before.area_mm2)
-            return area, max(before.area_uncertainty_mm2, after.area_uncertainty_mm2)
+            return area, max(before.area_scatter_mm2, after.area_scatter_mm2)
     return None
 
 

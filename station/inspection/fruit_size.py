@@ -11,3 +11,7 @@ class FruitSize:
     """Length from stem to tip, mm; None where the PLC gave none (register 0)."""
     size_class: int | None = None
     """The grader's size class, 1 to 65535; None where the PLC gave none (register 0)."""
+
+
+NO_SIZE = FruitSize()
+"""What a PLC tells that writes none."""

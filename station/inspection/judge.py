@@ -2,15 +2,19 @@
 
 PASS is said only of a fruit all of whose limits were measured, by trusted points, to be kept with the uncertainty on
 top. FAIL needs a trusted proof. All else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as
-they are: docs/decisions/0015.
+they are: docs/decisions/0015 and 0057.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from station.inspection.evidence import Evidence, Growth
 from station.inspection.press import Flag, Measured, Press
-from station.settings.recipe_model import AreaThreshold, Recipe
+from station.inspection.sized_limits import SizedLimits, sized_limits
+from station.inspection.uncertainty import Budget
+from station.settings.damage import AreaThreshold
+from station.settings.recipe_model import Recipe
 from station.vocabulary import OutcomeName, Reason
 
 
@@ -29,6 +33,15 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Stop:
+    """Why no further step is made."""
+
+    sentence: str
+    finding: Finding | None = None
+    """The limit that ended the steps, with reason `EARLY_STOP`; None where they ended as the outcome was decided."""
+
+
+@dataclass(frozen=True, slots=True)
 class AreaAt:
     """The area at one of the recipe's results' closings, interpolated between measured points."""
 
@@ -36,8 +49,9 @@ class AreaAt:
     area_mm2: float | None
     """None where the closing was not reached; nothing is extrapolated."""
     uncertainty_mm2: float | None
+    """Expanded: the guard band."""
     limit_mm2: float | None
-    """None where the recipe has no damage threshold here."""
+    """For the fruit's size. None where the recipe has no damage threshold here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +68,11 @@ class Verdict:
     growth: Growth | None
     """The steepest over a few steps; None with fewer than two points beyond a light touch."""
     partial: bool
-    """A result's closing was not reached."""
-    stopped: Finding | None
+    """A result's closing was not reached; of a press that ended as it was decided, a damage threshold's."""
+    stopped: Stop | None
     """Why the steps ended early, also where the fruit passes: what was left is no criterion."""
+    budget: Budget
+    """Of the area at the last damage threshold's closing."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
@@ -101,18 +117,21 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         press: all measured points, in any order.
         recipe: limits and expectations.
     """
-    evidence = Evidence(press, recipe)
-    void = [*_void(press, recipe)]
-    stopped = early_stop(press, recipe)
-    findings = [] if press.onset_mm is None else [*_damage(evidence, recipe), *_distrust(evidence, recipe, stopped)]
+    case = _Case(press, recipe)
+    stopped = case.stopped
+    findings = [*case.findings, *([] if case.nothing else _reach(case, stopped))]
     proofs = [finding for finding in findings if finding.proves]
-    if proofs and not void:
-        outcome, findings = "FAIL", proofs + ([stopped] if stopped else [])
-    elif void or findings:
-        outcome, findings = "NO_RESULT", void + findings
+    if proofs and not case.void:
+        outcome = "FAIL"
+        findings = proofs + ([stopped.finding] if stopped is not None and stopped.finding is not None else [])
+    elif case.void or findings:
+        outcome, findings = "NO_RESULT", case.void + findings
     else:
         outcome = "PASS"
+    recipe, evidence = case.limits.recipe, case.evidence
     areas = tuple(_result(evidence, recipe, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
+    last_mm = recipe.damage.area[-1].closing_mm
+    decided = stopped is not None and stopped.finding is None
     order = list(Reason)
     return Verdict(
         outcome=outcome,
@@ -120,35 +139,86 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         deciding=_deciding(evidence, recipe, proofs),
         areas=areas,
         growth=max(evidence.growths, key=lambda growth: growth.mm2_per_mm, default=None),
-        partial=areas[-1].area_mm2 is None and not _almost(evidence, recipe),
+        partial=evidence.area_at(last_mm) is None
+        if decided
+        else areas[-1].area_mm2 is None and not _almost(evidence, recipe),
         stopped=stopped,
+        budget=evidence.budget_at(last_mm),
     )
 
 
-def early_stop(press: Press, recipe: Recipe) -> Finding | None:
-    """Whether no further step is to be made, to spare fruit and gel; also on what is not trusted.
+def early_stop(press: Press, recipe: Recipe) -> Stop | None:
+    """Whether no further step is to be made: to spare fruit and gel, or since nothing could change any more.
 
     Args:
-        press: what was measured so far.
-        recipe: its early stop's limits and its closing limit.
+        press: what was measured so far; also what is not trusted counts.
+        recipe: its early stop's limits, its closing limit, and whether it stops when decided.
 
     Returns:
-        Why, with reason `EARLY_STOP`; None where the next step may be made.
+        Why; None where the next step may be made.
     """
-    evidence = Evidence(press, recipe)
+    return _Case(press, recipe).stopped
+
+
+class _Case:
+    """A press beside the limits for its fruit, and what speaks against PASS but for how far the steps went."""
+
+    def __init__(self, press: Press, recipe: Recipe) -> None:
+        self.press = press
+        self.limits = sized_limits(press.size, recipe)
+        self.evidence = Evidence(press, self.limits)
+        self.nothing = press.onset_mm is None
+        self.void = [*_void(press, self.limits)]
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """Limits that are or may be passed, and what keeps the measurement from being trusted."""
+        if self.nothing:
+            return []
+        damage = [] if self.limits.problem else _damage(self.evidence, self.limits)
+        return [*damage, *_distrust(self.evidence, self.limits.recipe)]
+
+    @cached_property
+    def stopped(self) -> Stop | None:
+        """Why no further step is made."""
+        if not self.evidence.points:
+            return None
+        finding = _over_early_stop(self.evidence, self.limits.recipe)
+        if finding is not None:
+            return Stop(finding.sentence, finding)
+        why = self._decided() if self.limits.recipe.steps.stop_when_decided else ""
+        reached_mm = self.evidence.points[-1].closing_mm
+        return Stop(f"No further step was made at {reached_mm:.1f} mm of closing: {why}.") if why else None
+
+    def _decided(self) -> str:
+        """Why no further step can change the outcome; empty where one can."""
+        if self.void:
+            return "this cannot become a result any more"
+        if any(finding.proves for finding in self.findings):
+            return "the fruit is damaged"
+        if self.evidence.points[-1].closing_mm < self.limits.recipe.damage.area[-1].closing_mm:
+            return ""
+        if not self.findings:
+            return "every limit is kept"
+        # Only an onset that excused steps hide may show itself with one more.
+        lasting = any(finding.reason is not Reason.AREA_NOT_RISING for finding in self.findings)
+        return "the fruit cannot pass any more" if lasting else ""
+
+
+def _over_early_stop(evidence: Evidence, recipe: Recipe) -> Finding | None:
+    """The recipe's limit that ends the steps, passed also by what is not trusted."""
     points, limits = evidence.points, recipe.early_stop
-    if not points:
-        return None
     last, growth = points[-1], evidence.latest_growth
     place = f"No further step was made at {last.closing_mm:.1f} mm of closing"
     over = max(points, key=lambda point: point.area_mm2)
     if over.area_mm2 > limits.area_mm2:
-        sentence = f"{place}: the area, {over.area_mm2:.1f} mm², is over the early stop's {limits.area_mm2:g} mm²."
+        told = figure(limits.area_mm2)
+        sentence = f"{place}: the area, {over.area_mm2:.1f} mm², is over the early stop's {told} mm²."
         return Finding(Reason.EARLY_STOP, sentence, over.area_mm2, limits.area_mm2, over.closing_mm)
     if growth is not None and growth.mm2_per_mm > limits.growth_mm2_per_mm:
         sentence = (
             f"{place}: the area grows by {growth.mm2_per_mm:.1f} mm² a millimetre, over the early stop's "
-            f"{limits.growth_mm2_per_mm:g}."
+            f"{figure(limits.growth_mm2_per_mm)}."
         )
         return Finding(Reason.EARLY_STOP, sentence, growth.mm2_per_mm, limits.growth_mm2_per_mm, growth.to_closing_mm)
     limit_mm = recipe.steps.closing_limit_mm
@@ -175,8 +245,9 @@ def _hopeless(evidence: Evidence, recipe: Recipe, place: str) -> Finding | None:
     return Finding(Reason.EARLY_STOP, sentence, area[0], threshold.least_area_mm2, threshold.closing_mm)
 
 
-def _void(press: Press, recipe: Recipe) -> Iterator[Finding]:
+def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
     """What makes the measurement no measurement of this recipe's fruit: nothing in it is a proof."""
+    recipe = limits.recipe
     for reason in dict.fromkeys(press.interruptions):
         yield Finding(reason, _INTERRUPTED.get(reason, f"The inspection was interrupted: {reason}."))
     if press.onset_mm is None:
@@ -191,46 +262,77 @@ def _void(press: Press, recipe: Recipe) -> Iterator[Finding]:
             f"{expected.largest_mm:g} mm."
         )
         yield Finding(Reason.OUT_OF_RANGE, sentence, press.onset_mm, beyond, 0.0)
+    if limits.problem:
+        yield Finding(Reason.SIZE_UNKNOWN, limits.problem)
 
 
-def _damage(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
+def _damage(evidence: Evidence, limits: SizedLimits) -> Iterator[Finding]:
     """Limits that are passed, or may be."""
-    for threshold in recipe.damage.area:
-        yield from _area(evidence, threshold)
-    limit = recipe.damage.growth_mm2_per_mm
+    for threshold in limits.recipe.damage.area:
+        yield from _area(evidence, threshold, limits)
+    limit = limits.recipe.damage.growth_mm2_per_mm
     proofs = [growth for growth in evidence.growths if growth.trusted and growth.least_mm2_per_mm > limit]
-    doubts = [growth for growth in evidence.growths if growth.most_mm2_per_mm > limit]
+    doubts = [growth for growth in evidence.growths if not growth.few and growth.most_mm2_per_mm > limit]
     if not proofs and not doubts:
         return
     worst = max(proofs or doubts, key=lambda growth: growth.mm2_per_mm)
     sentence = (
         f"From {worst.from_closing_mm:.1f} to {worst.to_closing_mm:.1f} mm of closing the area grows by "
         f"{worst.mm2_per_mm:.1f} ± {worst.uncertainty_mm2_per_mm:.1f} mm² a millimetre, "
-        f"{'' if proofs else 'which may be '}over the limit of {limit:g}."
+        f"{'' if proofs else 'which may be '}over the limit of {figure(limit)}."
     )
-    yield Finding(Reason.GROWTH_OVER_LIMIT, sentence, worst.mm2_per_mm, limit, worst.to_closing_mm, proves=bool(proofs))
+    reason = Reason.GROWTH_OVER_LIMIT if proofs else Reason.NEAR_LIMIT
+    yield Finding(reason, sentence, worst.mm2_per_mm, limit, worst.to_closing_mm, proves=bool(proofs))
 
 
-def _area(evidence: Evidence, threshold: AreaThreshold) -> Iterator[Finding]:
+def _area(evidence: Evidence, threshold: AreaThreshold, limits: SizedLimits) -> Iterator[Finding]:
     """One area threshold."""
     closing_mm, limit = threshold.closing_mm, threshold.area_mm2
     least, area = evidence.least_area_mm2(closing_mm), evidence.area_at(closing_mm)
     at = f"at {closing_mm:g} mm of closing"
     if least is not None and least > limit:
-        sentence = f"The area {at} is at least {least:.1f} mm², over the limit of {limit:g} mm²."
+        sentence = f"The area {at} is at least {least:.1f} mm²; {limit_in_words(limit, limits)}: it is over the limit."
         yield Finding(Reason.AREA_OVER_LIMIT, sentence, least, limit, closing_mm, proves=True)
     elif area is not None and sum(area) > limit:
-        sentence = f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be over the limit of {limit:g} mm²."
-        yield Finding(Reason.AREA_OVER_LIMIT, sentence, area[0], limit, closing_mm)
+        told = f"{area[0]:.1f} ± {area[1]:.1f} mm²; {limit_in_words(limit, limits)}"
+        sentence = f"The area {at} is {told}: it is not surely within the limit."
+        yield Finding(Reason.NEAR_LIMIT, sentence, area[0], limit, closing_mm)
     elif area is not None and area[0] - area[1] < threshold.least_area_mm2:
         sentence = (
             f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be less than any fruit's, "
-            f"{threshold.least_area_mm2:g} mm²: not all of the contact was seen."
+            f"{figure(threshold.least_area_mm2)} mm²: not all of the contact was seen."
         )
         yield Finding(Reason.LOW_CONFIDENCE, sentence, area[0], threshold.least_area_mm2, closing_mm)
 
 
-def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:
+def limit_in_words(limit_mm2: float, limits: SizedLimits) -> str:
+    """An area limit with the fruit that it is for, as part of a sentence.
+
+    Args:
+        limit_mm2: the limit for the fruit.
+        limits: what it was made from.
+    """
+    told = f"{figure(limit_mm2)} mm²"
+    if limits.without_size:
+        return f"the limit for a fruit of unknown size is {told}"
+    if limits.length_mm is None:
+        return f"the limit is {told}"
+    fruit = limits.recipe.title.lower()
+    if fruit[0] in "aeiou":
+        return f"the limit for an {fruit} of {figure(limits.length_mm)} mm is {told}"
+    return f"the limit for a {fruit} of {figure(limits.length_mm)} mm is {told}"
+
+
+def figure(value: float) -> str:
+    """A limit as a sentence has it: to a tenth, without a needless `.0`.
+
+    Args:
+        value: in its unit.
+    """
+    return f"{round(value, 1):g}"
+
+
+def _distrust(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
     """What a PASS would need and does not have."""
     for flag, (reason, what) in _DOUBTS.items():
         asked = [point for point in evidence.needed if point not in evidence.excused]
@@ -249,7 +351,6 @@ def _distrust(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> It
         sentence = f"The area does not rise with the closing: {places} does not fit the other steps."
         yield Finding(Reason.AREA_NOT_RISING, sentence, falling[0].area_mm2, None, falling[0].closing_mm)
     yield from _onset(evidence, recipe)
-    yield from _reach(evidence, recipe, stopped)
 
 
 def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
@@ -262,16 +363,20 @@ def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
         yield Finding(Reason.AREA_NOT_RISING, sentence, begins_mm, allowed_mm, 0.0)
 
 
-def _reach(evidence: Evidence, recipe: Recipe, stopped: Finding | None) -> Iterator[Finding]:
+def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
     """Whether every damage threshold was reached, and whether the steps ended as they should."""
+    evidence, recipe = case.evidence, case.limits.recipe
     missing = [limit for limit in recipe.damage.area if evidence.area_at(limit.closing_mm) is None]
     reached_mm = evidence.points[-1].closing_mm if evidence.points else 0.0
     if stopped is None and (missing or not _almost(evidence, recipe)):
+        if case.press.interruptions:  # which say why
+            return
         wanted_mm = missing[0].closing_mm if missing else recipe.steps.result_closings_mm[-1]
         sentence = f"The steps ended at {reached_mm:.1f} mm of closing, before {wanted_mm:g} mm, and nothing says why."
         yield Finding(Reason.INTERNAL_FAULT, sentence, reached_mm, wanted_mm, reached_mm)
-    elif missing and stopped is not None:
-        yield replace(stopped, sentence=f"{stopped.sentence} The area at {missing[0].closing_mm:g} mm is unknown.")
+    elif missing and stopped is not None and stopped.finding is not None:
+        sentence = f"{stopped.sentence} The area at {missing[0].closing_mm:g} mm is unknown."
+        yield replace(stopped.finding, sentence=sentence)
 
 
 def _almost(evidence: Evidence, recipe: Recipe) -> bool:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
-from station.inspection.fruit_size import FruitSize
+from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.vocabulary import Reason
 
 RELATIVE_NOISE = 0.05
-"""By how much of itself a trusted area differs from another image's of the same contact; docs/measurement.md has the
-method's median errors, 0.04 to 0.06 on smooth fruit."""
+"""By how much of itself an area may fall while the gripper closes before its step is called wrong; docs/measurement.md
+has the method's median errors, 0.04 to 0.06 on smooth fruit. The guard band of a limit is in uncertainty.py."""
 
 
 class Flag(StrEnum):
@@ -24,15 +24,6 @@ class Flag(StrEnum):
     REFERENCE_MISMATCH = "reference_mismatch"
 
 
-def usual_uncertainty_mm2(area_mm2: float) -> float:
-    """The uncertainty of an area where its own images do not tell it, in mm².
-
-    Args:
-        area_mm2: the area.
-    """
-    return RELATIVE_NOISE * area_mm2
-
-
 @dataclass(frozen=True, slots=True)
 class Measured:
     """One measured width step."""
@@ -41,19 +32,18 @@ class Measured:
     """Onset minus the measured width; negative before the first contact."""
     area_mm2: float
     area_px: int
-    area_uncertainty_mm2: float
-    """Half the interval in which another image of the same contact would lie. The error of the scale, which all of a
-    unit's areas and its recipes' limits share, is no part of it."""
     confidence: float | None
     """0 to 1; None where the method does not say, which is no trust."""
     flags: frozenset[Flag] = frozenset()
     changed_area_mm2: float | None = None
     """The second witness: how much of the image has changed; None where the method does not say. No criterion."""
     changed_area_px: int | None = None
+    area_scatter_mm2: float = 0.0
+    """How far the areas of steps that share this closing differ; `area_mm2` is the largest of them."""
 
     def __post_init__(self) -> None:
         changed = (self.changed_area_mm2 or 0.0, self.changed_area_px or 0)
-        sizes = (self.area_mm2, self.area_px, self.area_uncertainty_mm2, self.confidence or 0.0, *changed)
+        sizes = (self.area_mm2, self.area_px, self.area_scatter_mm2, self.confidence or 0.0, *changed)
         if not isfinite(self.closing_mm) or not all(isfinite(size) and size >= 0 for size in sizes):
             raise ValueError(f"expected finite values, and sizes that are not negative, got {self}")
 
@@ -70,5 +60,9 @@ class Press:
     """In any order."""
     interruptions: tuple[Reason, ...] = ()
     """What ended the steps or spoilt them from outside the measurement: a fault, called off, late, a bad reference."""
-    size: FruitSize = FruitSize()
+    size: FruitSize = NO_SIZE
     """What the line's PLC told of the fruit."""
+    resolution_mm: float = 0.0
+    """Of the measured widths: one count of the gripper, mm."""
+    scale_uncertainty: float = 0.0
+    """Relative standard uncertainty of the unit's mm per px, from its calibration."""

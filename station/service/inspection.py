@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from station.channel.line import Outcome
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
-from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Flag, Measured, Press
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.eye import Seen
 from station.service.grip import GripStep
@@ -130,7 +130,6 @@ class Inspection:
             closing_mm=onset_mm - seen.step.move.width_mm,
             area_mm2=area_mm2,
             area_px=contact.area_px,
-            area_uncertainty_mm2=usual_uncertainty_mm2(area_mm2),
             confidence=contact.confidence,
             flags=frozenset(Flag(flag.value) for flag in contact.flags),
             changed_area_mm2=self._mm2(contact.changed_area_px),

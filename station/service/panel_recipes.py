@@ -36,7 +36,8 @@ from station.channel.panel_recipe_queries import (
 from station.channel.server import Handler
 from station.errors import BadInputError, StationError
 from station.inspection.evidence import Evidence
-from station.inspection.press import Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Measured, Press
+from station.inspection.sized_limits import SizedLimits
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
@@ -322,10 +323,10 @@ def _curve(
     number: int, outcome: str, onset_mm: float | None, points: Sequence[tuple[Any, ...]], recipe: Recipe
 ) -> PastCurve:
     measured = tuple(
-        Measured(closing_mm, area_mm2, area_px or 0, usual_uncertainty_mm2(area_mm2), confidence, frozenset())
+        Measured(closing_mm, area_mm2, area_px or 0, confidence, frozenset())
         for closing_mm, area_mm2, area_px, confidence in points
     )
-    evidence = Evidence(Press(onset_mm, 0.0, measured, ()), recipe) if measured else None
+    evidence = Evidence(Press(onset_mm, 0.0, measured, ()), SizedLimits(recipe)) if measured else None
     growths, needed = ((), ()) if evidence is None else (evidence.growths, evidence.needed)
     return PastCurve(
         sequence=number,

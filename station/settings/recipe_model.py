@@ -1,16 +1,13 @@
 """One fruit's recipe: how it is pressed, how the contact is found, and what is too much."""
 
-from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from station.settings.damage import LARGEST_AREA_MM2, DamageThresholds
 from station.settings.model import Settings, setting
 from station.settings.problems import Contradiction, Path
 from station.settings.segmentation import Segmentation
-
-LARGEST_AREA_MM2 = 260.0
-"""No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
 
 
 def _integer(value: object) -> object:
@@ -87,6 +84,13 @@ class WidthSteps(Settings):
         ge=0.4,
         le=50.0,
     )
+    # Left out of a recipe's values where it is false, as in recipes written before it: they keep their content hash.
+    stop_when_decided: Annotated[bool, Field(exclude_if=lambda stops: not stops)] = setting(
+        default=False,
+        title="Stop when decided",
+        description="No step is made once no further one can change the outcome. False takes the curve to the last "
+        "step, for research.",
+    )
 
     @property
     def travel_mm(self) -> float:
@@ -157,64 +161,6 @@ class Imaging(Settings):
         ge=1,
         le=60,
     )
-
-
-class AreaThreshold(Settings):
-    """The contact area above which a fruit is damaged, at one closing."""
-
-    closing_mm: float = setting(
-        title="Closing", description="One of the results' closings.", unit="mm", gt=0.0, le=50.0
-    )
-    area_mm2: float = setting(
-        title="Area", description="A larger area fails the fruit.", unit="mm²", gt=0.0, le=LARGEST_AREA_MM2
-    )
-    least_area_mm2: float = setting(
-        0.0,
-        title="Least area",
-        description="A smaller area is no fruit's: not all of the contact was seen, and the fruit is not judged.",
-        unit="mm²",
-        ge=0.0,
-        le=LARGEST_AREA_MM2,
-    )
-
-    @model_validator(mode="after")
-    def _leaves_room(self) -> Self:
-        if self.least_area_mm2 >= self.area_mm2:
-            text = f"expected less than area_mm2, {self.area_mm2:g} mm², got {self.least_area_mm2:g}"
-            raise Contradiction([(("least_area_mm2",), text)])
-        return self
-
-
-class DamageThresholds(Settings):
-    """What fails a fruit."""
-
-    area: tuple[AreaThreshold, ...] = setting(
-        title="Area thresholds",
-        description="Largest areas of a good fruit, in ascending order of closing.",
-        min_length=1,
-        max_length=20,
-    )
-    growth_mm2_per_mm: float = setting(
-        title="Growth threshold",
-        description="A larger growth of the area per millimetre of closing fails the fruit.",
-        unit="mm²/mm",
-        gt=0.0,
-        le=500.0,
-    )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
-        for index, (before, after) in enumerate(pairwise(self.area), start=1):
-            if after.closing_mm <= before.closing_mm:
-                text = f"expected more than the threshold before, got {after.closing_mm:g}"
-                wrong.append((("area", index, "closing_mm"), text))
-            if after.area_mm2 < before.area_mm2:
-                text = f"expected no less than the threshold before, got {after.area_mm2:g}"
-                wrong.append((("area", index, "area_mm2"), text))
-        if wrong:
-            raise Contradiction(wrong)
-        return self
 
 
 class EarlyStop(Settings):

@@ -99,7 +99,7 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
         root: the whole schema.
         node: where to begin; the root by default.
         path: the path of `node`.
-        into_lists: go on into lists of mappings, whose path then ends in `[]`.
+        into_lists: go on into lists of mappings, whose path then ends in `[]`, and into mappings that may be null.
     """
     node = resolved(root if node is None else node, root)
     if "properties" in node:
@@ -107,6 +107,9 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
             yield from leaves(root, child, (*path, name), into_lists=into_lists)
         return
     yield Leaf(path, node)
+    mappings = [branch for branch in branches(node, root) if "properties" in branch and "anyOf" in node]
+    if into_lists and len(mappings) == 1:  # one that may be null
+        yield from leaves(root, mappings[0], path, into_lists=True)
     item = resolved(node.get("items") or {}, root)
     if into_lists and "properties" in item:
         yield from leaves(root, item, (*path[:-1], f"{path[-1]}[]"), into_lists=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from station.inspection.judge import early_stop
-from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Flag, Measured, Press
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
 from station.twin.contact import FruitOnGel, Pose
@@ -193,7 +193,6 @@ class Grip:
             closing_mm=closing_mm,
             area_mm2=area_mm2,
             area_px=contact.area_px,
-            area_uncertainty_mm2=usual_uncertainty_mm2(area_mm2),
             confidence=contact.confidence,
             flags=frozenset(Flag(flag.value) for flag in contact.flags),
         )

@@ -13,6 +13,7 @@ from scipy import stats
 
 from station.inspection.evidence import Evidence
 from station.inspection.press import Press
+from station.inspection.sized_limits import sized_limits
 from station.settings.recipe_model import Recipe
 
 CONFIDENCE = 0.95
@@ -44,25 +45,32 @@ class Limit:
 
 
 def area_most_mm2(press: Press, recipe: Recipe, closing_mm: float) -> float | None:
-    """The most that a fruit's area may be at a closing; None where it was not reached.
+    """The most that a fruit's area may be at a closing, as that of a fruit of the recipe's reference size.
+
+    None where the closing was not reached, or the fruit's size is not known.
 
     Args:
         press: as stored.
         recipe: that it was pressed by.
         closing_mm: where.
     """
-    area = Evidence(press, recipe).area_at(closing_mm)
-    return None if area is None else sum(area)
+    limits = sized_limits(press.size, recipe)
+    area = Evidence(press, limits).area_at(closing_mm)
+    return None if area is None or limits.problem else sum(area) / limits.factor
 
 
 def growth_most_mm2_per_mm(press: Press, recipe: Recipe) -> float | None:
-    """The most that a fruit's steepest growth may be; None with too few points.
+    """The most that a fruit's steepest growth may be, as that of a fruit of the recipe's reference size.
+
+    None with too few points, or where the fruit's size is not known.
 
     Args:
         press: as stored.
         recipe: that it was pressed by.
     """
-    return max((growth.most_mm2_per_mm for growth in Evidence(press, recipe).growths), default=None)
+    limits = sized_limits(press.size, recipe)
+    growths = [] if limits.problem else [growth for growth in Evidence(press, limits).growths if not growth.few]
+    return max((growth.most_mm2_per_mm / limits.factor for growth in growths), default=None)
 
 
 def propose(

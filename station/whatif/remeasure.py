@@ -8,7 +8,7 @@ import numpy as np
 
 from station.calibration.gate import gated
 from station.errors import StationError
-from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Flag, Measured, Press
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Image
 from station.vision.methods import make_method
@@ -73,9 +73,7 @@ def _point(
     flags = {Flag(flag.value) for flag in now.flags}
     if confidence is not None and confidence < draft.robust.least_confidence:
         flags.add(Flag.LOW_CONFIDENCE)
-    return Measured(
-        stored.closing_mm, area_mm2, now.area_px, usual_uncertainty_mm2(area_mm2), confidence, frozenset(flags)
-    )
+    return Measured(stored.closing_mm, area_mm2, now.area_px, confidence, frozenset(flags))
 
 
 def _scale(press: Press) -> float:

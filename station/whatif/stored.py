@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Flag, Measured, Press
 from station.records.images import image_path
 from station.vocabulary import OutcomeName, Reason
 
@@ -133,7 +133,7 @@ def _points(curve: Iterable[Any]) -> Iterator[Measured]:
     for _, closing_mm, area_mm2, area_px, confidence, flags in curve:
         if closing_mm is not None and area_mm2 is not None:
             known = frozenset(Flag(flag) for flag in json.loads(flags) if flag in _FLAGS) if flags != "[]" else _NONE
-            yield Measured(closing_mm, area_mm2, area_px or 0, usual_uncertainty_mm2(area_mm2), confidence, known)
+            yield Measured(closing_mm, area_mm2, area_px or 0, confidence, known)
 
 
 _NONE: frozenset[Flag] = frozenset()

@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Flag, Measured, Press, usual_uncertainty_mm2
+from station.inspection.press import Flag, Measured, Press
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
@@ -257,7 +257,6 @@ def _pressed(shown: PressSequence, recipe) -> Press:
             float(closing_mm),
             area_mm2,
             contact.area_px,
-            usual_uncertainty_mm2(area_mm2),
             contact.confidence,
             frozenset(Flag(flag.value) for flag in contact.flags),
             None if changed_px is None else changed_px * MM_PER_PX**2,

@@ -54,7 +54,7 @@ def test_a_draft_is_in_force_once_another_person_approves_it(begun, station, doe
     does("Bo", "retire", "strawberry", why="the season is over")
     assert limit(book_of(site, home)) is None
     told = station("audit", "show", "--action", "recipe.", "--subject", "strawberry")[1]
-    for action in ("recipe.shipped", "recipe.edited", "recipe.submitted", "recipe.approved", "recipe.retired"):
+    for action in ("recipe.adopted", "recipe.edited", "recipe.submitted", "recipe.approved", "recipe.retired"):
         assert action in told
     assert station("audit", "verify")[0] == 0
 

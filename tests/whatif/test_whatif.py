@@ -16,7 +16,7 @@ from station.whatif import runner
 from station.whatif.replay import replay
 from station.whatif.stored import StoredPress
 
-SOUND, BRUISED, BETWEEN = 27.0, 45.0, 34.5
+SOUND, BRUISED, BETWEEN = 27.0, 45.0, 33.5
 
 
 def stored_of(press, recipe, sequence=1):

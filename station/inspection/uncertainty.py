@@ -1,0 +1,114 @@
+"""The uncertainty of an area against its limit as a budget, after the GUM (JCGM 100:2008), and the guard band from it.
+
+Every component is a standard uncertainty of one input, with the factor by which it changes the area (the sensitivity);
+they are independent, so their shares of the area add by their squares (GUM 5.1.2).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+from station.inspection.press import Press
+from station.inspection.sized_limits import SizedLimits
+from station.settings.damage import Repeatability
+
+COMPONENTS = ("repeatability", "onset", "gripper", "scale", "size")
+"""In the order of the budget's table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One input's part of the uncertainty."""
+
+    name: str
+    standard: float
+    """Standard uncertainty of the input, in `unit`."""
+    unit: str
+    """`mm`, or empty for a share."""
+    sensitivity: float
+    """By which share the area, or its limit, changes for one unit of the input."""
+
+    @property
+    def relative(self) -> float:
+        """Standard uncertainty as a share of the area."""
+        return self.sensitivity * self.standard
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """All components at one closing."""
+
+    closing_mm: float
+    components: tuple[Component, ...]
+    """One for each of `COMPONENTS`."""
+    factor: float
+    """The coverage factor, one-sided."""
+
+    @property
+    def combined(self) -> float:
+        """Combined standard uncertainty, as a share of the area."""
+        return hypot(*(each.relative for each in self.components))
+
+    @property
+    def expanded(self) -> float:
+        """The guard band, as a share of the area."""
+        return self.factor * self.combined
+
+    def expanded_of(self, *names: str) -> float:
+        """What some of the components alone would give, as a share of the area.
+
+        Args:
+            names: of `COMPONENTS`.
+        """
+        return self.factor * hypot(*(each.relative for each in self.components if each.name in names))
+
+
+def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
+    """The budget of an area at a closing.
+
+    Args:
+        closing_mm: more than 0.
+        press: with what is known of its onset, gripper and scale.
+        limits: for the fruit's size.
+    """
+    rule = limits.recipe.damage.uncertainty
+    # Hertz's contact: the area goes as the closing, so an error of the closing is the same share of the area.
+    per_mm = 1 / closing_mm
+    components = (
+        Component("repeatability", repeatability_at(closing_mm, rule.repeatability), "", 1.0),
+        # The contact began anywhere between the last image without it and the first with it: rectangular. Limits are
+        # found with onsets as late as others, so that its middle is in both.
+        Component("onset", rectangular(press.onset_uncertainty_mm), "mm", per_mm),
+        Component("gripper", rectangular(press.resolution_mm), "mm", per_mm),
+        # An area has the scale twice.
+        Component("scale", press.scale_uncertainty, "", 2.0),
+        Component("size", limits.relative_uncertainty, "", 1.0),
+    )
+    return Budget(closing_mm, components, rule.factor)
+
+
+def rectangular(width: float) -> float:
+    """The standard uncertainty of what lies anywhere in an interval alike (GUM 4.3.7).
+
+    Args:
+        width: the interval's, whole.
+    """
+    return width / sqrt(12)
+
+
+def repeatability_at(closing_mm: float, measured: Sequence[Repeatability]) -> float:
+    """The repeatability at a closing, as a share: interpolated, and beyond the ends as at the nearest.
+
+    Args:
+        closing_mm: where.
+        measured: in ascending order of closing.
+    """
+    before = [each for each in measured if each.closing_mm <= closing_mm]
+    after = [each for each in measured if each.closing_mm >= closing_mm]
+    if not before or not after:
+        return (before[-1:] or after[:1])[0].relative
+    low, high = before[-1], after[0]
+    if low is high:
+        return low.relative
+    share = (closing_mm - low.closing_mm) / (high.closing_mm - low.closing_mm)
+    return low.relative + share * (high.relative - low.relative)

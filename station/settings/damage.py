@@ -1,0 +1,245 @@
+"""What fails a fruit: area and growth thresholds, how they go with its size, and the uncertainty that guards them."""
+
+from itertools import pairwise
+from statistics import NormalDist
+from typing import Annotated, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from station.settings.model import Settings, setting
+from station.settings.problems import Contradiction, Path
+
+LARGEST_AREA_MM2 = 260.0
+"""No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
+
+
+class AreaThreshold(Settings):
+    """The contact area above which a fruit is damaged, at one closing."""
+
+    closing_mm: float = setting(
+        title="Closing", description="One of the results' closings.", unit="mm", gt=0.0, le=50.0
+    )
+    area_mm2: float = setting(
+        title="Area",
+        description="A larger area fails the fruit. With `damage.size`: of a fruit of the reference size.",
+        unit="mm²",
+        gt=0.0,
+        le=LARGEST_AREA_MM2,
+    )
+    least_area_mm2: float = setting(
+        0.0,
+        title="Least area",
+        description="A smaller area is no fruit's: not all of the contact was seen, and the fruit is not judged. With "
+        "`damage.size`: of a fruit of the reference size.",
+        unit="mm²",
+        ge=0.0,
+        le=LARGEST_AREA_MM2,
+    )
+
+    @model_validator(mode="after")
+    def _leaves_room(self) -> Self:
+        if self.least_area_mm2 >= self.area_mm2:
+            text = f"expected less than area_mm2, {self.area_mm2:g} mm², got {self.least_area_mm2:g}"
+            raise Contradiction([(("least_area_mm2",), text)])
+        return self
+
+
+class LengthRange(Settings):
+    """The lengths of fruit that a recipe or a size class is meant for."""
+
+    smallest_mm: float = setting(title="Smallest", description="No fruit is shorter.", unit="mm", ge=1.0, le=200.0)
+    largest_mm: float = setting(title="Largest", description="No fruit is longer.", unit="mm", ge=1.0, le=200.0)
+
+    @property
+    def middle_mm(self) -> float:
+        """Half way between smallest and largest, mm."""
+        return (self.smallest_mm + self.largest_mm) / 2
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.smallest_mm >= self.largest_mm:
+            text = f"expected less than largest_mm, {self.largest_mm:g} mm, got {self.smallest_mm:g}"
+            raise Contradiction([(("smallest_mm",), text)])
+        return self
+
+
+class SizeClass(LengthRange):
+    """One of the grader's size classes."""
+
+    number: int = setting(
+        title="Number", description="The class's number, as the line's PLC writes it; 0 is none.", ge=1, le=65_534
+    )
+
+
+class SizeOfFruit(Settings):
+    """The fruit's size, measured by a grader upstream, with which the area limits and growth limits go."""
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    judged_by: Literal["length", "class"] = setting(
+        alias="from",
+        title="Judged by",
+        description="`length` takes the length that the PLC writes, `class` the middle of the size class.",
+    )
+    reference_mm: float = setting(
+        title="Reference length",
+        description="The length for which the limits are written.",
+        unit="mm",
+        ge=1.0,
+        le=200.0,
+    )
+    exponent: float = setting(
+        title="Exponent",
+        description="The area of a sound fruit goes as its length over the reference length to this power.",
+        gt=0.0,
+        le=3.0,
+    )
+    expected_length: LengthRange = setting(
+        title="Expected length", description="A length outside is not believed: no result."
+    )
+    uncertainty_mm: float = setting(
+        title="Uncertainty of the length",
+        description="Standard uncertainty of the length given; ±1 mm without more knowledge is 0.58 mm.",
+        unit="mm",
+        ge=0.0,
+        le=50.0,
+    )
+    classes: tuple[SizeClass, ...] = setting(
+        (),
+        title="Size classes",
+        description="The grader's classes, in ascending order. Where there are none, a class is not looked at.",
+        max_length=50,
+    )
+    without_size: Literal["no_result", "plain_limit"] = setting(
+        "no_result",
+        title="Without a size",
+        description="Where the PLC writes no size: `no_result`, or `plain_limit`, which takes a fruit of the reference "
+        "length with `spread` as the uncertainty of its length. A size that cannot be is always no result.",
+    )
+    spread: float = setting(
+        title="Spread of the lengths",
+        description="Relative standard deviation of the length among the line's fruit.",
+        gt=0.0,
+        le=1.0,
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        expected = self.expected_length
+        span = f"expected within expected_length, {expected.smallest_mm:g} to {expected.largest_mm:g} mm, got"
+        if not expected.smallest_mm <= self.reference_mm <= expected.largest_mm:
+            wrong.append((("reference_mm",), f"{span} {self.reference_mm:g}"))
+        if self.judged_by == "class" and not self.classes:
+            wrong.append((("classes",), "expected the grader's classes, as from is 'class'"))
+        for index, each in enumerate(self.classes):
+            if not expected.smallest_mm <= each.middle_mm <= expected.largest_mm:
+                wrong.append((("classes", index, "smallest_mm"), f"{span} a middle of {each.middle_mm:g}"))
+        for index, (before, after) in enumerate(pairwise(self.classes), start=1):
+            if after.number <= before.number:
+                text = f"expected more than the class before, {before.number}, got {after.number}"
+                wrong.append((("classes", index, "number"), text))
+        if wrong:
+            raise Contradiction(wrong)
+        return self
+
+
+class Repeatability(Settings):
+    """How far the area repeats on one fruit, at one closing."""
+
+    closing_mm: float = setting(
+        title="Closing",
+        description="Where it was measured; between two it is interpolated, beyond them the nearest holds.",
+        unit="mm",
+        gt=0.0,
+        le=50.0,
+    )
+    relative: float = setting(
+        title="Repeatability",
+        description="Standard deviation of the measured over the true area, over fruit as the line has them.",
+        ge=0.0,
+        le=1.0,
+    )
+
+
+class AreaUncertainty(Settings):
+    """What the guard band of the thresholds is made of, beside what the press itself tells."""
+
+    coverage: float = setting(
+        0.95,
+        title="Coverage",
+        description="One-sided probability with which a fruit at its limit is kept from PASS, and from FAIL; 0.95 is a "
+        "coverage factor of 1.64.",
+        ge=0.5,
+        le=0.9999,
+    )
+    repeatability: tuple[Repeatability, ...] = setting(
+        (Repeatability(closing_mm=3.0, relative=0.05),),
+        title="Repeatability",
+        description="Of the area, in ascending order of closing.",
+        min_length=1,
+        max_length=20,
+    )
+
+    @property
+    def factor(self) -> float:
+        """The coverage factor k: so many standard uncertainties are the guard band."""
+        return NormalDist().inv_cdf(self.coverage)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        for index, (before, after) in enumerate(pairwise(self.repeatability), start=1):
+            if after.closing_mm <= before.closing_mm:
+                text = f"expected more than the closing before, got {after.closing_mm:g}"
+                wrong.append((("repeatability", index, "closing_mm"), text))
+        if wrong:
+            raise Contradiction(wrong)
+        return self
+
+
+AREA_UNCERTAINTY = AreaUncertainty()
+"""Of a recipe that says none, as those written before there was one."""
+
+
+class DamageThresholds(Settings):
+    """What fails a fruit."""
+
+    area: tuple[AreaThreshold, ...] = setting(
+        title="Area thresholds",
+        description="Largest areas of a good fruit, in ascending order of closing.",
+        min_length=1,
+        max_length=20,
+    )
+    growth_mm2_per_mm: float = setting(
+        title="Growth threshold",
+        description="A larger growth of the area per millimetre of closing fails the fruit. With `damage.size`: of a "
+        "fruit of the reference size.",
+        unit="mm²/mm",
+        gt=0.0,
+        le=500.0,
+    )
+    # The three below are left out of a recipe's values where they are as in recipes written before them: such a
+    # recipe keeps its content hash, and with it its approval.
+    size: Annotated[SizeOfFruit | None, Field(exclude_if=lambda size: size is None)] = setting(
+        None,
+        title="Size of the fruit",
+        description="How the limits go with the fruit's length; null where the size is not used.",
+    )
+    uncertainty: Annotated[AreaUncertainty, Field(exclude_if=lambda given: given == AREA_UNCERTAINTY)] = setting(
+        AREA_UNCERTAINTY, title="Uncertainty", description="What the guard band of the thresholds is made of."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        wrong: list[tuple[Path, str]] = []
+        for index, (before, after) in enumerate(pairwise(self.area), start=1):
+            if after.closing_mm <= before.closing_mm:
+                text = f"expected more than the threshold before, got {after.closing_mm:g}"
+                wrong.append((("area", index, "closing_mm"), text))
+            if after.area_mm2 < before.area_mm2:
+                text = f"expected no less than the threshold before, got {after.area_mm2:g}"
+                wrong.append((("area", index, "area_mm2"), text))
+        if wrong:
+            raise Contradiction(wrong)
+        return self
