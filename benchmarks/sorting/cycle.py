@@ -77,7 +77,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
     Raises:
         Unmeasured: a closing is not measured yet.
     """
-    specimen = draw(task)
+    specimen, recipe = draw(task), sized_by(practice, recipe)
     shift_mm, closings, steps, forces = (0.0, 0.0), 0, 0, [0.0]
     presses: list[Press] = []
 
@@ -142,12 +142,11 @@ def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: P
         practice: which scale and size the station has.
     """
     mm_per_px = specimen.calibrated_mm_per_px if practice.calibrated else TYPICAL_MM_PER_PX
-    sizes = {"length": FruitSize(length_mm=specimen.graded_mm), "class": specimen.size_class, "none": FruitSize()}
     press = Press(
         pressed.onset_mm,
         pressed.onset_uncertainty_mm,
         (),
-        size=sizes[practice.size],
+        size=_size(specimen, recipe, practice),
         resolution_mm=GripperCalibration().mm_per_count,
         # The usual scale's uncertainty is two standard deviations.
         scale_uncertainty=CALIBRATION_SD if practice.calibrated else TYPICAL_UNCERTAINTY / 2,
@@ -157,6 +156,31 @@ def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: P
         if early_stop(press, recipe) is not None:
             break
     return press, len(press.points)
+
+
+def sized_by(practice: Practice, recipe: Recipe) -> Recipe:
+    """The recipe, going by what the grader of this practice gives.
+
+    Args:
+        practice: with its size.
+        recipe: as shipped.
+    """
+    rule = recipe.damage.size
+    if practice.size != "class" or rule is None:
+        return recipe
+    by_class = rule.model_copy(update={"judged_by": "class"})
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"size": by_class})})
+
+
+def _size(specimen: Specimen, recipe: Recipe, practice: Practice) -> FruitSize:
+    """What the PLC writes; a fruit outside all of the recipe's classes has none."""
+    if practice.size == "length":
+        return FruitSize(length_mm=specimen.graded_mm)
+    rule = recipe.damage.size
+    if practice.size == "none" or rule is None:
+        return FruitSize()
+    numbers = (one.number for one in rule.classes if one.smallest_mm <= specimen.graded_mm < one.largest_mm)
+    return FruitSize(size_class=next(numbers, None))
 
 
 def looks_again(verdict: Verdict) -> bool:

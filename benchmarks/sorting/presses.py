@@ -20,8 +20,8 @@ from station.twin.squeeze import Squeeze
 
 from .specimens import Task, draw
 
-_DEEPEST_MM = (6.1, 4.2)
-"""First closings go on to where the early stops of sound fruit lie, later ones to a step beyond the last threshold."""
+_DEEPEST_MM = (6.1, 5.0)
+"""First closings go on to where the early stops of sound fruit lie, later ones two steps beyond the last threshold."""
 _KEEP_EVERY_S = 20.0
 _DECIDED_BY = (
     "vision",
@@ -163,8 +163,7 @@ def _made_by(kind: str) -> str:
     if kind not in _hashes:
         root, recipe = Path(station.__file__).parent, find_recipe(kind)
         digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
-        for part in (recipe.segmentation, recipe.imaging, recipe.steps):
-            digest.update(part.model_dump_json().encode())
+        digest.update(f"{recipe.steps.step_mm}{recipe.segmentation!r}{recipe.imaging!r}".encode())
         for name in _DECIDED_BY:
             place = root / name
             for file in [place] if place.is_file() else sorted(place.rglob("*.[pn][yp]*")):

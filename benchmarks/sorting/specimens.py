@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from station.inspection.fruit_size import FruitSize
 from station.twin.contact import Pose
 from station.twin.damage import DAMAGES, Severity
 from station.twin.fruit import Fruit, Kind, draw_fruit
@@ -27,8 +26,6 @@ CALIBRATION_SD = 0.011
 three places (docs/calibration.md)."""
 _GRADER_MM = 1.0
 """A grader's length is within this of the true one, uniform."""
-CLASS_MM = {Kind.STRAWBERRY: 8.0, Kind.RASPBERRY: 4.0, Kind.BLUEBERRY: 2.0}
-"""How much length a size class spans; an estimate."""
 
 
 class Task(NamedTuple):
@@ -61,11 +58,6 @@ class Specimen:
     noise_seed: int
     graded_mm: float
     """The length as a grader has it."""
-
-    @property
-    def size_class(self) -> FruitSize:
-        """The class alone, by the true length."""
-        return FruitSize(size_class=1 + int(self.fruit.length_mm // CLASS_MM[self.fruit.kind]))
 
 
 def draw(task: Task) -> Specimen:

@@ -14,6 +14,7 @@ from benchmarks.sorting.cycle import (
     inspect,
     looks_again,
     move_mm,
+    sized_by,
     together,
 )
 from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
@@ -81,9 +82,7 @@ class TestPressing:
     def test_the_arm_brings_the_contact_to_the_middle(self):
         """A closing off the middle, its move, and the next closing: nearer than a move is made for."""
         task = next(
-            task
-            for number in range(50)
-            if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
+            task for number in range(50) if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
         )
         _, first = presses.press(Closing(task, 0, (0.0, 0.0)))
         move = move_mm(first.steps[0])
@@ -92,7 +91,8 @@ class TestPressing:
         for step in second.steps[:4]:
             assert step.offset_px is not None
             assert np.hypot(*step.offset_px) * TYPICAL_MM_PER_PX < 0.4
-        assert first.steps[-1].closing_mm > 5.5 > 4.5 > second.steps[-1].closing_mm
+        # Later closings are not taken as far as the early stops of the first.
+        assert first.steps[-1].closing_mm > second.steps[-1].closing_mm > 4
 
     def test_an_arm_moves_by_its_own_steps_within_its_bounds(self):
         step = Step(0.0, 500, 0.9, (), None, 0.1)
@@ -132,6 +132,17 @@ class TestDeciding:
         with pytest.raises(Unmeasured) as missing:
             inspect(BLUEBERRY, recipe, Practice(), Looks(pressed(offset_px=(40.0, 0.0)), None))
         assert missing.value.closing == Closing(BLUEBERRY, 1, (-1.05, 0.0))
+
+    @pytest.mark.parametrize(
+        ("size", "told"), [("length", (True, False)), ("class", (False, True)), ("none", (False,) * 2)]
+    )
+    def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, told):
+        practice = Practice(size=size)
+        by = sized_by(practice, recipe)
+        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice)
+        assert (press.size.length_mm is not None, press.size.size_class is not None) == told
+        assert by.damage.size is not None
+        assert by.damage.size.judged_by == ("class" if size == "class" else "length")
 
     def test_the_usual_scale_stands_in_where_a_unit_was_never_calibrated(self, recipe):
         one = replace(draw(BLUEBERRY), mm_per_px=0.029, calibrated_mm_per_px=0.029)
