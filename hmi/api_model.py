@@ -128,6 +128,8 @@ class InspectionWhole(Model):
     images: list[str] = Field(description="SHA-256 of those kept.")
     published: datetime | None = Field(description="When the PLC was told.")
     acknowledged: datetime | None = Field(description="When the PLC took it.")
+    fruit_length_mm: float | None = Field(description="As the PLC gave it with the trigger; null where it did not.")
+    size_class: int | None = Field(description="Likewise.")
 
     @classmethod
     def of(cls, told: InspectionTold) -> "InspectionWhole":
@@ -163,6 +165,8 @@ class InspectionWhole(Model):
             images=[image.sha256 for image in told.images if image.there],
             published=None if told.published_utc_ms is None else moment(told.published_utc_ms),
             acknowledged=None if told.acknowledged_utc_ms is None else moment(told.acknowledged_utc_ms),
+            fruit_length_mm=told.fruit_length_mm,
+            size_class=told.size_class,
         )
 
 

@@ -84,24 +84,36 @@ class StationClient(RegisterLink):
         """The result that waits for its acknowledgement, or None."""
         return result_shown(await self.scan())
 
-    async def inspect(self, trigger_id: int, encoder: int = 0, deadline_s: float = 20.0) -> InspectionResult:
+    async def inspect(
+        self,
+        trigger_id: int,
+        encoder: int = 0,
+        deadline_s: float = 20.0,
+        *,
+        fruit_length_mm: float | None = None,
+        size_class: int | None = None,
+    ) -> InspectionResult:
         """Inspect one fruit: trigger, wait, take the result whose id is this one, acknowledge it. Not idempotent.
 
         Args:
             trigger_id: 1 to 65535, other than the last one accepted.
             encoder: the line's encoder, given back with the result.
             deadline_s: for all of it. A result that comes later waits, and has to be acknowledged by its sequence.
+            fruit_length_mm: as a grader measured it, sent to a tenth; None where it did not.
+            size_class: the grader's, 1 to 65535; None where it gave none.
 
         Raises:
             NotReadyError: nothing was triggered.
             TriggerRefusedError: the station refused.
+            RegisterValueError: a size that its register cannot hold; nothing was triggered.
             DeadlineMissedError: no answer or no result in time.
             ClientError: the link; whether the fruit is being inspected is then unknown.
         """
         ends_s = time.monotonic() + deadline_s
         before = await self.scan()
         self._may_trigger(before, trigger_id)
-        await self.write({"encoder": encoder})
+        size = {"fruit_length_mm_x10": round(10 * (fruit_length_mm or 0)), "size_class": size_class or 0}
+        await self.write({"encoder": encoder, **size})
         try:
             await self.write({"control": CONTROL.flags(self._control | {"trigger"}), "trigger_id": trigger_id})
             answered = await self._until(

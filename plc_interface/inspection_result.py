@@ -31,6 +31,10 @@ class InspectionResult:
     duration_ms: int
     encoder: int
     lot_checksum: int
+    fruit_length_mm: float | None
+    """As given with the trigger, to a tenth; None where none was."""
+    size_class: int | None
+    """The same."""
 
     @property
     def passed(self) -> bool:
@@ -47,7 +51,7 @@ def result_shown(block: Mapping[str, Any]) -> InspectionResult | None:
     sequence = block["result_sequence"]
     if "result_valid" not in BY_NAME["status"].names(block["status"]):
         return None
-    if sequence == 0 or sequence != block["result_sequence_again"]:
+    if sequence == 0 or not sequence == block["result_sequence_again"] == block["result_sequence_end"]:
         return None
     return InspectionResult(
         sequence=sequence,
@@ -65,6 +69,8 @@ def result_shown(block: Mapping[str, Any]) -> InspectionResult | None:
         duration_ms=block["result_duration_ms"],
         encoder=block["result_encoder"],
         lot_checksum=block["result_lot_checksum"],
+        fruit_length_mm=block["result_fruit_length_mm_x10"] / 10 or None,
+        size_class=block["result_size_class"] or None,
     )
 
 

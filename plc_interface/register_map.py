@@ -27,7 +27,12 @@ from plc_interface.register_bits import (
 from station.channel.line import CommandName
 
 MAP_VERSION = 1
-"""Raised with every change that an integrator has to follow; `map_checksum` tells any change."""
+"""Raised with every change that an integrator has to follow; `map_checksum` tells any change.
+
+A map that only grows keeps its version: no register moves, the new ones lie behind those of their block, and a program
+that neither reads nor writes them works as before. Where the result block grows, another copy of the sequence ends it,
+so that a torn read of the new registers is found as well.
+"""
 
 RO, RW = Access.READ_ONLY, Access.READ_WRITE
 U16_MAX, U32_MAX, U64_MAX = 2**16 - 1, 2**32 - 1, 2**64 - 1
@@ -65,6 +70,9 @@ CONTROL = (
              text_words=LOT_CHARACTERS // 2),
     Register("write_key", 26, Kind.U16, RW, "", 0, U16_MAX, "Claims or gives back the right to write",
              codes=WRITE_KEY_CODES),
+    _u16("fruit_length_mm_x10", 27, "Length of the fruit from stem to tip, taken with the trigger and used up by it; "
+         "0: not given", RW, "mm/10"),
+    _u16("size_class", 28, "The grader's size class of the fruit, taken and used up likewise; 0: not given", RW),
 )  # fmt: skip
 """Written by the one writer, read by anybody."""
 
@@ -114,6 +122,9 @@ RESULT = (
     _u32("result_encoder", 152, "The line's encoder at the trigger, as given with it or read over CAN", RO, "counts"),
     _u32("result_lot_checksum", 154, "CRC-32 of the lot id of this inspection"),
     _u32("result_sequence_again", 156, "As result_sequence: where they differ the block was read torn, read again"),
+    _u16("result_fruit_length_mm_x10", 158, "The fruit's length that this inspection was given; 0: none", RO, "mm/10"),
+    _u16("result_size_class", 159, "The fruit's size class that this inspection was given; 0: none"),
+    _u32("result_sequence_end", 160, "As result_sequence, for who reads the size too: where they differ read again"),
 )  # fmt: skip
 
 COUNTERS = (

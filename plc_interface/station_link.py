@@ -121,7 +121,13 @@ class StationLink:
                 pass
 
     async def _begin(self, action: do.AskBegin) -> None:
-        request = Begin(trigger_id=action.trigger_id, encoder=action.encoder, lot=action.lot)
+        request = Begin(
+            trigger_id=action.trigger_id,
+            encoder=action.encoder,
+            lot=action.lot,
+            fruit_length_mm_x10=action.fruit_length_mm_x10,
+            size_class=action.size_class,
+        )
         try:
             begun = await self._client.ask(request, Begun, deadline_s=self._settings.begin_deadline_s)
         except ChannelError as error:

@@ -23,6 +23,8 @@ class AskBegin:
     trigger_id: int
     encoder: int
     lot: str
+    fruit_length_mm_x10: int
+    size_class: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,8 @@ class Inputs:
     encoder: int = 0
     lot: str | None = ""
     """None where the registers do not hold printable ASCII."""
+    fruit_length_mm_x10: int = 0
+    size_class: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ def ask_begin(work: Work) -> None:
     """`Begin` to the station."""
     state = work.state
     number = work.number()
-    state.asked = Asked(number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot)
-    work.actions.append(AskBegin(number, state.asked.trigger_id, state.asked.encoder, state.asked.lot))
+    state.asked = asked = Asked(number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot, work.size)
+    work.actions.append(AskBegin(number, asked.trigger_id, asked.encoder, asked.lot, *asked.size))
 
 
 def is_new(work: Work) -> bool:
@@ -50,6 +50,7 @@ def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
         trigger_id=asked.trigger_id,
         encoder=asked.encoder,
         lot=asked.lot,
+        **asked.size._asdict(),
         within_s=within_s,
         began_s=work.at.s,
         began_utc_ms=work.at.utc_ms,
@@ -69,6 +70,7 @@ def unknown_run(asked: Asked, sequence: int, at: Moment) -> Running:
         trigger_id=asked.trigger_id,
         encoder=asked.encoder,
         lot=asked.lot,
+        **asked.size._asdict(),
         within_s=0.0,
         began_s=at.s,
         began_utc_ms=at.utc_ms,

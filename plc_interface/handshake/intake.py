@@ -22,6 +22,7 @@ from plc_interface.handshake.events import (
     WriterWent,
 )
 from plc_interface.handshake.modes import Signal
+from plc_interface.handshake.state import NO_SIZE, Size
 from plc_interface.handshake.work import Work
 
 EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
@@ -47,6 +48,7 @@ def _writer_came(work: Work, _event: WriterCame) -> None:
 def _writer_went(work: Work, _event: WriterWent) -> None:
     work.state.writer = False
     work.state.seen = None
+    work.state.size = NO_SIZE
     work.stop(Signal.PLC_SILENT)
     work.signals.append(Signal.WRITER_LOST)
 
@@ -105,6 +107,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
         fell = frozenset(bit for bit in _BITS if bit not in control and (seen is None or bit in seen))
         if seen is None:  # a bit that was high all along is no order to clear or to reset
             rose -= {"clear_error", "reset_counters"}
+    _take_size(work, event, by_trigger="trigger" in rose)
     for bit, on, off in EDGES:
         if bit in rose:
             work.signals.append(on)
@@ -125,6 +128,17 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
 
 
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
+
+
+def _take_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
+    """Note a size that was written, and let a trigger use it up, accepted or refused.
+
+    A register that keeps its value without being written again gives the next fruit none. So a PLC may write the size
+    before the trigger or with it, and one that stops writing it never has a fruit judged by the size of another.
+    """
+    written = {name: getattr(event.inputs, name) for name in Size._fields if name in event.written}
+    size = work.state.size._replace(**written)
+    work.size, work.state.size = (size, NO_SIZE) if by_trigger else (NO_SIZE, size)
 
 
 def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:

@@ -19,6 +19,8 @@ class Running(_Kept):
     trigger_id: int = Field(ge=1, le=65_535)
     encoder: int = Field(ge=0, lt=2**32)
     lot: str = Field(max_length=32)
+    fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
+    size_class: int = Field(default=0, ge=0, le=65_535)
     within_s: float = Field(ge=0, allow_inf_nan=False)
     """From its acceptance: the interface's own deadline."""
     began_s: float = Field(allow_inf_nan=False)

@@ -4,7 +4,7 @@ from plc_interface.handshake.actions import AskOutcome, TellPublished
 from plc_interface.handshake.events import OpenTold
 from plc_interface.handshake.inspection import run, unknown_run
 from plc_interface.handshake.modes import Signal
-from plc_interface.handshake.state import Asked
+from plc_interface.handshake.state import NO_SIZE, Asked
 from plc_interface.handshake.verdict import (
     acknowledge,
     give,
@@ -68,7 +68,7 @@ def _settle_outcome(work: Work, outcome: Outcome, *, known: bool) -> None:
 
 def _settle_running(work: Work, sequence: int, trigger_id: int, *, known: bool) -> None:
     state, journal = work.state, work.state.journal
-    asked = Asked(0, trigger_id, 0, journal.lot)
+    asked = Asked(0, trigger_id, 0, journal.lot, NO_SIZE)
     if state.running is not None and sequence == state.running.sequence:
         work.actions.append(AskOutcome(sequence, state.running.within_s))
     elif sequence <= journal.acknowledged:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from plc_interface.handshake.events import Inputs, Moment
 from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
@@ -28,6 +28,16 @@ class Fault(StrEnum):
     COMMAND_BUSY = "the PLC gave a command while another was carried out: wait for command_done or command_failed"
 
 
+class Size(NamedTuple):
+    """The fruit's size as the PLC wrote it, by the registers' names; 0 where it gave none."""
+
+    fruit_length_mm_x10: int = 0
+    size_class: int = 0
+
+
+NO_SIZE = Size()
+
+
 @dataclass(frozen=True, slots=True)
 class Asked:
     """A trigger that the station has still to accept."""
@@ -36,6 +46,7 @@ class Asked:
     trigger_id: int
     encoder: int
     lot: str
+    size: Size
 
 
 COUNTERS = (
@@ -77,6 +88,8 @@ class State:
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
     unconfirmed: int = 0
     """The sequence taken by its number alone; the bit may still follow."""
+    size: Size = NO_SIZE
+    """What the writer wrote since the last trigger: a trigger uses it up, so that no fruit gets the one before's."""
     acknowledge_stuck: bool = False
     """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
     last_refusal: Refusal | None = None

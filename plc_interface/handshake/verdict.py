@@ -40,6 +40,8 @@ def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
         duration_ms=max(0, min(round(1000 * (at.s - running.began_s)), 2**32 - 1)),
         encoder=running.encoder,
         lot=running.lot,
+        fruit_length_mm_x10=running.fruit_length_mm_x10,
+        size_class=running.size_class,
     )
 
 

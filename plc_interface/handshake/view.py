@@ -137,6 +137,9 @@ def result_values(outcome: Outcome) -> dict[str, Value]:
         "result_encoder": outcome.encoder,
         "result_lot_checksum": lot_checksum(outcome.lot),
         "result_sequence_again": outcome.sequence,
+        "result_fruit_length_mm_x10": outcome.fruit_length_mm_x10,
+        "result_size_class": outcome.size_class,
+        "result_sequence_end": outcome.sequence,
     }
 
 
@@ -158,6 +161,9 @@ _NO_RESULT: dict[str, Value] = {
     "result_encoder": 0,
     "result_lot_checksum": 0,
     "result_sequence_again": 0,
+    "result_fruit_length_mm_x10": 0,
+    "result_size_class": 0,
+    "result_sequence_end": 0,
 }
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from plc_interface.handshake.actions import Action, Say
 from plc_interface.handshake.events import Event, Moment
 from plc_interface.handshake.modes import Mode, Signal
-from plc_interface.handshake.state import Fault, State
+from plc_interface.handshake.state import NO_SIZE, Fault, Size, State
 from station.channel.line import Outcome
 from station.settings.plc import HandshakeSettings
 
@@ -25,6 +25,8 @@ class Work:
     signals: deque[Signal] = field(default_factory=deque)
     found: Outcome | None = None
     """The outcome that the signal OUTCOME or FOREIGN_OUTCOME is about."""
+    size: Size = NO_SIZE
+    """What was given with the trigger that the signal TRIGGER_ON is about."""
 
     def keep(self, **changes: Any) -> None:
         """Change the journal; it is written before the PLC sees what follows from it."""

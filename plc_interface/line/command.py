@@ -60,6 +60,13 @@ _ENDING_S = 0.5
     show_default=True,
     help="Share of damaged fruit in the twin.",
 )
+@click.option(
+    "--grader/--no-grader",
+    "graded",
+    default=True,
+    show_default=True,
+    help="Whether the twin's fruit come with a length.",
+)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
 @click.option(
     "--fault",
@@ -79,6 +86,7 @@ def line(
     console_port: int | None,
     kinds: tuple[str, ...],
     damaged_share: float,
+    graded: bool,  # noqa: FBT001 (click passes arguments by name)
     seed: int,
     faults: tuple[str, ...],
     fault_every: int,
@@ -93,7 +101,7 @@ def line(
         raise BadInputError(f"--lot: expected at most 32 printable ASCII characters, got {lot!r}")
     nest: Nest = RealNest()
     if console_port is not None:
-        nest = TwinNest(console_port, _numbers(kinds, site.recipes_folder), damaged_share, seed)
+        nest = TwinNest(console_port, _numbers(kinds, site.recipes_folder), damaged_share, seed, graded=graded)
     elif kinds:
         raise BadInputError("--fruit: only the twin can lay fruit of a kind; give its console with --twin")
     program = LineProgram(FaultPlan([LineFault(fault) for fault in faults], fault_every), lot)

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 
 from station.errors import StationError
 
+GRADER_ERROR_MM = 1.0
+"""Largest error of a length; an estimate of what an optical sizer resolves on soft fruit, no source found."""
 _ANSWER_LIMIT_S = 5.0
 _LOOPBACK = "127.0.0.1"
 _SEEDS = 2**31
@@ -24,6 +26,27 @@ class LaidFruit:
     """The truth, None where nobody knows."""
     recipe: int
     """The number of its recipe; 0 for the active one."""
+    length_mm_x10: int = 0
+    """Its length as the grader measured it, tenths of a millimetre; 0 where none did."""
+
+
+class Grader:
+    """The grader upstream: measures the length of every fruit, with an error drawn evenly from its bounds.
+
+    Args:
+        seed: the same gives the same errors.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)  # noqa: S311 (a simulation)
+
+    def length_mm_x10(self, true_mm: float) -> int:
+        """A fruit's length as it tells the PLC, tenths of a millimetre.
+
+        Args:
+            true_mm: the fruit's length.
+        """
+        return round(10 * (true_mm + self._random.uniform(-GRADER_ERROR_MM, GRADER_ERROR_MM)))
 
 
 class Nest(Protocol):
@@ -57,9 +80,13 @@ class TwinNest:
         recipes: the recipe's number of each kind of fruit, which is drawn from at random.
         damaged_share: of the fruit, from 0 to 1.
         seed: the same gives the same fruits.
+        graded: whether a grader upstream tells their length.
     """
 
-    def __init__(self, console_port: int, recipes: Mapping[str, int], damaged_share: float, seed: int) -> None:
+    def __init__(
+        self, console_port: int, recipes: Mapping[str, int], damaged_share: float, seed: int, *, graded: bool = True
+    ) -> None:
+        self._grader = Grader(seed) if graded else None
         self._port, self._recipes, self._damaged_share = console_port, dict(recipes), damaged_share
         self._random = random.Random(seed)  # noqa: S311 (a simulation)
 
@@ -73,7 +100,10 @@ class TwinNest:
         damaged = self._random.random() < self._damaged_share
         seed = self._random.randrange(_SEEDS)
         await self._ask({"do": "fruit", "kind": kind, "seed": seed, "bruised": damaged})
-        return LaidFruit(kind, damaged, self._recipes[kind])
+        graded = 0
+        if self._grader is not None:
+            graded = self._grader.length_mm_x10((await self._ask({"do": "state"}))["fruit_length_mm"])
+        return LaidFruit(kind, damaged, self._recipes[kind], graded)
 
     async def leave(self) -> None:
         """Empty the nest.
@@ -83,7 +113,7 @@ class TwinNest:
         """
         await self._ask({"do": "remove"})
 
-    async def _ask(self, request: dict[str, Any]) -> None:
+    async def _ask(self, request: dict[str, Any]) -> Any:
         try:
             async with asyncio.timeout(_ANSWER_LIMIT_S):
                 reader, writer = await asyncio.open_connection(_LOOPBACK, self._port)
@@ -99,3 +129,4 @@ class TwinNest:
             ) from error
         if not answer.get("ok"):
             raise StationError(f"the twin refused {request['do']}: {answer.get('error')}")
+        return answer["result"]

@@ -73,6 +73,8 @@ class Passage:
     confidence_pct: int | None
     cycle_s: float
     """From the trigger to what decided."""
+    fruit_length_mm_x10: int
+    """The size that the result was found with, as it says itself; 0 for none."""
     fault: LineFault | None
     """What the PLC itself did wrong meanwhile."""
 
@@ -148,7 +150,14 @@ class LineProgram:
         return passages
 
     def scan(
-        self, inputs: Values | None, now_s: float, *, fruit_in_nest: bool, recipe: int = 0, encoder: int = 0
+        self,
+        inputs: Values | None,
+        now_s: float,
+        *,
+        fruit_in_nest: bool,
+        recipe: int = 0,
+        encoder: int = 0,
+        fruit_length_mm_x10: int = 0,
     ) -> Outputs:
         """One scan.
 
@@ -158,6 +167,7 @@ class LineProgram:
             fruit_in_nest: a fruit lies in the nest and has not been decided yet.
             recipe: the number of the fruit's recipe; 0 to take the active one.
             encoder: the line's count.
+            fruit_length_mm_x10: of the fruit in the nest, as a grader upstream measured it; 0 where none did.
 
         Returns:
             The control block to write.
@@ -169,7 +179,7 @@ class LineProgram:
             self._lose(now_s)
         else:
             self._step(inputs, now_s, recipe if fruit_in_nest else None)
-        return self._outputs(now_s, encoder)
+        return self._outputs(now_s, encoder, fruit_length_mm_x10)
 
     def _alive(self, inputs: Values, now_s: float) -> bool:
         if inputs["station_heartbeat"] != self._station_heartbeat or self._heard_s is None:
@@ -303,7 +313,7 @@ class LineProgram:
     def _take(self, inputs: Values, now_s: float) -> None:
         """Use the result if it is the fruit's own, and acknowledge it in any case."""
         sequence = int(inputs["result_sequence"])
-        if not sequence or sequence != inputs["result_sequence_again"]:
+        if not sequence or not sequence == inputs["result_sequence_again"] == inputs["result_sequence_end"]:
             return
         fruit = self._fruit
         if sequence == self._closed:
@@ -358,6 +368,7 @@ class LineProgram:
                 closing_mm=None if closing is None else closing / 100,
                 confidence_pct=None if confidence is None else int(confidence),
                 cycle_s=now_s - fruit.since_s,
+                fruit_length_mm_x10=int(inputs["result_fruit_length_mm_x10"]) if inputs else 0,
                 fault=fruit.fault,
             )
         )
@@ -365,7 +376,7 @@ class LineProgram:
     def _go(self, stage: Stage, now_s: float) -> None:
         self.stage, self._since_s = stage, now_s
 
-    def _outputs(self, now_s: float, encoder: int) -> Outputs:
+    def _outputs(self, now_s: float, encoder: int, fruit_length_mm_x10: int) -> Outputs:
         if not self._frozen(now_s):
             self._heartbeat = (self._heartbeat + 1) % 2**16
         fruit, armed = self._fruit, self.stage is not Stage.CLAIMING
@@ -390,6 +401,8 @@ class LineProgram:
             "encoder": encoder,
             "lot": self._lot,
             "write_key": WRITE_KEY,
+            "fruit_length_mm_x10": fruit_length_mm_x10 if self.stage is Stage.TRIGGERING else 0,
+            "size_class": 0,
         }
 
     def _acknowledged_sequence(self, now_s: float) -> int:

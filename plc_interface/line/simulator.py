@@ -82,8 +82,14 @@ class LineSimulator:
                 fruit = await self._nest.arrive()
                 next_arrival_s = now_s + self._pace.every_s
             encoder = int(now_s * self._pace.encoder_counts_per_s) % 2**32
-            recipe = fruit.recipe if fruit else 0
-            outputs = self._program.scan(inputs, now_s, fruit_in_nest=fruit is not None, recipe=recipe, encoder=encoder)
+            outputs = self._program.scan(
+                inputs,
+                now_s,
+                fruit_in_nest=fruit is not None,
+                recipe=fruit.recipe if fruit else 0,
+                encoder=encoder,
+                fruit_length_mm_x10=fruit.length_mm_x10 if fruit else 0,
+            )
             if self._program.cut_wanted:
                 self._scanner.cut()
             inputs = await self._scanner.exchange(outputs)

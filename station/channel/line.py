@@ -59,6 +59,10 @@ class Outcome(Message):
     encoder: int = Field(ge=0, lt=2**32)
     """The line's encoder at the trigger, as given with `Begin`."""
     lot: str = Field(max_length=32)
+    fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
+    """The fruit's length as given with `Begin`; 0 where none was, and in outcomes of versions without it."""
+    size_class: int = Field(default=0, ge=0, le=65_535)
+    """Likewise."""
 
 
 class Begin(Message):
@@ -68,6 +72,10 @@ class Begin(Message):
     trigger_id: int = Field(ge=1, le=65_535)
     encoder: int = Field(ge=0, lt=2**32)
     lot: str = Field(max_length=32)
+    fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
+    """Length from stem to tip, tenths of a millimetre, as the line's grader measured it; 0 where none is given."""
+    size_class: int = Field(default=0, ge=0, le=65_535)
+    """The grader's; 0 where none is given."""
 
 
 class Begun(Message):

@@ -132,6 +132,9 @@ class InspectionTold(Message):
     images_state: str
     published_utc_ms: int | None
     acknowledged_utc_ms: int | None
+    fruit_length_mm: float | None = None
+    """As the PLC gave it with the trigger; None where it did not."""
+    size_class: int | None = None
 
 
 class GetImage(Message):

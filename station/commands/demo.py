@@ -44,6 +44,7 @@ _PATIENCE = {"stale_after_s": 0.5, "link_lost_after_s": 2.0}
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
 @click.option("--damaged", type=click.FloatRange(0, 1), default=0.25, show_default=True, help="Share of damaged fruit.")
 @click.option("--console", default=49211, show_default=True, type=click.IntRange(1, 65535), help="The twin's console.")
+@click.option("--grader/--no-grader", "graded", default=True, help="Whether the PLC sends each fruit's length.")
 @click.option("--faults", is_flag=True, help=f"The PLC does something wrong at every {_FAULT_EVERY}th fruit.")
 def demo(
     fruits: tuple[str, ...],
@@ -52,6 +53,7 @@ def demo(
     seed: int,
     damaged: float,
     console: int,
+    graded: bool,  # noqa: FBT001 (click passes arguments by name)
     faults: bool,  # noqa: FBT001
 ) -> None:
     """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
@@ -66,7 +68,7 @@ def demo(
     site = load_configuration()
     _refuse_real_devices(site)
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
-    nest = TwinNest(console, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed)
+    nest = TwinNest(console, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed, graded=graded)
     plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
     pace = Pace(every_s=60 / speed if speed else 0.0)
     supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])

@@ -165,7 +165,7 @@ class _Case:
 
     def __init__(self, press: Press, recipe: Recipe) -> None:
         self.press = press
-        self.limits = sized_limits(press.size, recipe)
+        self.limits = sized_limits(press, recipe)
         self.evidence = Evidence(press, self.limits)
         self.nothing = press.onset_mm is None
         self.void = [*_void(press, self.limits)]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 
 from station.inspection.fruit_size import FruitSize
+from station.inspection.press import Press
 from station.settings.damage import SizeClass, SizeOfFruit
 from station.settings.recipe_model import Recipe
 
@@ -29,20 +30,20 @@ class SizedLimits:
     """Why the limits for this fruit are not known, a sentence; empty where they are."""
 
 
-def sized_limits(size: FruitSize, recipe: Recipe) -> SizedLimits:
-    """The limits for a fruit of this size.
+def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
+    """The limits for the fruit of a press.
 
     Only a size that is missing may be replaced by the recipe's fallback. One that cannot be is a fault of the line or
     another fruit's, and then nothing that is known of this fruit's size is true.
 
     Args:
-        size: as the PLC wrote it.
+        press: with the size as the PLC wrote it, and the width at which the gripper met the fruit.
         recipe: with limits for a fruit of the reference size.
     """
-    rule = recipe.damage.size
+    rule, size = recipe.damage.size, press.size
     if rule is None:
         return SizedLimits(recipe)
-    if problem := _problem(size, rule, recipe.title):
+    if problem := _problem(size, rule, recipe.title) or _another_fruits(size, rule, press.onset_mm):
         return SizedLimits(recipe, problem=problem)
     told = _length(size, rule)
     if told is not None:
@@ -90,6 +91,27 @@ def _problem(size: FruitSize, rule: SizeOfFruit, title: str) -> str:
             f"{known.smallest_mm:g} to {known.largest_mm:g} mm: they contradict each other."
         )
     return ""
+
+
+def _another_fruits(size: FruitSize, rule: SizeOfFruit, width_mm: float | None) -> str:
+    """Why a size does not fit the width that the gripper measured; empty where it does, and where nothing is known.
+
+    A line whose sizes have slipped by one fruit writes lengths that are all possible by themselves.
+    """
+    ratio, known = rule.expected_ratio, _class(size, rule)
+    if ratio is None or width_mm is None:
+        return ""
+    if size.length_mm is not None:
+        shortest_mm = longest_mm = size.length_mm
+        told = f"a length of {size.length_mm:.1f} mm"
+    elif known is not None:
+        shortest_mm, longest_mm = known.smallest_mm, known.largest_mm
+        told = f"the size class {known.number}"
+    else:
+        return ""
+    if longest_mm >= ratio.smallest * width_mm and shortest_mm <= ratio.largest * width_mm:
+        return ""
+    return f"The PLC gave {told}, and the fruit is {width_mm:.1f} mm wide: that is another fruit's size."
 
 
 def _scaled(recipe: Recipe, factor: float) -> Recipe:

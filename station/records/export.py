@@ -64,6 +64,13 @@ COLUMNS = (
         _LIST.format("changed_area_mm2", "curve_points", "step"),
         "of each step: how much of the image has changed",
     ),
+    Column(
+        "fruit_length_mm",
+        pa.float64(),
+        "nullif(i.fruit_length_mm_x10, 0) / 10.0",
+        "as the PLC gave it with the trigger; empty where it did not",
+    ),
+    Column("size_class", pa.int64(), "nullif(i.size_class, 0)", "likewise"),
 )
 """A list is JSON text in CSV."""
 SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])

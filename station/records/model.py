@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from station.channel.line import Outcome, OutcomeName
+from station.inspection.fruit_size import FruitSize
 
 ImageKind = Literal["reference", "step", "mask"]
 
@@ -59,6 +60,15 @@ class Trigger:
     began_utc_ms: int
     recipe: RecipeSnapshot | None
     simulated: bool
+    fruit_length_mm_x10: int = 0
+    """As the PLC wrote it, tenths of a millimetre, possible or not; 0 where it gave none, and in older records."""
+    size_class: int = 0
+    """Likewise."""
+
+    @property
+    def size(self) -> FruitSize:
+        """The same in mm; None for what was not given."""
+        return FruitSize(self.fruit_length_mm_x10 / 10 or None, self.size_class or None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,7 +100,14 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
     return FullRecord(
         sequence=sequence,
         trigger=Trigger(
-            row.trigger_id, row.encoder, row.lot, row.began_utc_ms, _recipe(connection, row), row.simulated
+            row.trigger_id,
+            row.encoder,
+            row.lot,
+            row.began_utc_ms,
+            _recipe(connection, row),
+            row.simulated,
+            row.fruit_length_mm_x10,
+            row.size_class,
         ),
         boot=row.boot,
         judged=_judged(connection, row),

@@ -8,7 +8,7 @@ from typing import Any
 from station.channel.line import Outcome
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.reading import Summary
-from station.records.wording import printable, sentence, sparkline
+from station.records.wording import printable, sentence, size_sentence, sparkline
 
 
 def described(record: FullRecord) -> str:
@@ -57,6 +57,7 @@ def _described(record: FullRecord) -> Iterator[str]:
     yield _field("begun", f"{_time(trigger.began_utc_ms)} UTC{ended}")
     if trigger.simulated:
         yield _field("simulated", "a twin's device took part")
+    yield _field("size", size_sentence(trigger.size))
     yield from _why(judged, standing)
     yield _field("told the PLC", _told(record))
     if trigger.recipe:

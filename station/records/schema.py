@@ -71,6 +71,8 @@ inspections = Table(
     Column("standing", Text),
     Column("published_utc_ms", Integer),
     Column("acknowledged_utc_ms", Integer),
+    Column("fruit_length_mm_x10", Integer, nullable=False, server_default="0"),
+    Column("size_class", Integer, nullable=False, server_default="0"),
     CheckConstraint("judged IN ('PASS', 'FAIL', 'NO_RESULT')", name="judged"),
     CheckConstraint("outcome IN ('PASS', 'FAIL', 'NO_RESULT')", name="outcome"),
     CheckConstraint("published_utc_ms IS NULL OR outcome IS NOT NULL", name="published"),

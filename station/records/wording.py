@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from station.channel.line import Reason
+from station.inspection.fruit_size import FruitSize
 
 _BARS = "▁▂▃▄▅▆▇█"
 
@@ -27,6 +28,8 @@ SENTENCES: dict[Reason, str] = {
     Reason.RECORDS_FAULT: "the records could not be written",
     Reason.STATION_LOST: "the station was lost or restarted before the outcome was surely the PLC's",
     Reason.INTERNAL_FAULT: "the program had a fault of its own; see the log",
+    Reason.NEAR_LIMIT: "the contact area or its growth is nearer to a limit than the measurement is certain",
+    Reason.SIZE_UNKNOWN: "the recipe needs the fruit's size, and the PLC gave none that can be true",
 }
 
 
@@ -47,6 +50,18 @@ def sentence(reason: str) -> str:
         reason: its name.
     """
     return SENTENCES[Reason(reason)] if reason in set(Reason) else reason
+
+
+def size_sentence(size: FruitSize) -> str:
+    """The fruit's size as the PLC gave it, or that it gave none.
+
+    Args:
+        size: as the trigger has it.
+    """
+    length = [] if size.length_mm is None else [f"fruit length {size.length_mm:.1f} mm"]
+    named = [] if size.size_class is None else [f"class {size.size_class}"]
+    given = ", ".join([*length, *named])
+    return f"{given} (given by the PLC)" if given else "not given by the PLC"
 
 
 def printable(text: str) -> str:

@@ -61,6 +61,8 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
         "recipe_checksum": recipe.checksum if recipe else 0,
         "simulated": trigger.simulated,
         "began_utc_ms": trigger.began_utc_ms,
+        "fruit_length_mm_x10": trigger.fruit_length_mm_x10,
+        "size_class": trigger.size_class,
     }
     _lost(begun)
     sha256 = recipe.sha256 if recipe else None
@@ -285,6 +287,8 @@ def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
         "recipe_checksum",
         "simulated",
         "began_utc_ms",
+        "fruit_length_mm_x10",
+        "size_class",
     )
     try:
         return Outcome(**{name: begun[name] for name in columns}, **ended)
@@ -307,6 +311,8 @@ def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
             began_utc_ms=outcome.began_utc_ms,
             ended_utc_ms=outcome.ended_utc_ms,
             duration_ms=outcome.duration_ms,
+            fruit_length_mm_x10=outcome.fruit_length_mm_x10,
+            size_class=outcome.size_class,
             images_state="none: known by its outcome alone",
         )
     )

@@ -83,13 +83,13 @@ class Inspection:
         """What was measured so far, for the judge."""
         onset_mm = self.onset_mm
         if onset_mm is None:
-            return Press(None, 0.0, (), tuple(self.interruptions))
+            return Press(None, 0.0, (), tuple(self.interruptions), self.trigger.size)
         untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
         if self.before_onset_mm is not None:
             untouched.append(self.before_onset_mm)
         sooner_mm = min(untouched) - onset_mm if untouched else 0.0
         points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
-        return Press(onset_mm, sooner_mm, points, tuple(self.interruptions))
+        return Press(onset_mm, sooner_mm, points, tuple(self.interruptions), self.trigger.size)
 
     def record(self) -> InspectionRecord:
         """What is to be made durable."""

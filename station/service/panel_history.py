@@ -222,6 +222,8 @@ def _told(record: FullRecord) -> InspectionTold:
         images_state=record.images_state,
         published_utc_ms=record.published_utc_ms,
         acknowledged_utc_ms=record.acknowledged_utc_ms,
+        fruit_length_mm=trigger.size.length_mm,
+        size_class=trigger.size.size_class,
     )
 
 

@@ -112,6 +112,8 @@ class Service:
                 utc_ms(),
                 self.active.snapshot,
                 self._crew.simulated,
+                request.fruit_length_mm_x10,
+                request.size_class,
             )
             limits = self.pacing.limits(self.active.recipe)
             now = Inspection(trigger, self.active, limits, *self._calibrated.in_force)

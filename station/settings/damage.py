@@ -63,6 +63,21 @@ class LengthRange(Settings):
         return self
 
 
+class RatioRange(Settings):
+    """How long fruit are for their width."""
+
+    smallest: float = setting(title="Smallest", description="No fruit is shorter for its width.", gt=0.0, le=10.0)
+    largest: float = setting(title="Largest", description="No fruit is longer for its width.", gt=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.smallest >= self.largest:
+            raise Contradiction(
+                [(("smallest",), f"expected less than largest, {self.largest:g}, got {self.smallest:g}")]
+            )
+        return self
+
+
 class SizeClass(LengthRange):
     """One of the grader's size classes."""
 
@@ -96,6 +111,12 @@ class SizeOfFruit(Settings):
     )
     expected_length: LengthRange = setting(
         title="Expected length", description="A length outside is not believed: no result."
+    )
+    expected_ratio: RatioRange | None = setting(
+        None,
+        title="Expected length over width",
+        description="A length outside, of the width at which the gripper met the fruit, is another fruit's: no result. "
+        "Null: not looked at.",
     )
     uncertainty_mm: float = setting(
         title="Uncertainty of the length",

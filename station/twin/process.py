@@ -174,6 +174,7 @@ class Twin:
         squeezed = self.world.squeezed()
         return {
             "fruit_width_mm": self.world.fruit.width_mm if self.world.fruit else None,
+            "fruit_length_mm": self.world.fruit.length_mm if self.world.fruit else None,
             "width_mm": self.world.width_mm(self.world.opening_mm()),
             "closing_mm": max(0.0, squeezed.closing_mm),
             "force_n": squeezed.force_n,

@@ -54,7 +54,7 @@ def area_most_mm2(press: Press, recipe: Recipe, closing_mm: float) -> float | No
         recipe: that it was pressed by.
         closing_mm: where.
     """
-    limits = sized_limits(press.size, recipe)
+    limits = sized_limits(press, recipe)
     area = Evidence(press, limits).area_at(closing_mm)
     return None if area is None or limits.problem else sum(area) / limits.factor
 
@@ -68,7 +68,7 @@ def growth_most_mm2_per_mm(press: Press, recipe: Recipe) -> float | None:
         press: as stored.
         recipe: that it was pressed by.
     """
-    limits = sized_limits(press.size, recipe)
+    limits = sized_limits(press, recipe)
     growths = [] if limits.problem else [growth for growth in Evidence(press, limits).growths if not growth.few]
     return max((growth.most_mm2_per_mm / limits.factor for growth in growths), default=None)
 

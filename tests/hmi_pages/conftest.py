@@ -159,7 +159,8 @@ class Site:
         eventually(self.ready)
 
         async def steps(client: ChannelClient) -> Outcome:
-            request = Begin(trigger_id=next(self._triggers), encoder=7, lot="LOT 1")
+            size = {"fruit_length_mm_x10": 480, "size_class": 3} if bruised else {}
+            request = Begin(trigger_id=next(self._triggers), encoder=7, lot="LOT 1", **size)
             begun = await client.ask(request, Begun, deadline_s=20)
             assert begun.sequence is not None, begun
             outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)

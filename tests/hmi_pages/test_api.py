@@ -68,6 +68,9 @@ def test_results_are_found_by_their_reason_and_told_whole(orchard: Any, api: Any
     assert whole["reasons"] == [str(reason) for reason in soft.reasons]
     assert len(whole["curve"]) >= 3
     assert whole["recipe"] == "strawberry"
+    assert (whole["fruit_length_mm"], whole["size_class"]) == (48.0, 3)
+    sound = api("GET", f"/api/v1/inspections/{orchard.fruit[0].sequence}", token=reading).body
+    assert (sound["fruit_length_mm"], sound["size_class"]) == (None, None)
 
 
 def test_pages_of_results_neither_overlap_nor_leave_out(orchard: Any, api: Any, reading: str) -> None:

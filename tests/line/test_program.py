@@ -23,7 +23,7 @@ class Station:
         self.bits = {"online", "trigger_ready"}
         self.results, self.up, self.accepted = [], frozenset(), []
         self.alive, self.refuses, self.answers, self.acknowledged = True, "", True, []
-        self.measures = True
+        self.measures, self.length = True, 0
 
     def scan(self, outputs):
         up = BY_NAME["control"].names(outputs["control"])
@@ -38,7 +38,7 @@ class Station:
             self.values["command_sequence_echo"] = outputs["command_sequence"]
             self.values["command_result"] = BY_NAME["command_result"].code("done")
         if "trigger" in rising and self.answers:
-            self.answer(outputs["trigger_id"])
+            self.answer(outputs["trigger_id"], outputs["fruit_length_mm_x10"])
         if "trigger" not in up:
             self.bits.discard("trigger_acknowledged")
         if outputs["acknowledged_sequence"] == self.values["result_sequence"] != 0:
@@ -52,7 +52,8 @@ class Station:
         self.values["status"] = BY_NAME["status"].flags(self.bits)
         return dict(self.values)
 
-    def answer(self, trigger_id):
+    def answer(self, trigger_id, length):
+        self.length = length
         self.bits |= {"trigger_acknowledged"}
         if self.refuses or trigger_id == self.values["accepted_trigger_id"]:
             self.values["last_refused_trigger_id"] = trigger_id
@@ -66,7 +67,9 @@ class Station:
         self.results.append((self.next_sequence, trigger_id))
 
     def show(self, sequence, trigger_id):
-        self.values |= {"result_sequence": sequence, "result_sequence_again": sequence}
+        copies = ("result_sequence", "result_sequence_again", "result_sequence_end")
+        self.values |= dict.fromkeys(copies, sequence)
+        self.values["result_fruit_length_mm_x10"] = self.length if sequence else 0
         self.values["result_trigger_id"] = trigger_id
         self.values["result_outcome"] = BY_NAME["result_outcome"].code(self.outcome if sequence else "none")
         self.values["result_area_mm2"] = 12.5 if sequence else math.nan
@@ -78,12 +81,14 @@ class Line:
         self.station, self.program = station, LineProgram(FaultPlan(faults, every=1), lot)
         self.now_s, self.fruit, self.passages, self.cuts = 0.0, False, [], 0
         self.inputs: Any = None
-        self.recipe, self.connected = 0, True
+        self.recipe, self.length, self.connected = 0, 0, True
         self.outputs: dict[str, Any] = {}
 
     def scan(self):
         self.now_s += SCAN_S
-        self.outputs = self.program.scan(self.inputs, self.now_s, fruit_in_nest=self.fruit, recipe=self.recipe)
+        self.outputs = self.program.scan(
+            self.inputs, self.now_s, fruit_in_nest=self.fruit, recipe=self.recipe, fruit_length_mm_x10=self.length
+        )
         self.cuts += self.program.cut_wanted
         self.inputs = self.station.scan(self.outputs) if self.connected else None
         decided = self.program.take_passages()
@@ -136,17 +141,27 @@ def test_results_of_an_earlier_run_are_taken_away_and_decide_nothing():
     assert station.acknowledged[:2] == [7, 8]
 
 
-def test_a_result_with_two_different_sequences_is_torn_and_not_used():
+@pytest.mark.parametrize("copy", ["result_sequence_again", "result_sequence_end"])
+def test_a_result_with_two_different_sequences_is_torn_and_not_used(copy):
     station = Station()
     line = Line(station)
     line.until(lambda: line.program.free)
     line.fruit = True
     line.until(lambda: station.values["result_sequence"] == 41)
-    line.inputs = line.inputs | {"result_sequence_again": 40}
+    line.inputs = line.inputs | {copy: 40}
     line.scan()
     assert line.passages == []
     line.until(lambda: line.passages)
     assert line.passages[0].sequence == 41
+
+
+def test_the_size_is_sent_with_its_own_fruit_alone_and_read_back_with_the_result():
+    line = Line(Station())
+    line.length = 483
+    assert line.inspect().fruit_length_mm_x10 == 483
+    assert line.outputs["fruit_length_mm_x10"] == 0, "it would be the next fruit's"
+    line.length = 0
+    assert line.inspect().fruit_length_mm_x10 == 0
 
 
 def test_a_refused_fruit_is_diverted_with_the_reason_and_the_next_one_is_tried():

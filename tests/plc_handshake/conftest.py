@@ -127,6 +127,8 @@ class ScriptedStation:
             "duration_ms": 900,
             "encoder": begin.encoder,
             "lot": begin.lot,
+            "fruit_length_mm_x10": begin.fruit_length_mm_x10,
+            "size_class": begin.size_class,
         }
         self.outcomes[sequence] = Outcome.model_validate(values | changes)
         return self.outcomes[sequence]

@@ -51,6 +51,8 @@ class Rig:
         self.commands: list[tuple[str, int]] = []
         self.begun: list[tuple[int, int, str]] = []
         """Trigger id, encoder and lot of every inspection."""
+        self.sizes: list[tuple[int, int]] = []
+        """Length and class of every inspection."""
         self.image = RegisterImage(order)
         self.settings = HandshakeSettings()
         self.state = restarted(Journal(), now(), self.settings.station_lost_after_s)
@@ -100,6 +102,7 @@ class Rig:
                 begun = Begun(refusal=self.refusal)
                 if self.refusal is None:
                     self.begun.append((action.trigger_id, action.encoder, action.lot))
+                    self.sizes.append((action.fruit_length_mm_x10, action.size_class))
                     begun = Begun(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
                 self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, begun))
             case actions.AskOutcome():
@@ -117,11 +120,13 @@ class Rig:
 
     def _made(self, sequence: int) -> Outcome:
         trigger_id, encoder, lot = self.begun[sequence - self.first_sequence]
+        length, size_class = self.sizes[sequence - self.first_sequence]
         made: dict[str, Any] = {
             "sequence": sequence, "trigger_id": trigger_id, "outcome": "PASS", "reasons": (), "late": False,
             "partial": False, "simulated": True, "area_mm2": 12.34, "area_px": 70_001, "closing_mm": 0.75,
             "confidence": 0.87, "recipe_number": 3, "recipe_checksum": 0xCAFE, "began_utc_ms": 1, "ended_utc_ms": 2**40,
             "duration_ms": 100_000, "encoder": encoder, "lot": lot,
+            "fruit_length_mm_x10": length, "size_class": size_class,
         }  # fmt: skip
         return Outcome(**{**made, **self.outcome})
 

@@ -44,6 +44,22 @@ def test_an_inspection_in_either_word_order(serve, order):
     assert (counters["count_accepted"], counters["count_pass"]) == (1, 1)
 
 
+def test_a_size_goes_with_its_fruit_and_comes_back_with_its_result(serve):
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            await client.arm()
+            sized = await client.inspect(7, fruit_length_mm=48.04, size_class=3)
+            unsized = await client.inspect(8)
+            with pytest.raises(RegisterValueError, match="fruit_length_mm_x10"):
+                await client.inspect(9, fruit_length_mm=7000.0)
+            return rig.sizes, sized, unsized
+
+    sizes, sized, unsized = asyncio.run(main())
+    assert sizes == [(480, 3), (0, 0)]
+    assert (sized.fruit_length_mm, sized.size_class) == (48.0, 3)
+    assert (unsized.fruit_length_mm, unsized.size_class) == (None, None)
+
+
 def test_what_is_not_measured_is_none_and_does_not_pass(serve, no_contact):
     async def main():
         async with serve() as rig, StationClient(HOST, rig.port) as client:
@@ -292,14 +308,13 @@ def test_a_result_of_another_fruit_is_never_returned(serve):
     assert asyncio.run(main()) == 8
 
 
-def test_a_torn_result_is_never_returned(serve):
+@pytest.mark.parametrize("copy", ["result_sequence_again", "result_sequence_end"])
+def test_a_torn_result_is_never_returned(serve, copy):
     async def main():
         async with serve() as rig, StationClient(HOST, rig.port) as client:
             await client.arm()
             commit = rig.image.commit
-            rig.image.commit = lambda values: commit(
-                {**values, "result_sequence_again": 3} if values.get("result_sequence_again") else values
-            )
+            rig.image.commit = lambda values: commit({**values, copy: 3} if values.get(copy) else values)
             with pytest.raises(DeadlineMissedError):
                 await client.inspect(7, deadline_s=1.0)
 

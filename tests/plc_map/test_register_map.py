@@ -40,8 +40,23 @@ def test_only_the_control_block_can_be_written():
 
 def test_the_result_begins_and_ends_with_its_sequence():
     result = GROUP_BY_NAME["result"].registers
-    assert (result[0].name, result[-1].name) == ("result_sequence", "result_sequence_again")
+    assert (result[0].name, result[-1].name) == ("result_sequence", "result_sequence_end")
     assert result[0].kind is result[-1].kind is Kind.U32
+
+
+def test_what_programs_of_version_1_read_and_write_stays_where_it_was():
+    """Blocks have no gap, so that the first and the last of the registers first published hold those between."""
+    assert register_map.MAP_VERSION == 1
+    published = {
+        "control": (0, "write_key", 26),
+        "status": (100, "station_boots", 127),
+        "result": (128, "result_sequence_again", 156),
+        "counters": (200, "counters_reset_utc_ms", 224),
+        "identity": (240, "station_heartbeat_ms", 270),
+    }
+    for name, (begin, last, address) in published.items():
+        group = GROUP_BY_NAME[name]
+        assert (group.address, BY_NAME[last].address) == (begin, address)
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)

@@ -119,7 +119,7 @@ def unmapped(source: random.Random) -> Malformed:
 
 
 def read_only(source: random.Random) -> Malformed:
-    return Malformed("read only", _frame(source, struct.pack(">BHH", 6, source.randint(100, 157), 1)), 2)
+    return Malformed("read only", _frame(source, struct.pack(">BHH", 6, source.randint(100, 161), 1)), 2)
 
 
 def half_written(source: random.Random) -> Malformed:
@@ -256,12 +256,12 @@ def test_tshark_finds_nothing_malformed_in_the_answers(serving, connect, tmp_pat
     good = [
         GOOD,
         struct.pack(">BHH", 1, 0, 9),
-        struct.pack(">BHH", 4, 100, 58),
+        struct.pack(">BHH", 4, 100, 62),
         struct.pack(">BHH", 6, 26, 0x5AFE),
         struct.pack(">BHHBBB", 15, 0, 9, 2, 1, 0),
         struct.pack(">BHHBHH", 16, 0, 2, 4, 1, 9),
         struct.pack(">BHHH", 22, 0, 0xFFFF, 0),
-        struct.pack(">BHHHHBH", 23, 100, 58, 1, 1, 2, 9),
+        struct.pack(">BHHHHBH", 23, 100, 62, 1, 1, 2, 9),
         bytes([43, 14, 2, 0]),
     ]
     for message in good:

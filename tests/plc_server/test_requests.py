@@ -6,10 +6,10 @@ import pytest
 
 from plc_interface.modbus.exceptions import ExceptionCode, Trouble
 from plc_interface.register import Access, Kind
-from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_map import BY_NAME, REGISTERS, bit_address
 
 CONTROL, TRIGGER_ID, KEY = (BY_NAME[name].address for name in ("control", "trigger_id", "write_key"))
+BLOCK_END = BY_NAME["size_class"].end
 UNMAPPED = 60
 LAST = REGISTERS[-1].end
 
@@ -139,7 +139,7 @@ BAD = {
     "124 registers": (struct.pack(">BHHB123H", 16, 0, 124, 246, *[0] * 123), 3),
     "a head without registers": (bytes([16, 0, 0]), 3),
     "an unmapped register written": (struct.pack(">BHH", 6, UNMAPPED, 1), 2),
-    "a write that runs off the block": (struct.pack(">BHHBHH", 16, KEY, 2, 4, WRITE_KEY, 0), 2),
+    "a write that runs off the block": (struct.pack(">BHHBHH", 16, BLOCK_END - 1, 2, 4, 0, 0), 2),
     "flags without a meaning": (struct.pack(">BHH", 6, CONTROL, 0x8000), 3),
     "no such command": (struct.pack(">BHH", 6, BY_NAME["command_code"].address, 99), 3),
     "no such key": (struct.pack(">BHH", 6, KEY, 1), 3),
@@ -156,7 +156,7 @@ HEADINGS = {1: Trouble.ILLEGAL_FUNCTION, 2: Trouble.ILLEGAL_ADDRESS, 3: Trouble.
 class TestBadRequests:
     def refused(self, serving, plc, caplog, request, code, unit=1, heading=None):
         """The exception, its count, its line in the log with the peer, and nothing written."""
-        troubles, before = serving.server.statistics.troubles, serving.call(serving.image.registers, 0, 27)
+        troubles, before = serving.server.statistics.troubles, serving.call(serving.image.registers, 0, BLOCK_END)
         heading = heading or HEADINGS[code]
         count, lines = troubles[heading], len(caplog.records)
         assert plc.ask(request, unit) == bytes([request[0] | 0x80, code])
@@ -165,7 +165,7 @@ class TestBadRequests:
         assert len(written) == 1
         peer = "{}:{}".format(*plc.socket.getsockname())
         assert written[0].getMessage().startswith(f"{peer}: function {request[0]} answered with exception {code:02}: ")
-        assert serving.call(serving.image.registers, 0, 27) == before
+        assert serving.call(serving.image.registers, 0, BLOCK_END) == before
         assert not serving.writes
 
     @pytest.mark.parametrize(("request_", "code"), BAD.values(), ids=BAD)

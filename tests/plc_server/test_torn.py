@@ -6,7 +6,9 @@ from plc_interface.register_map import BY_NAME
 
 READS = 10_000
 BLOCK = BY_NAME["result_sequence"].address
-BEHIND = BY_NAME["result_sequence_again"].end
+BEHIND = BY_NAME["result_sequence_end"].end
+AGAIN = BY_NAME["result_sequence_again"].address - BLOCK
+SIZE = BY_NAME["result_fruit_length_mm_x10"].address - BLOCK
 AREA = BY_NAME["result_area_mm2"].address - BLOCK
 
 
@@ -19,6 +21,9 @@ def result(sequence):
         "result_ended_utc_ms": sequence << 20,
         "result_duration_ms": sequence,
         "result_sequence_again": sequence,
+        "result_fruit_length_mm_x10": sequence % 65_536,
+        "result_size_class": sequence % 65_536,
+        "result_sequence_end": sequence,
     }
 
 
@@ -44,8 +49,10 @@ def test_no_read_of_ten_thousand_is_torn_while_results_change(serve, connect):
                 block = plc.receive()[2][2:]
                 first, trigger_id = struct.unpack_from(">IH", block, 0)
                 (area,) = struct.unpack_from(">f", block, 2 * AREA)
-                (last,) = struct.unpack_from(">I", block, len(block) - 4)
-                assert (first, first % 65_536, float(first)) == (last, trigger_id, area)
+                (again,) = struct.unpack_from(">I", block, 2 * AGAIN)
+                length, size_class, last = struct.unpack_from(">HHI", block, 2 * SIZE)
+                assert (first, first, float(first)) == (again, last, area)
+                assert first % 65_536 == trigger_id == length == size_class
                 seen.add(first)
     finally:
         serving.call(serving.again.cancel)

@@ -113,7 +113,8 @@ def _told(sequence: int) -> Outcome:
 def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger, passed, failed):
     async def steps():
         async with opened() as records:
-            running, judged, told, taken = [await records.begin(trigger) for _ in range(4)]
+            sized = replace(trigger, fruit_length_mm_x10=483, size_class=3)
+            running, judged, told, taken = [await records.begin(sized) for _ in range(4)]
             await records.conclude(judged, passed)
             for sequence in (told, taken):
                 await records.published(await records.conclude(sequence, failed))
@@ -123,6 +124,7 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
         async with opened() as records:
             assert records.lost == (running, judged)
             was_open = await records.open_inspections()
+            assert {(each.fruit_length_mm_x10, each.size_class) for each in was_open.ended} == {(483, 3)}
             assert was_open.running == ()
             assert [(outcome.sequence, outcome.outcome) for outcome in was_open.ended] == [
                 (running, "NO_RESULT"),
@@ -170,9 +172,10 @@ def test_a_malformed_record_is_refused_and_the_inspection_stays_open(opened, sce
 def test_a_trigger_that_no_outcome_could_be_told_of_is_refused_at_the_door(opened, scenario, trigger):
     async def steps():
         async with opened() as records:
-            for change in ({"lot": "x" * 33}, {"trigger_id": 0}, {"encoder": -1}, {"began_utc_ms": -1}):
+            changes = {"lot": "x" * 33, "trigger_id": 0, "encoder": -1, "size_class": 65_536, "began_utc_ms": -1}
+            for name, value in changes.items():
                 with pytest.raises(BadRecordError):
-                    await records.begin(replace(trigger, **change))
+                    await records.begin(replace(trigger, **{name: value}))
         async with opened() as records:
             assert records.lost == ()
 

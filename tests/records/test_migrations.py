@@ -12,6 +12,7 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
+from station.inspection.fruit_size import FruitSize
 from station.records import database
 from station.records.database import FILE_NAME, MIGRATIONS, migrate, open_engine
 from station.records.errors import SchemaError
@@ -96,6 +97,8 @@ def test_records_from_before_the_second_witness_read_without_it(opened, scenario
         connection = sqlite3.connect(folder / FILE_NAME)
         for column in ("changed_area_mm2", "changed_area_px"):
             connection.execute(f"ALTER TABLE curve_points DROP COLUMN {column}")
+        for column in ("fruit_length_mm_x10", "size_class"):
+            connection.execute(f"ALTER TABLE inspections DROP COLUMN {column}")
         connection.execute("UPDATE alembic_version SET version_num = '0005'")
         connection.commit()
         connection.close()
@@ -118,6 +121,38 @@ def test_records_from_before_the_second_witness_read_without_it(opened, scenario
     with (folder / "all.csv").open(newline="", encoding="utf-8") as file:
         exported = [json.loads(row["changed_areas_mm2"]) for row in csv.DictReader(file)]
     assert exported == [[None] * 5, [0.0, 9.5, 19.0, 28.5, 38.0]]
+
+
+def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, folder, trigger, passed, ask):
+    sized = replace(trigger, fruit_length_mm_x10=483, size_class=3)
+
+    async def steps():
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), passed))
+        connection = sqlite3.connect(folder / FILE_NAME)
+        for column in ("fruit_length_mm_x10", "size_class"):
+            connection.execute(f"ALTER TABLE inspections DROP COLUMN {column}")
+        connection.execute(
+            "UPDATE inspections SET standing = json_remove(standing, '$.fruit_length_mm_x10', '$.size_class')"
+        )
+        connection.execute("UPDATE alembic_version SET version_num = '0006'")
+        connection.commit()
+        connection.close()
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(sized), passed))
+            return [await records.inspection(sequence) for sequence in (1, 2)]
+
+    old, new = scenario(steps)
+    assert (old.trigger, old.trigger.size) == (trigger, FruitSize())
+    assert (new.trigger, new.trigger.size) == (sized, FruitSize(48.3, 3))
+    assert [(one.standing.fruit_length_mm_x10, one.standing.size_class) for one in (old, new)] == [(0, 0), (483, 3)]
+    assert "size:         not given by the PLC\n" in ask("show", 1).output
+    assert "size:         fruit length 48.3 mm, class 3 (given by the PLC)\n" in ask("show", 2).output
+    ask("export", folder / "all.csv")
+    with (folder / "all.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[-2:] == ["fruit_length_mm", "size_class"], "columns are added at the end"
+    assert [(row["fruit_length_mm"], row["size_class"]) for row in rows] == [("", ""), ("48.3", "3")]
 
 
 def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form, head):

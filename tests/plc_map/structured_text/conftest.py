@@ -379,6 +379,7 @@ class Station:
             **{
                 "result_sequence": sequence,
                 "result_sequence_again": sequence,
+                "result_sequence_end": sequence,
                 "result_trigger_id": trigger_id,
                 "result_outcome": BY_NAME["result_outcome"].code(outcome),
                 "result_flags": BY_NAME["result_flags"].flags(flags),
@@ -403,6 +404,8 @@ class Plc:
             "enable": True,
             "fruit_id": 7,
             "encoder": 0x00ABCDEF,
+            "fruit_length_mm_x10": 483,
+            "size_class": 3,
         }
 
     def scan(self, scans: int = 1, **inputs: Any) -> None:
@@ -428,10 +431,12 @@ class Plc:
         self.scan(inspect=True)
         assert self.control() == {"enable", "trigger"}
         assert self.written("trigger_id") == fruit_id
+        assert (self.written("fruit_length_mm_x10"), self.written("size_class")) == (483, 3)
         self.station.set(accepted_trigger_id=fruit_id)
         self.station.flags("online", "trigger_acknowledged", "inspecting")
         self.scan()
         assert self.control() == {"enable"}
+        assert (self.written("fruit_length_mm_x10"), self.written("size_class")) == (0, 0)
         self.station.flags("online", "inspecting")
         self.scan()
 

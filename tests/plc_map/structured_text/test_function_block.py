@@ -31,6 +31,7 @@ def test_an_inspection_from_trigger_to_acknowledgement(make_plc, order):
     plc.station.show(
         0x00010002, 7, result_area_mm2_x100=1234, result_area_px=70_000, result_closing_mm_x100=-5,
         result_ended_utc_ms=0x0000_0123_4567_89AB, result_encoder=0x00ABCDEF,
+        result_fruit_length_mm_x10=483, result_size_class=3,
     )  # fmt: skip
     plc.scan()
     block = plc.block
@@ -41,7 +42,7 @@ def test_an_inspection_from_trigger_to_acknowledgement(make_plc, order):
     assert (result["sequence"], result["trigger_id"], result["outcome"]) == (0x00010002, 7, 1)
     assert (result["area_mm2_x100"], result["area_px"], result["closing_mm_x100"]) == (1234, 70_000, -5)
     assert (result["ended_utc_ms_high"], result["ended_utc_ms_low"]) == (0x0123, 0x456789AB)
-    assert result["encoder"] == 0x00ABCDEF
+    assert (result["encoder"], result["fruit_length_mm_x10"], result["size_class"]) == (0x00ABCDEF, 483, 3)
     assert plc.control() == {"enable", "acknowledge"}
     assert plc.written("acknowledged_sequence") == 0x00010002
     plc.station.flags("online", "trigger_ready")
@@ -212,13 +213,14 @@ def test_a_result_left_over_is_cleared_before_the_station_counts_as_ready(plc):
     assert zero(plc.block["result"])
 
 
-def test_a_torn_result_is_not_used_and_not_acknowledged(plc):
+@pytest.mark.parametrize("copy", ["result_sequence_again", "result_sequence_end"])
+def test_a_torn_result_is_not_used_and_not_acknowledged(plc, copy):
     plc.accepted()
-    plc.station.show(5, 7, result_sequence_again=4)
+    plc.station.show(5, 7, **{copy: 4})
     plc.scan(3)
     assert not plc.block["done"]
     assert plc.control() == {"enable"}
-    plc.station.set(result_sequence_again=5)
+    plc.station.set(**{copy: 5})
     plc.scan()
     assert plc.block["passed"]
 

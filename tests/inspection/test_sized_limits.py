@@ -1,0 +1,169 @@
+"""Limits for the fruit's size: what a grader's length makes of them, and sizes that are not believed."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from station.inspection.fruit_size import NO_SIZE, FruitSize
+from station.inspection.judge import early_stop, judge
+from station.inspection.press import Measured, Press
+from station.inspection.sized_limits import sized_limits
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
+from station.vocabulary import Reason
+
+SIZE = {
+    "from": "length",
+    "reference_mm": 40.0,
+    "exponent": 0.8,
+    "expected_length": {"smallest_mm": 20.0, "largest_mm": 70.0},
+    "expected_ratio": {"smallest": 0.8, "largest": 2.0},
+    "uncertainty_mm": 0.6,
+    "classes": [
+        {"number": 2, "smallest_mm": 30.0, "largest_mm": 40.0},
+        {"number": 5, "smallest_mm": 40.0, "largest_mm": 50.0},
+    ],
+    "without_size": "no_result",
+    "spread": 0.17,
+}
+
+
+def recipe_with(**changes: object) -> Recipe:
+    """A strawberry's of another release, with one limit of 100 mm² at 3 mm for a fruit of 40 mm."""
+    golden = Path(__file__).parents[1] / "recipes_history" / "golden" / "form_1"
+    values = find_recipe("strawberry", golden).model_dump(mode="json")
+    values["damage"] = {
+        "area": [{"closing_mm": 3.0, "area_mm2": 100.0, "least_area_mm2": 40.0}],
+        "growth_mm2_per_mm": 60.0,
+        "size": {**SIZE, **changes},
+        "uncertainty": {"coverage": 0.95, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]},
+    }
+    values["early_stop"] = {"area_mm2": 120.0, "growth_mm2_per_mm": 80.0}
+    values["steps"]["stop_when_decided"] = True
+    return Recipe.model_validate_json(json.dumps(values))
+
+
+RECIPE = recipe_with()
+
+
+def pressed(area_mm2: float, size: FruitSize, width_mm: float = 35.0) -> Press:
+    """A fruit that shows this area at 3 mm."""
+    points = tuple(Measured(float(c), area_mm2 * c / 3, 1000 * c, 0.9) for c in range(4))
+    return Press(width_mm, 0.0, points, size=size)
+
+
+@pytest.mark.parametrize("length_mm", [30.0, 40.0, 55.5])
+def test_every_limit_goes_with_the_length(length_mm):
+    limits = sized_limits(pressed(80, FruitSize(length_mm)), RECIPE)
+    factor = (length_mm / 40) ** 0.8
+    (threshold,) = limits.recipe.damage.area
+    assert (threshold.area_mm2, threshold.least_area_mm2) == (pytest.approx(100 * factor), pytest.approx(40 * factor))
+    assert limits.recipe.damage.growth_mm2_per_mm == pytest.approx(60 * factor)
+    assert limits.recipe.early_stop.area_mm2 == pytest.approx(120 * factor)
+    assert limits.recipe.early_stop.growth_mm2_per_mm == pytest.approx(80 * factor)
+    assert limits.relative_uncertainty == pytest.approx(0.8 * 0.6 / length_mm)
+
+
+def test_one_area_is_damage_in_a_short_fruit_and_sound_in_a_long_one():
+    short, middle, long = (judge(pressed(98, FruitSize(length)), RECIPE) for length in (32.0, 40.0, 48.0))
+    assert (short.outcome, middle.outcome, long.outcome) == ("FAIL", "NO_RESULT", "PASS")
+    assert short.findings[0].sentence == (
+        "The area at 3 mm of closing is at least 92.6 mm²; the limit for a strawberry of 32 mm is 83.7 mm²: "
+        "it is over the limit."
+    )
+    assert middle.findings[0].sentence == (
+        "The area at 3 mm of closing is 98.0 ± 5.2 mm²; the limit for a strawberry of 40 mm is 100 mm²: "
+        "it is not surely within the limit."
+    )
+    assert middle.reasons == (Reason.NEAR_LIMIT,)
+    assert long.areas[0].limit_mm2 == pytest.approx(115.7, abs=0.05)
+
+
+def test_a_class_is_as_long_as_its_middle_and_as_uncertain_as_it_is_wide():
+    limits = sized_limits(pressed(80, FruitSize(None, 5)), recipe_with(**{"from": "class"}))
+    assert limits.length_mm == 45
+    assert limits.relative_uncertainty == pytest.approx(0.8 * (10**2 / 12 + 0.6**2) ** 0.5 / 45)
+
+
+WRONG = {
+    "impossible": (FruitSize(6553.5), "The PLC gave a length of 6553.5 mm; Strawberry is expected with 20 to 70 mm."),
+    "too short": (FruitSize(16.0), "The PLC gave a length of 16.0 mm; Strawberry is expected with 20 to 70 mm."),
+    "no class": (FruitSize(45.0, 65535), "The PLC gave the size class 65535, which the recipe does not list."),
+    "contradiction": (
+        FruitSize(45.0, 2),
+        "The PLC gave a length of 45.0 mm and the size class 2, which is for 30 to 40 mm: they contradict each other.",
+    ),
+    "another fruit's": (
+        FruitSize(26.0),
+        "The PLC gave a length of 26.0 mm, and the fruit is 35.0 mm wide: that is another fruit's size.",
+    ),
+}
+
+
+@pytest.mark.parametrize(("size", "sentence"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("fallback", ["no_result", "plain_limit"])
+@pytest.mark.parametrize("judged_by", ["length", "class"])
+def test_a_size_that_cannot_be_is_no_result_whatever_the_recipe_does_without(size, sentence, fallback, judged_by):
+    recipe = recipe_with(without_size=fallback, **{"from": judged_by})
+    for area_mm2 in (70, 300):
+        verdict = judge(pressed(area_mm2, size), recipe)
+        assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (Reason.SIZE_UNKNOWN,))
+        assert verdict.findings[0].sentence == sentence
+    first = pressed(70, size)
+    assert early_stop(replace(first, points=first.points[:1]), recipe), "no step can change it"
+
+
+def test_a_length_a_little_outside_its_class_is_within_the_graders_uncertainty():
+    assert not sized_limits(pressed(80, FruitSize(41.1, 2)), RECIPE).problem
+    assert sized_limits(pressed(80, FruitSize(41.3, 2)), RECIPE).problem
+    assert not sized_limits(pressed(80, FruitSize(41.3, 9)), recipe_with(classes=[])).problem, "none are listed"
+
+
+def test_a_class_of_another_fruit_is_noticed_by_the_width():
+    recipe = recipe_with(**{"from": "class"})
+    assert not sized_limits(pressed(80, FruitSize(None, 2), width_mm=49.0), recipe).problem, "its longest may be"
+    assert "the size class 2" in sized_limits(pressed(80, FruitSize(None, 2), width_mm=51.0), recipe).problem
+    assert not sized_limits(pressed(80, FruitSize(26.0)), recipe_with(expected_ratio=None)).problem
+
+
+@pytest.mark.parametrize(
+    ("judged_by", "size"), [("length", NO_SIZE), ("length", FruitSize(None, 2)), ("class", NO_SIZE)]
+)
+def test_without_a_size_the_recipe_says_what_is_done(judged_by, size):
+    refused = judge(pressed(70, size), recipe_with(**{"from": judged_by}))
+    assert (refused.outcome, refused.reasons) == ("NO_RESULT", (Reason.SIZE_UNKNOWN,))
+    plain = recipe_with(without_size="plain_limit", **{"from": judged_by})
+    assert judge(pressed(75, size), plain).outcome == "PASS"
+    near = judge(pressed(90, size), plain)
+    assert near.reasons == (Reason.NEAR_LIMIT,), "a fruit of average length would pass, and this may be a short one"
+    assert "the limit for a fruit of unknown size is 100 mm²" in near.findings[0].sentence
+    assert judge(pressed(90, FruitSize(40.0, 5)), plain).outcome == "PASS"
+
+
+LENGTHS = st.one_of(st.none(), st.floats(0, 6553.5))
+CLASSES = st.one_of(st.none(), st.integers(1, 65535))
+
+
+@given(LENGTHS, CLASSES, st.sampled_from(["length", "class"]), st.sampled_from(["no_result", "plain_limit"]))
+def test_no_size_whatever_lets_pass_what_is_too_much_for_the_longest_fruit_of_its_width(length, number, by, without):
+    recipe = recipe_with(without_size=without, **{"from": by})
+    most_mm2 = 100 * (70 / 40) ** 0.8  # the longest that the recipe expects
+    assert judge(pressed(most_mm2, FruitSize(length, number)), recipe).outcome != "PASS"
+
+
+@given(st.floats(36, 68), st.floats(0.01, 1.9), st.floats(50, 140))
+def test_a_shorter_fruit_never_passes_with_an_area_that_a_longer_one_does_not(length, less, area):
+    shorter, longer = (
+        judge(pressed(area, FruitSize(each)), recipe_with(classes=[])) for each in (length, length + less)
+    )
+    if longer.outcome != "PASS" and Reason.LOW_CONFIDENCE not in longer.reasons:
+        assert shorter.outcome != "PASS"
+
+
+def test_a_title_that_begins_with_a_vowel():
+    recipe = RECIPE.model_copy(update={"title": "Apricot"})
+    assert "limit for an apricot of 40 mm" in judge(pressed(98, FruitSize(40.0)), recipe).findings[0].sentence

@@ -1,0 +1,54 @@
+"""The simulated grader: what the PLC is told of the length of the fruit that the twin lays."""
+
+import asyncio
+import os
+
+import pytest
+
+from plc_interface.line.nest import GRADER_ERROR_MM, Grader, TwinNest
+from station.settings.camera import TwinCameraSettings
+from station.settings.gripper import GripperSettings
+from station.twin.process import Twin, TwinOptions
+
+RECIPES = {"strawberry": 1, "blueberry": 2}
+
+
+def test_a_grader_errs_evenly_within_its_bounds_in_tenths():
+    grader, again = Grader(7), Grader(7)
+    told = [grader.length_mm_x10(45.44) for _ in range(2_000)]
+    assert told == [again.length_mm_x10(45.44) for _ in range(2_000)]
+    assert set(told) == set(range(444, 465)), "every tenth within ± 1 mm, and none beyond"
+    assert GRADER_ERROR_MM == 1.0
+    outer = sum(abs(length - 454.4) > 5 for length in told)
+    assert 0.45 < outer / len(told) < 0.55, "half of them in the outer halves"
+
+
+@pytest.mark.parametrize("graded", [True, False])
+def test_the_length_is_of_the_fruit_that_the_twin_has_laid(graded, unused_port):
+    host = f"127.79.{os.getpid() % 250 + 1}.1"
+    gripper = GripperSettings.model_validate({"urcap": {"host": host}, "modbus_rtu": {"host": host}})
+    camera = TwinCameraSettings(host=host, port=unused_port)
+
+    async def main():
+        twin = Twin(TwinOptions(bench=True, gripper=gripper, camera=camera, console_port=0))
+        await twin.start()
+        try:
+            nest = TwinNest(twin.console.address[1], RECIPES, 0.5, 3, graded=graded)
+            laid = []
+            for _ in range(8):
+                fruit = await nest.arrive()
+                laid.append((fruit, twin.world.fruit))
+                await nest.leave()
+            return laid
+        finally:
+            await twin.stop()
+
+    laid = asyncio.run(main())
+    assert {fruit.kind for fruit, _ in laid} == set(RECIPES)
+    for fruit, truth in laid:
+        assert (fruit.kind, fruit.damaged) == (truth.kind, truth.bruised)
+        if graded:
+            assert abs(fruit.length_mm_x10 / 10 - truth.length_mm) <= GRADER_ERROR_MM + 0.05
+        else:
+            assert fruit.length_mm_x10 == 0
+    assert [fruit.length_mm_x10 for fruit, _ in laid] != [round(10 * truth.length_mm) for _, truth in laid]
