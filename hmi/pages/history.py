@@ -255,12 +255,13 @@ def _drawn(told: InspectionTold) -> dict[str, Any] | None:
     if told.recipe is None:
         return None
     limits, early = [], None
+    factor = float(told.measures.get("limit_factor") or 1.0)  # for the fruit's size
     try:
         limits = [
-            Limit(each["closing_mm"], each["area_mm2"], each.get("least_area_mm2", 0.0))
+            Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
             for each in told.recipe["damage"]["area"]
         ]
-        early = told.recipe["early_stop"]["area_mm2"]
+        early = factor * told.recipe["early_stop"]["area_mm2"]
     except (KeyError, TypeError):  # of a form that this program does not know
         pass
     return {"area": area_chart([Curve("own", points)], limits, early)}

@@ -68,11 +68,15 @@ class Verdict:
     growth: Growth | None
     """The steepest over a few steps; None with fewer than two points beyond a light touch."""
     partial: bool
-    """A result's closing was not reached; of a press that ended as it was decided, a damage threshold's."""
+    """A result's closing was not reached; where the steps end when decided, a damage threshold's."""
     stopped: Stop | None
     """Why the steps ended early, also where the fruit passes: what was left is no criterion."""
+    limit_factor: float
+    """By which the limits for this fruit differ from the recipe's."""
     budget: Budget
     """Of the area at the last damage threshold's closing."""
+    summary: str
+    """That area with its uncertainty, and the limit for the fruit: a sentence; empty where one of them is not known."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
@@ -131,7 +135,10 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
     recipe, evidence = case.limits.recipe, case.evidence
     areas = tuple(_result(evidence, recipe, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
     last_mm = recipe.damage.area[-1].closing_mm
-    decided = stopped is not None and stopped.finding is None
+    if recipe.steps.stop_when_decided:
+        partial = evidence.area_at(last_mm) is None
+    else:
+        partial = areas[-1].area_mm2 is None and not _almost(evidence, recipe)
     order = list(Reason)
     return Verdict(
         outcome=outcome,
@@ -139,11 +146,11 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         deciding=_deciding(evidence, recipe, proofs),
         areas=areas,
         growth=max(evidence.growths, key=lambda growth: growth.mm2_per_mm, default=None),
-        partial=evidence.area_at(last_mm) is None
-        if decided
-        else areas[-1].area_mm2 is None and not _almost(evidence, recipe),
+        partial=partial,
         stopped=stopped,
+        limit_factor=case.limits.factor,
         budget=evidence.budget_at(last_mm),
+        summary=_summary(case),
     )
 
 
@@ -183,12 +190,11 @@ class _Case:
         """Why no further step is made."""
         if not self.evidence.points:
             return None
+        if self.limits.recipe.steps.stop_when_decided and (why := self._decided()):
+            reached_mm = self.evidence.points[-1].closing_mm
+            return Stop(f"No further step was made at {reached_mm:.1f} mm of closing: {why}.")
         finding = _over_early_stop(self.evidence, self.limits.recipe)
-        if finding is not None:
-            return Stop(finding.sentence, finding)
-        why = self._decided() if self.limits.recipe.steps.stop_when_decided else ""
-        reached_mm = self.evidence.points[-1].closing_mm
-        return Stop(f"No further step was made at {reached_mm:.1f} mm of closing: {why}.") if why else None
+        return None if finding is None else Stop(finding.sentence, finding)
 
     def _decided(self) -> str:
         """Why no further step can change the outcome; empty where one can."""
@@ -389,6 +395,15 @@ def _result(evidence: Evidence, recipe: Recipe, closing_mm: float) -> AreaAt:
     area, uncertainty = evidence.area_at(closing_mm) or (None, None)
     limits = [threshold.area_mm2 for threshold in recipe.damage.area if threshold.closing_mm == closing_mm]
     return AreaAt(closing_mm, area, uncertainty, limits[0] if limits else None)
+
+
+def _summary(case: _Case) -> str:
+    threshold, limits = case.limits.recipe.damage.area[-1], case.limits
+    area = case.evidence.area_at(threshold.closing_mm)
+    if area is None or limits.problem:
+        return ""
+    told = f"{area[0]:.1f} ± {area[1]:.1f} mm²; {limit_in_words(threshold.area_mm2, limits)}"
+    return f"The area at {threshold.closing_mm:g} mm of closing is {told}."
 
 
 def _deciding(evidence: Evidence, recipe: Recipe, proofs: list[Finding]) -> Measured | None:

@@ -52,8 +52,9 @@ def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
         return SizedLimits(_scaled(recipe, factor), factor, length_mm, rule.exponent * uncertainty_mm / length_mm)
     if rule.without_size == "plain_limit":
         return SizedLimits(recipe, relative_uncertainty=rule.exponent * rule.spread, without_size=True)
-    what = "length" if rule.judged_by == "length" else "size class"
-    return SizedLimits(recipe, problem=f"The PLC gave no {what} of the fruit, with which its limits go.")
+    if rule.judged_by == "length":
+        return SizedLimits(recipe, problem="The PLC gave no length of the fruit, with which its limits go.")
+    return SizedLimits(recipe, problem="The PLC gave no size class of the fruit, with which its limits go.")
 
 
 def _length(size: FruitSize, rule: SizeOfFruit) -> tuple[float, float] | None:

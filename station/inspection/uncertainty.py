@@ -12,8 +12,14 @@ from station.inspection.press import Press
 from station.inspection.sized_limits import SizedLimits
 from station.settings.damage import Repeatability
 
-COMPONENTS = ("repeatability", "onset", "gripper", "scale", "size")
-"""In the order of the budget's table."""
+COMPONENTS = {
+    "repeatability": "repeatability of the area",
+    "onset": "onset between two images",
+    "gripper": "resolution of the gripper",
+    "scale": "scale of the unit",
+    "size": "length of the fruit",
+}
+"""What each component is, in the order of the budget's table."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from station.channel.line import Outcome
+from station.records.judgement import budget_rows, is_judgement, judgement_sentence
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.reading import Summary
 from station.records.wording import printable, sentence, size_sentence, sparkline
@@ -77,6 +78,9 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
         late = ", late" if judged.late else ""
         partial = ", ended before its last step" if judged.partial else ""
         yield _field("judged", f"{judged.outcome}, {area}{closing}{late}{partial}")
+        told = judgement_sentence(judged.measures)
+        if told and not any(text.startswith(told.removesuffix(".")) for text in judged.explanation):
+            yield f"  {told}"
         for text in judged.explanation:
             yield f"  {text}"
         for reason in judged.reasons:
@@ -109,6 +113,8 @@ def _recipe(recipe: RecipeSnapshot) -> Iterator[str]:
 
 def _limits(recipe: Any) -> Iterator[str]:
     damage, early = recipe["damage"], recipe["early_stop"]
+    if size := damage.get("size"):
+        yield f"  limits for a fruit of {size['reference_mm']:g} mm:"
     for limit in damage["area"]:
         yield f"  fails above {limit['area_mm2']:g} mm² at {limit['closing_mm']:g} mm of closing"
     yield f"  fails above {damage['growth_mm2_per_mm']:g} mm² of growth per mm"
@@ -119,7 +125,12 @@ def _judged(judged: InspectionRecord) -> Iterator[str]:
     if judged.curve:
         yield _field("curve", sparkline([point.area_mm2 for point in judged.curve]))
         yield "\n".join(f"  {line}" for line in _columns(_curve_rows(judged.curve)).splitlines())
-    for title, values in (("measures", judged.measures), ("phases, s", judged.phases_s)):
+    budget = [(text, f"{share:.1%}") for text, share in budget_rows(judged.measures)]
+    if budget:
+        yield _field("uncertainty", "of the judged area, each component's standard uncertainty")
+        yield "\n".join(f"  {line}" for line in _columns(budget).splitlines())
+    others = {name: value for name, value in judged.measures.items() if not is_judgement(name)}
+    for title, values in (("measures", others), ("phases, s", judged.phases_s)):
         if values:
             yield _field(title, _pairs(values))
     for title, values in (("devices", judged.devices), ("versions", judged.versions)):

@@ -2,14 +2,18 @@
 
 import time
 from collections.abc import Callable
+from math import sqrt
 from pathlib import Path
 from typing import NamedTuple
 
 from station.calibration.model import Calibration, Verification
 from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
 from station.settings.configuration import Configuration
+from station.vision.scale import TYPICAL_UNCERTAINTY
 
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
+_UNMEASURED = TYPICAL_UNCERTAINTY / sqrt(3)
+"""Standard uncertainty of the usual scale: a unit's own lies anywhere in the published range alike (GUM 4.3.7)."""
 
 
 class InUse(NamedTuple):
@@ -18,6 +22,8 @@ class InUse(NamedTuple):
     mm_per_px: float
     words: str
     """For its record."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of `mm_per_px`."""
 
 
 class Figures(NamedTuple):
@@ -58,9 +64,12 @@ class Calibrated:
         """The scale that areas are told by, and whose it is."""
         calibration = self.calibration
         if calibration is None:
-            return InUse(self._usual_mm_per_px, f"none: {self._usual_mm_per_px:g} mm/px, by the configuration")
-        scale = calibration.mm_per_px if calibration.scale_measured else self._usual_mm_per_px
-        return InUse(scale, f"{calibration.in_words()}, in use {scale:g} mm/px")
+            words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration"
+            return InUse(self._usual_mm_per_px, words, _UNMEASURED)
+        measured = calibration.scale_measured
+        scale = calibration.mm_per_px if measured else self._usual_mm_per_px
+        words = f"{calibration.in_words()}, in use {scale:g} mm/px"
+        return InUse(scale, words, calibration.scale_uncertainty / 2 if measured else _UNMEASURED)
 
     @property
     def gate_factor(self) -> float:

@@ -7,6 +7,7 @@ from station.channel.line import Outcome
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
+from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.eye import Seen
 from station.service.grip import GripStep
@@ -29,6 +30,10 @@ class Inspection:
     mm_per_px: float
     calibration: str
     """In words, for the record."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of `mm_per_px`."""
+    resolution_mm: float
+    """One count of the gripper."""
     began_s: float = field(default_factory=time.monotonic)
     sequence: int | None = None
     """Once it is durable."""
@@ -83,13 +88,24 @@ class Inspection:
         """What was measured so far, for the judge."""
         onset_mm = self.onset_mm
         if onset_mm is None:
-            return Press(None, 0.0, (), tuple(self.interruptions), self.trigger.size)
+            return self._press(None, 0.0, ())
         untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
         if self.before_onset_mm is not None:
             untouched.append(self.before_onset_mm)
         sooner_mm = min(untouched) - onset_mm if untouched else 0.0
         points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
-        return Press(onset_mm, sooner_mm, points, tuple(self.interruptions), self.trigger.size)
+        return self._press(onset_mm, sooner_mm, points)
+
+    def _press(self, onset_mm: float | None, sooner_mm: float, points: tuple[Measured, ...]) -> Press:
+        return Press(
+            onset_mm,
+            sooner_mm,
+            points,
+            tuple(self.interruptions),
+            self.trigger.size,
+            self.resolution_mm,
+            self.scale_uncertainty,
+        )
 
     def record(self) -> InspectionRecord:
         """What is to be made durable."""
@@ -119,6 +135,9 @@ class Inspection:
                 "onset_mm": onset_mm,
                 "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
                 "mm_per_px": self.mm_per_px,
+                "scale_uncertainty": self.scale_uncertainty,
+                "gripper_resolution_mm": self.resolution_mm,
+                **({} if verdict is None else judgement_measures(verdict)),
             },
             images=self._images(),
         )

@@ -14,6 +14,7 @@ from station.channel.line import Outcome
 from station.channel.panel_live import Counts, CurveShown, Fruit, FruitShort, LimitShown, Picture
 from station.devices.camera.interface import Image
 from station.errors import StationError
+from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
 from station.service.eye import Seen
 from station.service.inspection import Inspection
@@ -179,6 +180,7 @@ def fruit_of(
     """
     onset_mm = record.measures.get("onset_mm")
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
+    factor = limit_factor(record.measures)
     return Fruit(
         short=short_of(standing, recipe.name, [point.area_mm2 for point in points]),
         explanation=record.explanation,
@@ -194,11 +196,15 @@ def fruit_of(
             for point in points
         ),
         limits=tuple(
-            LimitShown(closing_mm=each.closing_mm, area_mm2=each.area_mm2, least_area_mm2=each.least_area_mm2)
+            LimitShown(
+                closing_mm=each.closing_mm,
+                area_mm2=factor * each.area_mm2,
+                least_area_mm2=factor * each.least_area_mm2,
+            )
             for each in recipe.damage.area
         ),
-        early_stop_mm2=recipe.early_stop.area_mm2,
-        growth_mm2_per_mm=recipe.damage.growth_mm2_per_mm,
+        early_stop_mm2=factor * recipe.early_stop.area_mm2,
+        growth_mm2_per_mm=factor * recipe.damage.growth_mm2_per_mm,
         deadline_s=deadline_s,
         phases_s=dict(record.phases_s),
         picture_step=picture,

@@ -62,6 +62,7 @@ class Service:
         calibrated: Calibrated,
     ) -> None:
         self._settings, self._calibrated = configuration.service, calibrated
+        self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._crew, self._inspector = crew, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
         self.conductor = Conductor(self)
@@ -116,7 +117,7 @@ class Service:
                 request.size_class,
             )
             limits = self.pacing.limits(self.active.recipe)
-            now = Inspection(trigger, self.active, limits, *self._calibrated.in_force)
+            now = Inspection(trigger, self.active, limits, *self._calibrated.in_force, self._resolution_mm)
             self._pending = Pending(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()

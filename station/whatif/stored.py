@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
+from station.inspection.fruit_size import FruitSize
 from station.inspection.press import Flag, Measured, Press
 from station.records.images import image_path
 from station.vocabulary import OutcomeName, Reason
@@ -90,8 +91,8 @@ def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, 
     """
     marks = ", ".join("?" * len(wanted))
     rows = connection.exec_driver_sql(
-        f"SELECT sequence, lot, judged, reasons, explanation, recipe_sha256, measures FROM inspections "  # noqa: S608 (marks)
-        f"WHERE sequence IN ({marks}) ORDER BY sequence",
+        "SELECT sequence, lot, judged, reasons, explanation, recipe_sha256, measures, fruit_length_mm_x10, "  # noqa: S608 (marks)
+        f"size_class FROM inspections WHERE sequence IN ({marks}) ORDER BY sequence",
         tuple(wanted),
     ).all()
     points = connection.exec_driver_sql(
@@ -116,7 +117,7 @@ def read_gate_factor(connection: Connection, sequence: int) -> float:
 
 
 def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, bytes], ...]) -> StoredPress:
-    sequence, lot, judged, reasons, explanation, recipe_sha256, measures = row
+    sequence, lot, judged, reasons, explanation, recipe_sha256, measures, length_mm_x10, size_class = row
     found = {Reason(reason) for reason in json.loads(reasons or "[]")}
     measured: dict[str, Any] = json.loads(measures or "{}")
     points = tuple(_points(curve))
@@ -124,7 +125,15 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
     uncertainty_mm = measured.get("onset_uncertainty_mm", USUAL_ONSET_UNCERTAINTY_MM)
     told = json.loads(explanation or "[]")
     interruptions = tuple(_interruptions(found, points, told))
-    press = Press(onset_mm, uncertainty_mm if onset_mm is not None else 0.0, points, interruptions)
+    press = Press(
+        onset_mm,
+        uncertainty_mm if onset_mm is not None else 0.0,
+        points,
+        interruptions,
+        FruitSize(length_mm_x10 / 10 or None, size_class or None),
+        measured.get("gripper_resolution_mm", 0.0),  # records of before were judged without it
+        measured.get("scale_uncertainty", 0.0),
+    )
     gate_factor = measured.get("gate_factor") or 1.0
     return StoredPress(sequence, lot, judged, recipe_sha256, press, gate_factor, images)
 

@@ -15,10 +15,13 @@ import pytest
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
+from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Flag, Measured, Press
+from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
+from station.settings.gripper import GripperCalibration
 from station.settings.recipe import find_recipe
 from station.settings.records import RecordsSettings
 from station.twin.digit.press import PressOptions, PressSequence, render_press
@@ -200,11 +203,14 @@ async def _inspect(folder: Path, fruit: int) -> None:
             drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
             closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
             shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3, references=3))
-            press = _pressed(shown, recipe)
+            length_mm = round(drawn.length_mm)
+            press = _pressed(shown, recipe, FruitSize(length_mm))
             verdict = judge(press, recipe)
             decided = verdict.areas[0]
             began_ms = 1_782_828_000_000 + number * 9000
-            sequence = await records.begin(Trigger(number + 1, 0, "A-17", began_ms, snapshot, simulated=True))
+            sequence = await records.begin(
+                Trigger(number + 1, 0, "A-17", began_ms, snapshot, simulated=True, fruit_length_mm_x10=10 * length_mm)
+            )
             steps = [Image("step", step, shown.frames[step]) for step in range(len(press.points))]
             outcome = await records.conclude(
                 sequence,
@@ -233,7 +239,13 @@ async def _inspect(folder: Path, fruit: int) -> None:
                         )
                         for step, p in enumerate(press.points)
                     ),
-                    measures={"onset_mm": press.onset_mm, "onset_uncertainty_mm": press.onset_uncertainty_mm},
+                    measures={
+                        "onset_mm": press.onset_mm,
+                        "onset_uncertainty_mm": press.onset_uncertainty_mm,
+                        "scale_uncertainty": press.scale_uncertainty,
+                        "gripper_resolution_mm": press.resolution_mm,
+                        **judgement_measures(verdict),
+                    },
                     images=(Image("reference", None, shown.references[0]), *steps),
                 ),
             )
@@ -245,11 +257,12 @@ async def _inspect(folder: Path, fruit: int) -> None:
         await records.close()
 
 
-def _pressed(shown: PressSequence, recipe) -> Press:
+def _pressed(shown: PressSequence, recipe, size: FruitSize) -> Press:
     """Measure its frames one after the other until the recipe stops the press."""
     method = make_method(shown.references, recipe.segmentation)
     tracker = PressTracker(method, recipe.segmentation.robust.least_confidence)
-    press = Press(shown.widths_mm[0], 0.1, ())
+    count_mm = GripperCalibration().mm_per_count
+    press = Press(shown.widths_mm[0], 0.1, (), size=size, resolution_mm=count_mm, scale_uncertainty=0.0125)
     for closing_mm, frame in zip(np.subtract(shown.closings_mm, TOUCHED_MM), shown.frames, strict=True):
         contact = tracker.measure_step([frame])
         area_mm2, changed_px = contact.area_px * MM_PER_PX**2, contact.changed_area_px

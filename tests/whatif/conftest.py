@@ -70,7 +70,7 @@ class Orchard:
 
     async def _one(self, records: Records, press: Press, images: tuple[Image, ...] | None, lot: str) -> int:
         snapshot = RecipeSnapshot.of(self.recipe.model_dump(mode="json"), "1")
-        sequence = await records.begin(Trigger(1, 0, lot, 1_700_000_000_000, snapshot, simulated=True))
+        sequence = await records.begin(Trigger(1, 0, lot, 1_700_000_000_000, snapshot, True, *_size(press)))
         verdict = judge(press, self.recipe)
         last = press.points[-1] if press.points else None
         await records.conclude(
@@ -91,11 +91,21 @@ class Orchard:
                     CurvePoint(step, ONSET_MM - p.closing_mm, p.closing_mm, p.area_mm2, p.area_px, p.confidence)
                     for step, p in enumerate(press.points)
                 ),
-                measures={"onset_mm": press.onset_mm, "onset_uncertainty_mm": press.onset_uncertainty_mm},
+                measures={
+                    "onset_mm": press.onset_mm,
+                    "onset_uncertainty_mm": press.onset_uncertainty_mm,
+                    "scale_uncertainty": press.scale_uncertainty,
+                    "gripper_resolution_mm": press.resolution_mm,
+                },
                 images=images or (),
             ),
         )
         return sequence
+
+
+def _size(press: Press) -> tuple[int, int]:
+    """As the PLC writes it."""
+    return round(10 * (press.size.length_mm or 0.0)), press.size.size_class or 0
 
 
 @pytest.fixture

@@ -4,17 +4,20 @@ import csv
 import json
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.errors import StationError
+from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.inspection.judge import judge
+from station.records.database import reading
 from station.vocabulary import Reason
 from station.whatif import runner
 from station.whatif.replay import replay
-from station.whatif.stored import StoredPress
+from station.whatif.stored import StoredPress, read_stored
 
 SOUND, BRUISED, BETWEEN = 27.0, 45.0, 33.5
 
@@ -92,6 +95,15 @@ def test_an_interrupted_inspection_stays_no_result_and_an_unknown_recipe_is_said
     assert stored.before == "NO_RESULT"
     assert replay(stored, orchard.recipe, changed(orchard.recipe, early_stop__area_mm2=200.0)).after == "NO_RESULT"
     assert replay(stored, None, orchard.recipe).after == "UNDECIDABLE"
+
+
+def test_a_stored_press_is_judged_again_with_its_size_scale_and_gripper(orchard):
+    press = replace(orchard.press(SOUND), size=FruitSize(41.5, 3), scale_uncertainty=0.0125, resolution_mm=0.375)
+    made = orchard.store([press, orchard.press(SOUND)])
+    with reading(orchard.folder) as connection:
+        sized, plain = read_stored(connection, made, orchard.folder, with_images=False)
+    assert judge(sized.press, orchard.recipe).budget == judge(press, orchard.recipe).budget
+    assert (sized.press.size, plain.press.size) == (FruitSize(41.5, 3), NO_SIZE)
 
 
 def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orchard, draft, station, tmp_path):

@@ -1,0 +1,38 @@
+"""What a record keeps of a judgement: the sentence, the fruit's limits, and the budget, read back as a table."""
+
+import pytest
+
+from station.inspection.fruit_size import NO_SIZE, FruitSize
+from station.inspection.judge import judge
+from station.records.judgement import (
+    budget_rows,
+    is_judgement,
+    judgement_measures,
+    judgement_sentence,
+    limit_factor,
+)
+from tests.inspection.test_sized_limits import RECIPE, pressed, recipe_with
+
+
+def test_a_budget_is_kept_and_read_back_as_its_table():
+    verdict = judge(pressed(80, FruitSize(48.0)), RECIPE)
+    kept = judgement_measures(verdict)
+    assert judgement_sentence(kept) == verdict.summary
+    assert verdict.summary == (
+        "The area at 3 mm of closing is 80.0 ± 4.2 mm²; the limit for a strawberry of 48 mm is 115.7 mm²."
+    )
+    assert limit_factor(kept) == pytest.approx((48 / 40) ** 0.8, abs=1e-5)
+    rows = dict(budget_rows(kept))
+    assert list(rows)[-2:] == ["combined", "guard band, 1.64 times that"]
+    assert rows["length of the fruit"] == pytest.approx(0.8 * 0.6 / 48)
+    assert rows["guard band, 1.64 times that"] == pytest.approx(verdict.budget.expanded, rel=1e-3)
+    assert all(is_judgement(name) for name in kept if name != "limit_factor")
+    assert not is_judgement("onset_uncertainty_mm")
+
+
+def test_nothing_is_kept_where_the_limit_is_not_known_and_records_of_before_have_none():
+    assert judgement_measures(judge(pressed(80, NO_SIZE), RECIPE)) == {}
+    assert (judgement_sentence({}), list(budget_rows({})), limit_factor({})) == ("", [], 1.0)
+    plain = judgement_measures(judge(pressed(80, NO_SIZE), recipe_with(without_size="plain_limit")))
+    assert limit_factor(plain) == 1.0
+    assert "limit_factor" not in plain
