@@ -1,16 +1,11 @@
-"""`station thresholds`: limits from fruit that a person has marked good and bad."""
+"""`station thresholds`: the limit from fruit that a person has marked good and bad, and what either error costs."""
 
-import base64
-import io
 import json
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
-import jinja2
-from matplotlib.figure import Figure
 
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
@@ -18,21 +13,14 @@ from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
 from station.settings.recipe import Recipe, find_recipe, recipe_files
 from station.settings.recipe_text import with_values
-from station.whatif.limits import (
-    Interval,
-    Limit,
-    area_most_mm2,
-    fewest_good,
-    growth_most_mm2_per_mm,
-    propose,
-    rate_interval,
-)
+from station.whatif.limits import Costs, rate_interval
 from station.whatif.marks import read_marks
+from station.whatif.proposal import Proposal, figures_of, proposals
+from station.whatif.proposal_page import lines_of, page_of
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import StoredPress, read_stored, sequences, snapshots
 
 _PART = 500
-_ROUND = 0.5
 
 
 @click.command("thresholds")
@@ -43,47 +31,65 @@ _ROUND = 0.5
 )  # fmt: skip
 @click.option("--lots", multiple=True, metavar="LOT", help="Only these, may be repeated. [default: all]")
 @click.option(
-    "--false-rejects", "rate", default=0.02, show_default=True, metavar="SHARE", type=click.FloatRange(0.0001, 0.5),
-    help="The wanted share of good fruit that is rejected by the limits, all of them together.",
+    "--false-accept", default=20.0, show_default=True, metavar="COST", type=click.FloatRange(0.01, 10_000),
+    help="What a damaged fruit that passes costs, in sound fruit that are diverted.",
+)  # fmt: skip
+@click.option(
+    "--damaged", default=0.05, show_default=True, metavar="SHARE", type=click.FloatRange(0.0001, 0.9),
+    help="The share of damaged fruit on the line.",
 )  # fmt: skip
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Where the results go.")
-@click.option("--draft", type=click.Path(path_type=Path), metavar="FILE", help="Write a recipe with these limits too.")
+@click.option("--draft", type=click.Path(path_type=Path), metavar="FILE", help="Write a recipe with the limit too.")
 @click.option("--config", metavar="FILE", type=click.Path(path_type=Path), help="The station.yaml to use.")
 def thresholds(
     name: str,
     marks: Path | None,
     lots: tuple[str, ...],
-    rate: float,
+    false_accept: float,
+    damaged: float,
     out: Path,
     draft: Path | None,
     config: Path | None,
 ) -> None:
-    """Propose damage thresholds from marked fruit, with what is unsure about them.
+    """Propose the last damage threshold from fruit marked good and bad, with what is unsure about it.
 
-    Writes DIR/thresholds.html, with a histogram for each limit, and thresholds.json. Nothing is put in force: a recipe
+    Writes DIR/thresholds.html, with both errors over the limit, and thresholds.json. Nothing is put in force: a recipe
     written with --draft goes the way of every draft, as by `station recipes import`.
     """
-    site = load_configuration(config)
+    site, costs = load_configuration(config), Costs(false_accept, damaged)
     recipe, folder = find_recipe(name, site.recipes_folder), records_folder(site.home)
     marked = _told_marks(folder) if marks is None else read_marks(marks)
     stored, own = _marked(folder, recipe.name, lots, set(marked))
-    good, bad = ([each for each in stored if marked[each.sequence] == mark] for mark in ("good", "bad"))
-    if not good:
+    for mark in ("good", "bad"):
+        if not any(marked[each.sequence] == mark for each in stored):
+            raise BadInputError(
+                f"{marks or folder}: none of the fruit marked {mark} is a judged {recipe.name} in the records; a limit "
+                "needs fruit of both kinds"
+            )
+    found = proposals(stored, marked, own, recipe, costs)
+    if not found:
         raise BadInputError(
-            f"{marks or folder}: none of the fruit marked good is a judged {recipe.name} in the records"
+            f"{recipe.name}: no closing of the recipe's results was reached by nine of ten good fruit, or none of them "
+            "could pass by any limit: press the marked fruit with a higher early stop, or look at why they are diverted"
         )
-    limits = _limits(good, bad, own, recipe, rate)
-    proposed, text = _draft(recipe, limits, name, site.recipes_folder)
-    told = _told(limits, good, bad, own, proposed, rate)
+    best = found[0]
+    proposed, text = _draft(recipe, best, name, site.recipes_folder)
+    told = {
+        "false_accept_cost": costs.false_accept,
+        "damaged_share": costs.damaged_share,
+        "proposed": figures_of(best, costs),
+        "other_closings": [figures_of(each, costs) for each in found[1:]],
+        "by_the_proposed_recipe": {mark: _rate(stored, marked, mark, own, proposed) for mark in ("good", "bad")},
+    }
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / "thresholds.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-        (out / "thresholds.html").write_text(_page(recipe, limits, told), encoding="utf-8")
+        (out / "thresholds.html").write_text(page_of(recipe.title, best, told), encoding="utf-8")
         if draft is not None:
             draft.write_text(text, encoding="utf-8")
     except OSError as error:
         raise StationError(f"{error.filename or out}: {error.strerror or error}; free space and try again") from error
-    for line in _lines(told):
+    for line in lines_of(told):
         click.echo(line)
     click.echo(f"see {out / 'thresholds.html'}" + (f"; the draft is {draft}" if draft else ""))
 
@@ -110,40 +116,19 @@ def _marked(
     return [each for each in stored if each.recipe_sha256 in own and each.press.onset_mm is not None], own
 
 
-def _limits(
-    good: Sequence[StoredPress], bad: Sequence[StoredPress], own: dict[str, Recipe], recipe: Recipe, rate: float
-) -> list[Limit]:
-    """Each limit gets its share of the wanted rate, so that all together reject no more (Bonferroni)."""
-    closings = [each.closing_mm for each in recipe.damage.area]
-    share = rate / (len(closings) + 1)
-    found: list[Limit] = []
-    for closing_mm in (*closings, None):
-        values = [
-            [
-                growth_most_mm2_per_mm(each.press, own[each.recipe_sha256])
-                if closing_mm is None
-                else area_most_mm2(each.press, own[each.recipe_sha256], closing_mm)
-                for each in group
-            ]
-            for group in (good, bad)
-        ]
-        limit = propose(values[0], values[1], closing_mm, share)
-        if limit is None:
-            what = "growth" if closing_mm is None else f"area at {closing_mm:g} mm of closing"
-            raise BadInputError(f"no good fruit tells its {what}: mark some that were pressed so far")
-        found.append(limit)
-    return found
-
-
-def _draft(recipe: Recipe, limits: Sequence[Limit], name: str, folder: Path | None) -> tuple[Recipe, str]:
-    """The recipe's file with the limits, rounded up; the early stop is raised where it has to be."""
-    areas = [_rounded(limit.value) for limit in limits if limit.closing_mm is not None]
-    areas = [max(areas[: place + 1]) for place in range(len(areas))]  # they do not fall with closing
-    growth = _rounded(limits[-1].value)
-    changes: dict[str, Any] = {f"damage.area[{place}].area_mm2": area for place, area in enumerate(areas)}
-    changes["damage.growth_mm2_per_mm"] = growth
-    changes["early_stop.area_mm2"] = max(recipe.early_stop.area_mm2, areas[-1])
-    changes["early_stop.growth_mm2_per_mm"] = max(recipe.early_stop.growth_mm2_per_mm, growth)
+def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
+    """The recipe's file with the limit in the place of its last one; sooner ones are lowered where they have to be."""
+    last, limit = len(recipe.damage.area) - 1, round(best.limit_mm2, 1)
+    changes: dict[str, Any] = {
+        f"damage.area[{place}].area_mm2": limit
+        for place, each in enumerate(recipe.damage.area)
+        if each.area_mm2 > limit
+    }
+    changes[f"damage.area[{last}].area_mm2"] = limit
+    changes[f"damage.area[{last}].closing_mm"] = best.closing_mm
+    if recipe.damage.size is not None:
+        changes["damage.size.exponent"] = best.exponent
+    changes["early_stop.area_mm2"] = max(recipe.early_stop.area_mm2, limit)
     for path in recipe_files(folder):
         if find_recipe(path).name == recipe.name:
             text, proposed = with_values(path.read_text(encoding="utf-8-sig"), changes, str(path))
@@ -151,100 +136,19 @@ def _draft(recipe: Recipe, limits: Sequence[Limit], name: str, folder: Path | No
     raise BadInputError(f"recipe {name}: there is no file of it to write a draft from")
 
 
-def _told(
-    limits: Sequence[Limit], good: Sequence[StoredPress], bad: Sequence[StoredPress], own: dict[str, Recipe],
-    proposed: Recipe, rate: float,
-) -> dict[str, Any]:  # fmt: skip
-    """All figures by name; the rates are those of the judge, by the proposed recipe."""
-    rates = {}
-    for name, group in (("good", good), ("bad", bad)):
-        after = [replay(each, own[each.recipe_sha256], proposed).after for each in group]
-        decided = [each for each in after if each != "UNDECIDABLE"]
-        rejected = sum(each != "PASS" for each in decided)
-        rates[name] = {
-            "marked": len(group),
-            "decided": len(decided),
-            "rejected": rejected,
-            "rejected_share": rejected / len(decided) if decided else None,
-            "interval": _pair(rate_interval(rejected, len(decided))),
-        }
+def _rate(
+    stored: Sequence[StoredPress], marked: Mapping[int, Mark], mark: Mark, own: dict[str, Recipe], proposed: Recipe
+) -> dict[str, Any]:
+    """What the judge makes of the marked fruit by the proposed recipe."""
+    group = [each for each in stored if marked[each.sequence] == mark]
+    after = [replay(each, own[each.recipe_sha256], proposed).after for each in group]
+    decided = [each for each in after if each != "UNDECIDABLE"]
+    rejected = sum(each != "PASS" for each in decided)
+    interval = rate_interval(rejected, len(decided))
     return {
-        "wanted_false_rejects": rate,
-        "limits": [
-            {
-                "closing_mm": limit.closing_mm,
-                "unit": "mm²/mm" if limit.closing_mm is None else "mm²",
-                "limit": limit.value,
-                "interval": _pair(limit.interval),
-                "good": len(limit.good),
-                "bad": len(limit.bad),
-                "not_known": limit.unknown,
-                "share_of_false_rejects": limit.rate,
-                "good_needed": fewest_good(limit.rate),
-            }
-            for limit in limits
-        ],
-        "by_the_proposed_recipe": rates,
+        "marked": len(group),
+        "decided": len(decided),
+        "rejected": rejected,
+        "rejected_share": rejected / len(decided) if decided else None,
+        "interval": [interval.low, interval.high],
     }
-
-
-def _lines(told: dict[str, Any]) -> list[str]:
-    lines = []
-    for limit in told["limits"]:
-        what = "growth" if limit["closing_mm"] is None else f"area at {limit['closing_mm']:g} mm"
-        low, high = ("not known" if end is None else f"{end:.1f}" for end in limit["interval"])
-        value = f"{limit['limit']:.1f} {limit['unit']}"
-        lines.append(f"{what}: {value}, 95 % interval {low} to {high}, from {limit['good']} good fruit")
-        if limit["interval"][1] is None:
-            lines.append(f"  too few: {limit['good_needed']} good fruit are needed for the interval's upper end")
-        if limit["not_known"]:
-            lines.append(f"  {limit['not_known']} marked fruit do not tell it: their steps ended before")
-    for name, rate in told["by_the_proposed_recipe"].items():
-        low, high = ("not known" if end is None else f"{100 * end:.1f} %" for end in rate["interval"])
-        lines.append(
-            f"{name} fruit rejected by the proposed recipe: {rate['rejected']} of {rate['decided']} decided "
-            f"({rate['marked']} marked), 95 % interval {low} to {high}"
-        )
-    return lines
-
-
-def _rounded(value: float) -> float:
-    return math.ceil(value / _ROUND) * _ROUND
-
-
-def _pair(interval: Interval) -> list[float | None]:
-    return [interval.low, interval.high]
-
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Thresholds: {{ title }}</title>
-<style>body { font: 15px/1.45 system-ui, sans-serif; max-width: 900px; margin: 0 auto; padding: 20px 16px; }
-img { max-width: 100%; }</style></head><body>
-<h1>Thresholds: {{ title }}</h1>
-{% for line in lines %}<p>{{ line }}</p>{% endfor %}
-{% for picture in pictures %}<img src="{{ picture }}" alt="histogram of good and bad fruit">{% endfor %}
-</body></html>
-"""
-
-
-def _page(recipe: Recipe, limits: Sequence[Limit], told: dict[str, Any]) -> str:
-    pictures = [_histogram(limit) for limit in limits]
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    return environment.from_string(_PAGE).render(title=recipe.title, lines=_lines(told), pictures=pictures)
-
-
-def _histogram(limit: Limit) -> str:
-    """Good and bad beside each other, with the limit and its interval; a data URI."""
-    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
-    axes = figure.add_subplot()
-    axes.hist([limit.good, limit.bad], bins=30, label=["good", "bad"], color=["#1f4e79", "#b3261e"])
-    axes.axvline(limit.value, color="#222222")
-    if limit.interval.low is not None and limit.interval.high is not None:
-        axes.axvspan(limit.interval.low, limit.interval.high, color="#999999", alpha=0.3)
-    growth = limit.closing_mm is None
-    axes.set_xlabel("growth [mm²/mm]" if growth else f"area at {limit.closing_mm:g} mm of closing [mm²]")
-    axes.set_ylabel("fruit")
-    axes.legend(frameon=False)
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()

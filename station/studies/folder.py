@@ -16,7 +16,10 @@ _DRAWN_BY = (
     "studies/cohort.py",
     "studies/sample.py",
     "studies/paper_samples.csv",
-    *(f"twin/{name}" for name in ("contact.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")),
+    *(
+        f"twin/{name}"
+        for name in ("contact.py", "damage.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")
+    ),
 )
 _MEASURED_BY = {"paper": ("vision/paper.py", "vision/methods.py"), "robust": ("vision",)}
 """Below the package: what decides a sample's numbers."""

@@ -1,6 +1,6 @@
 """One grip of the twin's as the station does it: what lies between gel and sponge, seen and measured frame by frame."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -54,6 +54,16 @@ class Pressed(NamedTuple):
     """The true closing at which the first contact was seen; None where nothing was touched."""
 
 
+class Onset(NamedTuple):
+    """The first contact that the station sees."""
+
+    width_mm: float
+    """The true one."""
+    uncertainty_mm: float
+    """How much sooner it may have begun."""
+    contact: Contact
+
+
 class Grip:
     """One fruit between gel and sponge.
 
@@ -63,13 +73,22 @@ class Grip:
         pose: how it lies.
         unit: seed of the sensor's light; None for the unit that the optics were fitted on.
         noise_seed: of the sensor's noise and drift.
+        mm_per_px: the unit's true scale.
     """
 
-    def __init__(self, recipe: Recipe, fruit: Fruit, pose: Pose, unit: int | None, noise_seed: int) -> None:
+    def __init__(
+        self,
+        recipe: Recipe,
+        fruit: Fruit,
+        pose: Pose,
+        unit: int | None,
+        noise_seed: int,
+        mm_per_px: float = MM_PER_PX,
+    ) -> None:
         self._recipe, self._fruit = recipe, fruit
         self._count_mm = GripperCalibration().mm_per_count
-        self._sensor = DigitSensor(noise_seed, unit)
-        self._gel = Gel()
+        self._sensor = DigitSensor(noise_seed, unit, mm_per_px=mm_per_px)
+        self._gel = Gel(mm_per_px=mm_per_px)
         self._contact = FruitOnGel(fruit, pose, self._gel)
         self._now_s = 0.0
         self._touched_s: float | None = None
@@ -91,27 +110,52 @@ class Grip:
             phase: 0 to 1, where the fruit's width lies between two counts of the gripper.
             zero_mm: by how much every width is read too large.
         """
-        start_mm = self._fruit.width_mm + _APPROACH_MM + phase * self._count_mm
-        widths = [start_mm - count * self._count_mm for count in range(_MOST_COUNTS)]
-        onset, contact = next(
-            ((at, seen) for at, width in enumerate(widths) if (seen := self._touched(width)) is not None), (None, None)
-        )
-        if onset is None or contact is None:
+        onset = self.approach(phase)
+        if onset is None:
             untouched = Press(None, 0.0, ())
             return Pressed(untouched, untouched, None)
-        steps, enough_mm = self._recipe.steps, deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm
-        press = Press(widths[onset] + zero_mm, self._count_mm if onset else 0.0, (self._point(0.0, contact),))
-        tracker = PressTracker(self._method, self._recipe.segmentation.robust.least_confidence, first=contact)
+        enough_mm = deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm - self._count_mm
+        press = Press(onset.width_mm + zero_mm, onset.uncertainty_mm, ())
         stopped: Press | None = None
-        for step in range(1, steps.number + 1):
-            closing_mm = round(step * steps.step_mm / self._count_mm) * self._count_mm
+        for closing_mm, contact in self.steps(onset):
+            press = replace(press, points=(*press.points, self._point(closing_mm, contact)))
             if stopped is None and early_stop(press, self._recipe) is not None:
                 stopped = press
-            if stopped is not None and press.points[-1].closing_mm > enough_mm - self._count_mm:
+            if stopped is not None and closing_mm > enough_mm:
                 break
-            point = self._point(closing_mm, tracker.measure_step(self._step_frames(widths[onset] - closing_mm)))
-            press = replace(press, points=(*press.points, point))
-        return Pressed(stopped or press, press, self._fruit.width_mm - widths[onset])
+        return Pressed(stopped or press, press, self._fruit.width_mm - onset.width_mm)
+
+    def approach(self, phase: float) -> Onset | None:
+        """Close count by count to the first contact.
+
+        Args:
+            phase: 0 to 1, where the fruit's width lies between two counts of the gripper.
+
+        Returns:
+            The onset; None where nothing was touched.
+        """
+        start_mm = self._fruit.width_mm + _APPROACH_MM + phase * self._count_mm
+        for count in range(_MOST_COUNTS):
+            width_mm = start_mm - count * self._count_mm
+            contact = self._touched(width_mm)
+            if contact is not None:
+                return Onset(width_mm, self._count_mm if count else 0.0, contact)
+        return None
+
+    def steps(self, onset: Onset) -> Iterator[tuple[float, Contact]]:
+        """Close step by step by the recipe; each step is pressed and measured when it is asked for.
+
+        Args:
+            onset: where the steps begin.
+
+        Yields:
+            The closing, in whole counts of the gripper, and the contact; first those of the onset.
+        """
+        yield 0.0, onset.contact
+        tracker = PressTracker(self._method, self._recipe.segmentation.robust.least_confidence, first=onset.contact)
+        for step in range(1, self._recipe.steps.number + 1):
+            closing_mm = round(step * self._recipe.steps.step_mm / self._count_mm) * self._count_mm
+            yield closing_mm, tracker.measure_step(self._step_frames(onset.width_mm - closing_mm))
 
     def _touched(self, width_mm: float) -> Contact | None:
         """One frame; where it shows a contact, a full step at the same width has to confirm it."""

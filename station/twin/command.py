@@ -14,6 +14,7 @@ import numpy.typing as npt
 from station.errors import BadInputError
 from station.settings.configuration import load_configuration
 from station.twin.console import ask
+from station.twin.damage import Severity
 from station.twin.digit.press import render_press
 from station.twin.fruit import Kind
 from station.twin.gel import MM_PER_PX
@@ -113,13 +114,26 @@ def fault_command(device: str | None, fault: str | None, amount: float, clear: b
 @twin.command("lay")
 @click.argument("fruit", type=FRUIT)
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Which fruit of its kind.")
-@click.option("--bruised", is_flag=True, help="A soft one.")
+@click.option("--bruised", is_flag=True, help="A damaged one.")
+@click.option(
+    "--severity", type=click.Choice([each.value for each in Severity]), default=Severity.SEVERE.value,
+    show_default=True, help="How a bruised one is damaged.",
+)  # fmt: skip
 @click.option("--x-mm", type=float, default=0.0, help="Right of the gel's middle, as the image shows it.")
 @click.option("--y-mm", type=float, default=0.0, help="Below it.")
 @CONSOLE
-def lay(fruit: str, seed: int, bruised: bool, x_mm: float, y_mm: float, console: int) -> None:  # noqa: FBT001
+def lay(
+    fruit: str,
+    seed: int,
+    bruised: bool,  # noqa: FBT001
+    severity: str,
+    x_mm: float,
+    y_mm: float,
+    console: int,
+) -> None:
     """Lay another fruit into the running twin's nest."""
-    request = {"do": "fruit", "kind": fruit, "seed": seed, "bruised": bruised, "x_mm": x_mm, "y_mm": y_mm}
+    damage = {"bruised": bruised, "severity": severity}
+    request = {"do": "fruit", "kind": fruit, "seed": seed, **damage, "x_mm": x_mm, "y_mm": y_mm}
     click.echo(ask(LOOPBACK, console, request))
 
 

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
+from station.twin.damage import DAMAGES, NO_DAMAGE, Damage, Severity
 from station.twin.gel import FloatArray, Surface
 from station.twin.texture import Texture, achenes, calyx, drupelets, smooth
 
@@ -72,8 +73,6 @@ VARIETIES = {
 
 _TAIL = 2.4
 """Fruit beyond this many standard deviations is drawn again: graders have taken it out."""
-_BRUISE_SOFTENING = 0.45
-_BRUISE_FLATTENING = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +87,8 @@ class Fruit:
     retardation_s: float
     seed: int
     bruised: bool = False
+    damage: Damage = DAMAGES[Severity.SEVERE]
+    """What a bruise of it is; of no effect where it is sound."""
 
     @property
     def variety(self) -> Variety:
@@ -97,7 +98,7 @@ class Fruit:
     @property
     def half_axes_mm(self) -> tuple[float, float]:
         """Half axes of the ellipsoid across the gripped one: along the columns, along the rows."""
-        flat = np.sqrt(_BRUISE_FLATTENING) if self.bruised else 1.0
+        flat = np.sqrt(self._damage.flattening)
         return self.width_mm / 2 * flat, self.length_mm / 2 * flat
 
     @property
@@ -109,7 +110,25 @@ class Fruit:
     @property
     def contact_modulus_mpa(self) -> float:
         """Young's modulus of the flesh under the gel, softer where it is bruised."""
-        return self.modulus_mpa * (_BRUISE_SOFTENING if self.bruised else 1.0)
+        return self.modulus_mpa * self._damage.softening
+
+    def contact_softening(self, contact_radius_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """By how much a soft patch under the gel lowers the contact's modulus further, 1 for not at all.
+
+        Compliances are averaged by the load over them: a contact within the patch is as soft as the patch, one much
+        wider as hard as the fruit. An estimate; the contact's outline stays the fruit's.
+
+        Args:
+            contact_radius_mm: of the contact, any shape.
+        """
+        if self._damage.patch is None:
+            return np.ones_like(contact_radius_mm)
+        share = self._damage.patch.load_share(contact_radius_mm)
+        return 1.0 / (1.0 - share + share / self._damage.patch.softening)
+
+    @property
+    def _damage(self) -> Damage:
+        return self.damage if self.bruised else NO_DAMAGE
 
     def gap_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
         """How far the smoothed surface stands behind the foremost point.
@@ -136,13 +155,16 @@ class Fruit:
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
 
 
-def draw_fruit(kind: Kind | str, seed: int, *, bruised: bool = False) -> Fruit:
+def draw_fruit(
+    kind: Kind | str, seed: int, *, bruised: bool = False, damage: Damage = DAMAGES[Severity.SEVERE]
+) -> Fruit:
     """Draw a fruit: sizes with the published mean, spread and correlation, stiffness log-normal.
 
     Args:
         kind: what to draw.
         seed: the same seed gives the same fruit.
-        bruised: make it softer and flatter where the gel touches.
+        bruised: damage it where the gel touches.
+        damage: how, where it is bruised.
 
     Raises:
         ValueError: there is no such kind.
@@ -153,7 +175,7 @@ def draw_fruit(kind: Kind | str, seed: int, *, bruised: bool = False) -> Fruit:
     weight_g, length_mm, width_mm = _draw_size(variety, generator)
     modulus_mpa = variety.modulus_mpa * float(np.exp(variety.modulus_spread * generator.standard_normal()))
     retardation_s = float(np.exp(generator.uniform(*np.log(variety.retardation_s))))
-    return Fruit(kind, weight_g, length_mm, width_mm, modulus_mpa, retardation_s, seed, bruised)
+    return Fruit(kind, weight_g, length_mm, width_mm, modulus_mpa, retardation_s, seed, bruised, damage)
 
 
 def _draw_size(variety: Variety, generator: np.random.Generator) -> npt.NDArray[np.float64]:

@@ -22,6 +22,7 @@ from station.twin.can.line import LineNodes
 from station.twin.clock import Clock, SteadyClock
 from station.twin.console import Action, ConsoleServer
 from station.twin.contact import Pose
+from station.twin.damage import DAMAGES, Severity
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.faults import FaultBoard
@@ -154,11 +155,14 @@ class Twin:
         bruised = request.get("bruised", False)
         if not isinstance(bruised, bool):
             raise ValueError(f"bruised: expected true or false, found {bruised!r}")  # noqa: TRY004 (one error for all)
+        severity = request.get("severity", Severity.SEVERE)
+        if severity not in list(Severity):
+            raise ValueError(f"severity: expected one of {', '.join(Severity)}, found {severity!r}")
         places = [request.get(axis, 0.0) for axis in ("x_mm", "y_mm")]
         if not all(isinstance(mm, int | float) and abs(mm) <= _FURTHEST_MM for mm in places):
             raise ValueError(f"x_mm, y_mm: expected numbers from -{_FURTHEST_MM:g} to {_FURTHEST_MM:g}, found {places}")
         x_px, y_px = (middle + mm / self._mm_per_px for middle, mm in zip((240.0, 320.0), places, strict=True))
-        fruit = draw_fruit(Kind(kind), seed, bruised=bruised)
+        fruit = draw_fruit(Kind(kind), seed, bruised=bruised, damage=DAMAGES[Severity(severity)])
         holder_mm = _BALL_HOLDER_MM if kind == Kind.RUBBER_BALL else 0.0
         self.world.place(fruit, Pose(x_px, y_px), holder_mm)
         return f"{kind} {seed}, {fruit.width_mm:.1f} mm wide"

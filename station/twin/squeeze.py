@@ -46,9 +46,12 @@ class Squeeze:
         plane = 1.0 - variety.poisson**2
         approach = np.linspace(0.0, 0.45 * fruit.width_mm, _SAMPLES)
         gel_compliance = (1.0 - gel.poisson**2) / (gel.modulus_mpa * gel.stiffening(approach, self._radius_mm))
-        front_compliance = plane / (fruit.contact_modulus_mpa * relaxed)
+        softening = fruit.contact_softening(np.sqrt(approach * self._radius_mm))
+        front_compliance = plane / (fruit.contact_modulus_mpa * softening * relaxed)
         compliance = gel_compliance + front_compliance
         force = 4.0 / 3.0 / compliance * np.sqrt(self._radius_mm) * approach**1.5
+        # Where the contact grows onto a soft patch the mean modulus falls; the force that was reached stays.
+        force = np.maximum.accumulate(force)
         back_modulus_mpa = fruit.modulus_mpa * relaxed / plane
         back = 0.5 * (0.75 * force / (back_modulus_mpa * np.sqrt(self._radius_mm))) ** (2 / 3)
         pressed = np.linspace(0.0, 10.0 * _SPONGE_FLAT_MM, _SAMPLES)

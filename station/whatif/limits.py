@@ -1,22 +1,63 @@
-"""Limits for a wanted rate of false rejects, from fruit that a person found good, with what is unsure about them.
+"""A limit from fruit that people found good and bad, for what either error costs, with what is unsure about it.
 
-The judge passes a fruit where its area with the uncertainty on top keeps the limit (docs/decisions/0015), so that sum
-is what is counted here. A limit is a quantile of it over the good fruit; its interval is between two order statistics,
-which needs no assumption of a distribution (David and Nagaraja, Order Statistics, 3rd ed., 2003, section 7.1).
+Each fruit is one number: the least limit, for a fruit of the reference length, by which the judge would pass it. So a
+limit's two errors on the marked fruit are counts, and nothing is assumed of how fruit are distributed.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
 from station.inspection.evidence import Evidence
+from station.inspection.judge import early_stop, judge
 from station.inspection.press import Press
 from station.inspection.sized_limits import sized_limits
+from station.settings.damage import LARGEST_AREA_MM2
 from station.settings.recipe_model import Recipe
 
+Values = npt.NDArray[np.float64]
+Counts = npt.NDArray[np.intp]
+
 CONFIDENCE = 0.95
+_LARGEST_GROWTH_MM2_PER_MM = 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """What the line's errors cost."""
+
+    false_accept: float
+    """Of a damaged fruit that passes, in sound fruit that are diverted."""
+    damaged_share: float
+    """Of the line's fruit, above 0 and below 1: how often there is a damaged one to pass."""
+
+    def of(self, false_accepts: float, false_rejects: float) -> float:
+        """Of an average fruit of the line, in sound fruit that are diverted.
+
+        Args:
+            false_accepts: share of the damaged fruit that pass.
+            false_rejects: share of the sound fruit that do not.
+        """
+        return self.damaged_share * self.false_accept * false_accepts + (1 - self.damaged_share) * false_rejects
+
+
+@dataclass(frozen=True, slots=True)
+class MarkedFruit:
+    """What one marked fruit's press says about a limit at a closing."""
+
+    good: bool
+    passes_from_mm2: float
+    """The least limit by which it passes, as its own size has it; infinite where none does."""
+    area_mm2: float | None
+    """The area itself; None where the closing was not reached."""
+    length_mm: float | None
+    """The length that its limits are for; None where the recipe does not go by the size, or it is not known."""
+    at_least: bool = False
+    """The judge ended its steps before the closing: the limit is this or a larger one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,86 +69,137 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
-    """One proposed limit."""
+class Exponent:
+    """How the area goes with the length, as the marked fruit have it."""
 
-    closing_mm: float | None
-    """None for the growth."""
-    good: tuple[float, ...]
-    """Of the good fruit, mm² or mm²/mm, ascending."""
-    bad: tuple[float, ...]
-    unknown: int
-    """Marked fruit whose curve does not tell the value."""
     value: float
-    interval: Interval
-    rate: float
-    """The rate of false rejects that this limit alone was chosen for."""
+    standard_error: float
+    fruit: int
 
 
-def area_most_mm2(press: Press, recipe: Recipe, closing_mm: float) -> float | None:
-    """The most that a fruit's area may be at a closing, as that of a fruit of the recipe's reference size.
+def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool) -> MarkedFruit | None:
+    """What a press says about the limit at a closing; None where a fault ended it before, or it touched nothing.
 
-    None where the closing was not reached, or the fruit's size is not known.
-
-    Args:
-        press: as stored.
-        recipe: that it was pressed by.
-        closing_mm: where.
-    """
-    limits = sized_limits(press, recipe)
-    area = Evidence(press, limits).area_at(closing_mm)
-    return None if area is None or limits.problem else sum(area) / limits.factor
-
-
-def growth_most_mm2_per_mm(press: Press, recipe: Recipe) -> float | None:
-    """The most that a fruit's steepest growth may be, as that of a fruit of the recipe's reference size.
-
-    None with too few points, or where the fruit's size is not known.
+    What the judge doubts for other reasons than a limit is diverted whatever the limit is. A fruit whose steps the
+    judge ended before has at least the area that was measured; it would be wrong to leave out the worst of the bad.
+    A good one of them is taken as diverted, a bad one as passed by any larger limit: the less favourable.
 
     Args:
         press: as stored.
         recipe: that it was pressed by.
+        closing_mm: where the limit is looked for.
+        good: how the fruit is marked.
     """
     limits = sized_limits(press, recipe)
-    growths = [] if limits.problem else [growth for growth in Evidence(press, limits).growths if not growth.few]
-    return max((growth.most_mm2_per_mm / limits.factor for growth in growths), default=None)
+    evidence = Evidence(press, limits)
+    if press.interruptions or not evidence.points:
+        return None
+    area = evidence.area_at(closing_mm)
+    if area is not None:
+        passes = judge(press, _without_limits(recipe, closing_mm)).outcome == "PASS"
+        return MarkedFruit(good, sum(area) if passes else math.inf, area[0], limits.length_mm)
+    if early_stop(press, recipe) is None:
+        return None
+    known = [point.area_mm2 for point in evidence.judged if evidence.bounds(point)]
+    at_least = max(known) if known and not good else math.inf
+    return MarkedFruit(good, at_least, None, limits.length_mm, at_least=True)
 
 
-def propose(
-    good: Sequence[float | None], bad: Sequence[float | None], closing_mm: float | None, rate: float
-) -> Limit | None:
-    """The limit that rejects at most this share of good fruit.
+def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
+    """The exponent of the area in the length: one slope for good and bad fruit, each with a level of its own.
 
     Args:
-        good: of each good fruit; None where it is not known.
-        bad: likewise of the bad.
-        closing_mm: where; None for the growth.
-        rate: the wanted rate of false rejects, above 0 and below 1.
+        fruit: marked ones.
 
     Returns:
-        None where no good fruit tells anything.
+        None with fewer than four fruit of known length and area, or all of one length.
     """
-    known = sorted(value for value in good if value is not None)
-    if not known:
+    known = [(one.good, one.length_mm, one.area_mm2) for one in fruit if one.length_mm and one.area_mm2]
+    if len(known) < 4:
         return None
-    unknown = sum(value is None for value in (*good, *bad))
-    place = min(len(known), math.ceil((1 - rate) * len(known)))
-    known_bad = tuple(sorted(value for value in bad if value is not None))
-    interval = quantile_interval(known, 1 - rate)
-    return Limit(closing_mm, tuple(known), known_bad, unknown, known[place - 1], interval, rate)
+    good = np.array([each[0] for each in known])
+    lengths, areas = (np.log(np.array([each[column] for each in known])) for column in (1, 2))
+    for group in (good, ~good):
+        if group.any():
+            lengths[group] -= lengths[group].mean()
+            areas[group] -= areas[group].mean()
+    spread = float(lengths @ lengths)
+    freedom = len(known) - 1 - len(set(good.tolist()))
+    if spread < 1e-9 or freedom < 1:
+        return None
+    slope = float(lengths @ areas) / spread
+    left = areas - slope * lengths
+    return Exponent(slope, math.sqrt(float(left @ left) / freedom / spread), len(known))
 
 
-def quantile_interval(ascending: Sequence[float], share: float) -> Interval:
-    """Between which two of the values the share's quantile lies.
+def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: float) -> tuple[Values, Values]:
+    """The least limits by which fruit pass, for a fruit of the reference length.
 
     Args:
-        ascending: a sample.
-        share: above 0 and below 1.
+        fruit: marked ones.
+        exponent: of the area in the length.
+        reference_mm: for which a recipe's limits are written.
+
+    Returns:
+        Of the good, and of the bad, mm², each in the order given.
     """
-    number, tail = len(ascending), (1 - CONFIDENCE) / 2
-    low = int(stats.binom.ppf(tail, number, share))
-    high = int(stats.binom.ppf(1 - tail, number, share)) + 1
-    return Interval(ascending[low - 1] if low >= 1 else None, ascending[high - 1] if high <= number else None)
+    factors = [(reference_mm / one.length_mm) ** exponent if one.length_mm else 1.0 for one in fruit]
+    good, bad = (
+        np.array(
+            [one.passes_from_mm2 * factor for one, factor in zip(fruit, factors, strict=True) if one.good == wanted]
+        )
+        for wanted in (True, False)
+    )
+    return good, bad
+
+
+def errors(good: Values, bad: Values, limits: Values) -> tuple[Counts, Counts]:
+    """How many good fruit each limit diverts, and how many bad ones it passes.
+
+    Args:
+        good: least limits by which they pass, mm².
+        bad: likewise.
+        limits: to try, mm².
+    """
+    diverted = len(good) - np.searchsorted(np.sort(good), limits, side="right")
+    return diverted, np.searchsorted(np.sort(bad), limits, side="right")
+
+
+def choose(good: Values, bad: Values, costs: Costs) -> float:
+    """The limit of the least cost on the marked fruit; of limits that cost the same, the middle of the widest gap.
+
+    Args:
+        good: least limits by which they pass, mm²; at least one of them finite.
+        bad: likewise; at least one.
+        costs: of the errors.
+    """
+    steps = np.unique(np.concatenate([good, bad]))
+    steps = steps[np.isfinite(steps)]
+    diverted, passed = errors(good, bad, steps)
+    cost = np.array([costs.of(p / len(bad), d / len(good)) for p, d in zip(passed, diverted, strict=True)])
+    # A limit anywhere from one value to the next errs alike. Beyond the last nothing is known.
+    ends = np.append(steps[1:], steps[-1])
+    cheapest = np.flatnonzero(cost <= cost.min() + 1e-12)
+    widest = max(cheapest, key=lambda place: ends[place] / steps[place])
+    return max(float(steps[widest]), math.sqrt(steps[widest] * ends[widest]))
+
+
+def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] | None:
+    """Errors on fruit that the limit was not chosen on: each is left out once, and judged by the limit of the others.
+
+    Args:
+        good: least limits by which they pass, mm².
+        bad: likewise.
+        costs: of the errors.
+
+    Returns:
+        Good fruit diverted and bad ones passed; None with too few to leave one out.
+    """
+    if np.isfinite(good).sum() < 2 or len(bad) < 2:
+        return None
+    diverted = sum(one > choose(np.delete(good, place), bad, costs) for place, one in enumerate(good))
+    passed = sum(one <= choose(good, np.delete(bad, place), costs) for place, one in enumerate(bad))
+    return int(diverted), int(passed)
 
 
 def rate_interval(happened: int, number: int) -> Interval:
@@ -123,10 +215,25 @@ def rate_interval(happened: int, number: int) -> Interval:
     return Interval(float(found.low), float(found.high))
 
 
-def fewest_good(rate: float) -> int:
-    """How many good fruit are needed for an interval's upper end to be known.
+def fewest_fruit(rate: float) -> int:
+    """How many fruit without an error show that no more than a rate of them err.
 
     Args:
-        rate: the wanted rate of false rejects.
+        rate: above 0 and below 1.
     """
     return math.ceil(math.log((1 - CONFIDENCE) / 2) / math.log(1 - rate))
+
+
+def _without_limits(recipe: Recipe, closing_mm: float) -> Recipe:
+    """The recipe with nothing to fail a fruit whose measurement is trusted up to a closing."""
+    last = recipe.damage.area[-1]
+    area = (last.model_copy(update={"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}),)
+    damage = {"area": area, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
+    stop = {"area_mm2": LARGEST_AREA_MM2, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
+    return recipe.model_copy(
+        update={
+            "damage": recipe.damage.model_copy(update=damage),
+            "early_stop": recipe.early_stop.model_copy(update=stop),
+            "steps": recipe.steps.model_copy(update={"stop_when_decided": True}),
+        }
+    )

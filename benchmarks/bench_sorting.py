@@ -1,0 +1,107 @@
+"""Sound, severely and mildly damaged fruit of the twin, decided by the station's own procedure and judge.
+
+Run with `./run bench sorting`. Closings are imaged once and kept below `state/sorting`, by a hash of the code that
+draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
+each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`;
+`--seeds tuning` and a part of the kinds print them only: what is tuned on must not be published as the result.
+"""
+
+import argparse
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from sorting import tables
+from sorting.cycle import Inspected, Practice, Unmeasured, inspect
+from sorting.presses import Closing, PressCache
+from sorting.specimens import KINDS, SEEDS, SOUND, Task
+
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
+from station.twin.damage import Severity
+from station.twin.fruit import Kind
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENT = ROOT / "docs" / "sorting.md"
+CACHE = ROOT / "state" / "sorting"
+AS_PLACED = Practice(centring=False, second_look=False)
+OF_EACH_GROUP = 100
+"""Fruit on which the practices are compared: without a size nearly all are pressed twice."""
+
+
+def decided(
+    tasks: Sequence[Task], recipes: Mapping[str, Recipe], practices: Iterable[Practice], cache: PressCache
+) -> dict[Practice, list[Inspected]]:
+    """Inspect fruit by several practices; closings that are not measured yet are, as many as possible at once."""
+    while True:
+        wanted: list[Closing] = []
+        found: dict[Practice, list[Inspected]] = {}
+        for practice in practices:
+            found[practice] = []
+            for task in tasks:
+                try:
+                    found[practice].append(inspect(task, recipes[task.kind], practice, cache.get))
+                except Unmeasured as missing:
+                    wanted.append(missing.closing)
+        if not wanted:
+            return found
+        cache.measure(wanted)
+
+
+def without_stop(recipe: Recipe) -> Recipe:
+    """The recipe as before there was `stop_when_decided`: pressed on to the early stop."""
+    return recipe.model_copy(update={"steps": recipe.steps.model_copy(update={"stop_when_decided": False})})
+
+
+def main() -> None:
+    """Inspect, print the tables, and write them where they are the result."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=300, help="sound fruit, and severely damaged ones, of each kind")
+    parser.add_argument("--others", type=int, help="mildly damaged fruit, and soft patches; a third of --count else")
+    parser.add_argument("--kinds", nargs="+", type=Kind, choices=KINDS, default=KINDS)
+    parser.add_argument("--seeds", choices=SEEDS, default="judging")
+    parser.add_argument("--recipes", type=Path, metavar="DIR", help="the folder of the recipes; else the shipped ones")
+    parser.add_argument("--processes", type=int, default=2)
+    asked = parser.parse_args()
+    others = asked.others if asked.others is not None else asked.count // 3
+    counts = {SOUND: asked.count, Severity.SEVERE: asked.count, Severity.MILD: others, Severity.PATCH: others}
+    tasks = [
+        Task(kind, str(group), asked.seeds, number)
+        for kind in asked.kinds
+        for group, count in counts.items()
+        for number in range(count)
+    ]
+    recipes: dict[str, Recipe] = {kind: find_recipe(kind, asked.recipes) for kind in asked.kinds}
+    cache = PressCache(CACHE, asked.processes)
+    all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
+    some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
+    compared = decided(some, recipes, tables.PRACTICES.values(), cache)
+    sound = [task for task in tasks if task.group == SOUND]
+    pressed_on = {kind: without_stop(recipe) for kind, recipe in recipes.items()}
+    before, after = (decided(sound, by, [AS_PLACED], cache)[AS_PLACED] for by in (pressed_on, recipes))
+    sections = {
+        "errors": tables.errors(all_of_it),
+        "why": tables.diverted_why(all_of_it),
+        "worth": tables.worth({name: compared[practice] for name, practice in tables.PRACTICES.items()}),
+        "spared": tables.spared(before, after, recipes),
+    }
+    for lines in sections.values():
+        print("\n".join(lines), end="\n\n")
+    if asked.seeds == "judging" and set(asked.kinds) == set(KINDS):
+        write(sections)
+
+
+def write(sections: Mapping[str, Sequence[str]]) -> None:
+    """Put the tables between their marks in the document."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for name, lines in sections.items():
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)"
+        table = "\n".join(lines) + "\n"
+        text, times = re.subn(pattern, lambda marks, table=table: marks[1] + table + marks[2], text, flags=re.DOTALL)
+        if times != 1:
+            raise SystemExit(f"{DOCUMENT}: expected the marks <!-- {name} --> and <!-- /{name} --> once")
+    DOCUMENT.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

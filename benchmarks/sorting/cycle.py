@@ -1,0 +1,234 @@
+"""The station's decision on one fruit, closing by closing: centre, press step by step, judge, look twice.
+
+The functions say what the service's cycle does with measured steps; here the steps come from a cache.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from math import hypot
+
+from station.inspection.fruit_size import FruitSize
+from station.inspection.judge import Verdict, early_stop, judge
+from station.inspection.press import Flag, Measured, Press
+from station.settings.gripper import GripperCalibration
+from station.settings.recipe_model import Recipe
+from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY
+from station.vocabulary import OutcomeName, Reason
+
+from .presses import Closing, Pressed, Step
+from .specimens import CALIBRATION_SD, Specimen, Task, draw
+
+CENTRE_FROM_MM = 0.4
+"""First contacts nearer to the field's middle are pressed where they are."""
+CENTRE_UP_TO_MM = 3.0
+"""Farther off, the fruit is not where the cell lays it, and the arm does not follow."""
+_ARM_MM = 0.05
+"""The UR10e's repeatability by its data sheet."""
+LOOK_AGAIN_AT = frozenset(
+    {Reason.CUT_BY_BORDER, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.AREA_NOT_RISING, Reason.NEAR_LIMIT}
+)
+"""Inconclusive for what another closing may show otherwise."""
+
+Look = Callable[[Closing], Pressed | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Practice:
+    """What of the station is used."""
+
+    size: str = "length"
+    """`length` by the grader, `class`, or `none`."""
+    centring: bool = True
+    second_look: bool = True
+    calibrated: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Inspected:
+    """One fruit's outcome."""
+
+    task: Task
+    outcome: OutcomeName
+    reasons: tuple[Reason, ...]
+    closings: int
+    """With the one that only found the first contact off the middle."""
+    steps: int
+    """Width steps after the onset, of all closings."""
+    most_force_n: float
+
+
+class Unmeasured(Exception):  # noqa: N818 (no error: a request)
+    """A closing that has to be measured first."""
+
+    def __init__(self, closing: Closing) -> None:
+        super().__init__(closing)
+        self.closing = closing
+
+
+def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspected:
+    """Decide on one fruit as the station does.
+
+    Args:
+        task: the fruit.
+        recipe: its recipe.
+        practice: what of the station is used.
+        look: gives measured closings.
+
+    Raises:
+        Unmeasured: a closing is not measured yet.
+    """
+    specimen, recipe = draw(task), sized_by(practice, recipe)
+    shift_mm, closings, steps, forces = (0.0, 0.0), 0, 0, [0.0]
+    presses: list[Press] = []
+
+    def close() -> Pressed:
+        nonlocal closings
+        closing = Closing(task, closings, shift_mm)
+        pressed = look(closing)
+        if pressed is None:
+            raise Unmeasured(closing)
+        closings += 1
+        return pressed
+
+    pressed = close()
+    if practice.centring and pressed.steps and (move := move_mm(pressed.steps[0])) is not None:
+        forces.append(pressed.steps[0].force_n)
+        shift_mm = move
+        pressed = close()
+    verdict = None
+    for again in (False, True):
+        if again:
+            last = pressed.steps[len(presses[-1].points) - 1]
+            if practice.centring and (move := move_mm(last)) is not None:
+                shift_mm = (round(shift_mm[0] + move[0], 2), round(shift_mm[1] + move[1], 2))
+            pressed = close()
+        press, used = as_stopped(pressed, specimen, recipe, practice)
+        presses.append(press)
+        steps += max(0, used - 1)
+        forces += [step.force_n for step in pressed.steps[:used]]
+        verdict = judge(together(presses), recipe)
+        if not (practice.second_look and looks_again(verdict)):
+            break
+    assert verdict is not None
+    return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, max(forces))
+
+
+def move_mm(step: Step) -> tuple[float, float] | None:
+    """How the arm moves so that a contact comes to the field's middle, as the contact's way in the image.
+
+    The usual scale serves: its 9 % are a tenth of a millimetre of the way.
+
+    Args:
+        step: whose contact.
+
+    Returns:
+        mm, to the arm's repeatability; None where the contact is near enough, too far off, or was not seen.
+    """
+    if step.offset_px is None:
+        return None
+    x_mm, y_mm = (-offset * TYPICAL_MM_PER_PX for offset in step.offset_px)
+    if not CENTRE_FROM_MM <= hypot(x_mm, y_mm) <= CENTRE_UP_TO_MM:
+        return None
+    return round(round(x_mm / _ARM_MM) * _ARM_MM, 2), round(round(y_mm / _ARM_MM) * _ARM_MM, 2)
+
+
+def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: Practice) -> tuple[Press, int]:
+    """One closing as far as the station goes, and the number of its points.
+
+    Args:
+        pressed: what was measured.
+        specimen: the fruit and its cell.
+        recipe: its recipe.
+        practice: which scale and size the station has.
+    """
+    mm_per_px = specimen.calibrated_mm_per_px if practice.calibrated else TYPICAL_MM_PER_PX
+    press = Press(
+        pressed.onset_mm,
+        pressed.onset_uncertainty_mm,
+        (),
+        size=_size(specimen, recipe, practice),
+        resolution_mm=GripperCalibration().mm_per_count,
+        # The usual scale's uncertainty is two standard deviations.
+        scale_uncertainty=CALIBRATION_SD if practice.calibrated else TYPICAL_UNCERTAINTY / 2,
+    )
+    for step in pressed.steps:
+        press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
+        if early_stop(press, recipe) is not None:
+            break
+    return press, len(press.points)
+
+
+def sized_by(practice: Practice, recipe: Recipe) -> Recipe:
+    """The recipe, going by what the grader of this practice gives.
+
+    Args:
+        practice: with its size.
+        recipe: as shipped.
+    """
+    rule = recipe.damage.size
+    if practice.size != "class" or rule is None:
+        return recipe
+    by_class = rule.model_copy(update={"judged_by": "class"})
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"size": by_class})})
+
+
+def _size(specimen: Specimen, recipe: Recipe, practice: Practice) -> FruitSize:
+    """What the PLC writes; a fruit outside all of the recipe's classes has none."""
+    if practice.size == "length":
+        return FruitSize(length_mm=specimen.graded_mm)
+    rule = recipe.damage.size
+    if practice.size == "none" or rule is None:
+        return FruitSize()
+    numbers = (one.number for one in rule.classes if one.smallest_mm <= specimen.graded_mm < one.largest_mm)
+    return FruitSize(size_class=next(numbers, None))
+
+
+def looks_again(verdict: Verdict) -> bool:
+    """Whether another closing may decide what this one did not.
+
+    Args:
+        verdict: on all closings so far.
+    """
+    return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= LOOK_AGAIN_AT | {Reason.EARLY_STOP}
+
+
+def together(presses: Iterable[Press]) -> Press:
+    """Closings on one fruit as one press: at each closing the mean of what is trusted, else of the later one.
+
+    What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean.
+
+    Args:
+        presses: one, or two in order.
+    """
+    first, *rest = presses
+    if not rest:
+        return first
+    second = rest[0]
+    theirs = {point.closing_mm: point for point in first.points}
+    points = []
+    for point in second.points:
+        other = theirs.get(point.closing_mm)
+        if other is None or (other.flags and not point.flags) or (other.flags and point.flags):
+            points.append(point)
+        elif point.flags:
+            points.append(other)
+        else:
+            points.append(
+                replace(
+                    point,
+                    area_mm2=(point.area_mm2 + other.area_mm2) / 2,
+                    area_px=(point.area_px + other.area_px) // 2,
+                )
+            )
+    return replace(second, points=tuple(points))
+
+
+def _measured(step: Step, mm_per_px: float) -> Measured:
+    area_mm2 = step.area_px * mm_per_px**2
+    return Measured(
+        closing_mm=step.closing_mm,
+        area_mm2=area_mm2,
+        area_px=step.area_px,
+        confidence=step.confidence,
+        flags=frozenset(Flag(flag) for flag in step.flags),
+    )

@@ -1,0 +1,175 @@
+"""Closings on the sorting run's fruit, imaged and measured as the station does it, and kept for any recipe's judge."""
+
+import hashlib
+import pickle
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+
+import station
+from station.settings.recipe import find_recipe
+from station.studies.gauge_grip import Grip
+from station.studies.workers import on_this_machine
+from station.twin.gel import SENSOR_SHAPE, Gel
+from station.twin.squeeze import Squeeze
+
+from .specimens import Task, draw
+
+_DEEPEST_MM = (6.1, 5.0)
+"""First closings go on to where the early stops of sound fruit lie, later ones two steps beyond the last threshold."""
+_KEEP_EVERY_S = 20.0
+_DECIDED_BY = (
+    "vision",
+    "studies/gauge_grip.py",
+    *(
+        f"twin/{name}"
+        for name in ("contact.py", "damage.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")
+    ),
+)
+"""Below the package: the code that decides what a closing measures."""
+
+
+class Closing(NamedTuple):
+    """One closing on a fruit."""
+
+    task: Task
+    number: int
+    """How many closings on the same fruit came before."""
+    shift_mm: tuple[float, float]
+    """By how much the arm has moved since the fruit was laid in, as the contact's way in the image."""
+
+
+class Step(NamedTuple):
+    """One measured width step, in pixels: the scale belongs to whoever judges."""
+
+    closing_mm: float
+    area_px: int
+    confidence: float | None
+    flags: tuple[str, ...]
+    offset_px: tuple[float, float] | None
+    """From the field's middle to the contact's, x to the right and y down; None without a contact."""
+    force_n: float
+    """The true one, before the flesh creeps."""
+
+
+class Pressed(NamedTuple):
+    """What was measured; no steps where nothing was touched."""
+
+    onset_mm: float | None
+    """As the gripper reads it."""
+    onset_uncertainty_mm: float
+    steps: tuple[Step, ...]
+
+
+def press(closing: Closing) -> tuple[Closing, Pressed]:
+    """Image and measure one closing.
+
+    Args:
+        closing: which.
+    """
+    cv2.setNumThreads(1)
+    one, recipe = draw(closing.task), find_recipe(closing.task.kind)
+    x_mm, y_mm = closing.shift_mm
+    pose = replace(one.pose, x_px=one.pose.x_px + x_mm / one.mm_per_px, y_px=one.pose.y_px + y_mm / one.mm_per_px)
+    grip = Grip(recipe, one.fruit, pose, one.unit, one.noise_seed + closing.number, one.mm_per_px)
+    onset = grip.approach(one.phase)
+    if onset is None:
+        return closing, Pressed(None, 0.0, ())
+    squeeze = Squeeze(one.fruit, Gel(mm_per_px=one.mm_per_px))
+    middle_x, middle_y = ((side - 1) / 2 for side in SENSOR_SHAPE[::-1])
+    deepest_mm, steps = _DEEPEST_MM[min(closing.number, 1)], []
+    for closing_mm, contact in grip.steps(onset):
+        if closing_mm > deepest_mm:
+            break
+        centre = contact.centroid_px
+        steps.append(
+            Step(
+                closing_mm,
+                contact.area_px,
+                contact.confidence,
+                tuple(sorted(flag.value for flag in contact.flags)),
+                None if centre is None else (centre[0] - middle_x, centre[1] - middle_y),
+                squeeze.at(one.fruit.width_mm - onset.width_mm + closing_mm).force_n,
+            )
+        )
+    return closing, Pressed(onset.width_mm + one.zero_mm, onset.uncertainty_mm, tuple(steps))
+
+
+class PressCache:
+    """Measured closings in a folder; those that other code or another recipe's segmentation made are not read.
+
+    Args:
+        folder: where; made when needed.
+        processes: that image at the same time.
+    """
+
+    def __init__(self, folder: Path, processes: int) -> None:
+        self._folder, self._processes = folder, processes
+        self._known: dict[Closing, Pressed] = {}
+        self._read: set[Path] = set()
+
+    def get(self, closing: Closing) -> Pressed | None:
+        """A closing; None where it is not measured yet.
+
+        Args:
+            closing: which.
+        """
+        place = self._place(closing.task)
+        if place not in self._read:
+            self._read.add(place)
+            if place.exists():
+                self._known.update(pickle.loads(place.read_bytes()))
+        return self._known.get(closing)
+
+    def measure(self, wanted: Iterable[Closing]) -> None:
+        """Image and measure closings, and keep them as they come.
+
+        Args:
+            wanted: which; those that are kept already are not made again.
+        """
+        missing = [closing for closing in dict.fromkeys(wanted) if self.get(closing) is None]
+        began = kept = time.monotonic()
+        for done, (closing, pressed) in enumerate(on_this_machine(press, missing, self._processes), 1):
+            self._known[closing] = pressed
+            now = time.monotonic()
+            if done == len(missing) or now - kept > _KEEP_EVERY_S:
+                self._keep()
+                kept = now
+            print(f"\r{done} of {len(missing)} closings in {now - began:.0f} s", end="", file=sys.stderr, flush=True)
+        if missing:
+            print(file=sys.stderr)
+
+    def _keep(self) -> None:
+        by_place: dict[Path, dict[Closing, Pressed]] = {}
+        for closing, pressed in self._known.items():
+            by_place.setdefault(self._place(closing.task), {})[closing] = pressed
+        for place, group in by_place.items():
+            place.parent.mkdir(parents=True, exist_ok=True)
+            beside = place.with_suffix(".new")
+            beside.write_bytes(pickle.dumps(group))
+            beside.replace(place)
+
+    def _place(self, task: Task) -> Path:
+        return self._folder / _made_by(task.kind) / f"{task.kind}-{task.group}-{task.seeds}.pickle"
+
+
+def _made_by(kind: str) -> str:
+    """A hash over the code and the recipe's part that decide what is measured."""
+    if kind not in _hashes:
+        root, recipe = Path(station.__file__).parent, find_recipe(kind)
+        digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
+        digest.update(f"{recipe.steps.step_mm}{recipe.segmentation!r}{recipe.imaging!r}".encode())
+        for name in _DECIDED_BY:
+            place = root / name
+            for file in [place] if place.is_file() else sorted(place.rglob("*.[pn][yp]*")):
+                digest.update(file.read_bytes())
+        _hashes[kind] = digest.hexdigest()[:12]
+    return _hashes[kind]
+
+
+_hashes: dict[str, str] = {}

@@ -1,0 +1,89 @@
+"""The fruit that the sorting run presses, each with its own sensor unit, gripper zero, phase, placing and tilt."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from station.twin.contact import Pose
+from station.twin.damage import DAMAGES, Severity
+from station.twin.fruit import Fruit, Kind, draw_fruit
+
+KINDS = (Kind.BLUEBERRY, Kind.RASPBERRY, Kind.STRAWBERRY)
+SOUND = "sound"
+GROUPS = (SOUND, *Severity)
+SEEDS = {"tuning": 20, "judging": 21}
+"""Sets of fruit that never meet: recipes are tuned on the first and judged on the second."""
+
+_ZERO_SD_MM = 0.2
+_HABIT_PX, _HABIT_DEG = 10.0, 3.0
+_PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
+"""As the gauge study draws an operator's set-up and how a fruit is laid in; here both anew for each fruit."""
+_SCALES_MM_PER_PX = (0.0255, 0.0291)
+"""What is published for single DIGIT units."""
+CALIBRATION_SD = 0.011
+"""Relative error of a calibrated scale: half the ± 2.2 %, two standard deviations, that `station calibrate` states at
+three places (docs/calibration.md)."""
+_GRADER_MM = 1.0
+"""A grader's length is within this of the true one, uniform."""
+
+
+class Task(NamedTuple):
+    """One fruit of a set."""
+
+    kind: Kind
+    group: str
+    """One of `GROUPS`."""
+    seeds: str
+    """A key of `SEEDS`."""
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Specimen:
+    """A fruit, how it lies, and the cell that presses it."""
+
+    fruit: Fruit
+    pose: Pose
+    unit: int
+    """Seed of the sensor's light."""
+    mm_per_px: float
+    """The unit's true scale."""
+    calibrated_mm_per_px: float
+    """What its calibration found."""
+    zero_mm: float
+    """By how much every width is read too large."""
+    phase: float
+    """Where the fruit's width lies between two counts of the gripper, 0 to 1."""
+    noise_seed: int
+    graded_mm: float
+    """The length as a grader has it."""
+
+
+def draw(task: Task) -> Specimen:
+    """Draw a fruit and its cell; the same task gives the same.
+
+    Args:
+        task: which.
+    """
+    generator = np.random.default_rng(
+        [SEEDS[task.seeds], KINDS.index(task.kind), GROUPS.index(task.group), task.number]
+    )
+    fruit_seed, unit, noise_seed = (int(one) for one in generator.integers(2**31, size=3))
+    fruit = draw_fruit(task.kind, fruit_seed)
+    if task.group != SOUND:
+        fruit = replace(fruit, bruised=True, damage=DAMAGES[Severity(task.group)])
+    shift_px = generator.normal(0.0, _HABIT_PX, 2) + generator.normal(0.0, _PLACE_PX, 2)
+    turn_deg = generator.normal(0.0, _HABIT_DEG) + generator.normal(0.0, _TURN_DEG)
+    mm_per_px = float(generator.uniform(*_SCALES_MM_PER_PX))
+    return Specimen(
+        fruit=fruit,
+        pose=Pose(240.0 + shift_px[0], 320.0 + shift_px[1], turn_deg, generator.normal(0.0, _TILT_DEG)),
+        unit=unit,
+        mm_per_px=mm_per_px,
+        calibrated_mm_per_px=mm_per_px * (1.0 + float(generator.normal(0.0, CALIBRATION_SD))),
+        zero_mm=float(generator.normal(0.0, _ZERO_SD_MM)),
+        phase=float(generator.uniform()),
+        noise_seed=noise_seed,
+        graded_mm=fruit.length_mm + float(generator.uniform(-_GRADER_MM, _GRADER_MM)),
+    )

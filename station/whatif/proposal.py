@@ -1,0 +1,168 @@
+"""The limit proposed from marked fruit, closing by closing, and what is said of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from station.records.marks import Mark
+from station.settings.recipe_model import Recipe
+from station.whatif.limits import (
+    Costs,
+    Exponent,
+    MarkedFruit,
+    Values,
+    at_reference,
+    choose,
+    cross_validated,
+    errors,
+    exponent_of,
+    fewest_fruit,
+    marked_fruit,
+    rate_interval,
+)
+from station.whatif.stored import StoredPress
+
+_KNOWN_SHARE = 0.9
+"""A closing that fewer of the good fruit reached is not proposed: what the others show there is not known."""
+_SURE = 2.0
+"""Standard errors by which the fruit's own exponent has to differ from the recipe's to take its place."""
+_CURVE_POINTS = 80
+_RATES_TO_SHOW = (0.05, 0.01)
+"""Shares of damaged fruit passed, of which is told how many marked ones would show them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """The limit of the least cost at one closing."""
+
+    closing_mm: float
+    fruit: tuple[MarkedFruit, ...]
+    unknown: int
+    """Marked fruit that say nothing about this closing."""
+    exponent: float
+    """For the draft; 0 where the recipe does not go by the size."""
+    found_exponent: Exponent | None
+    good: Values
+    bad: Values
+    """Least limits by which the fruit pass, for a fruit of the reference length, mm²."""
+    limit_mm2: float
+    left_out: tuple[int, int] | None
+    """Good fruit diverted and bad ones passed, each by the limit of the others; None with too few."""
+
+    def cost(self, costs: Costs) -> float:
+        """Of an average fruit, on fruit that the limit was not chosen on; of the worst where they are too few.
+
+        Args:
+            costs: of the errors.
+        """
+        diverted, passed = self.left_out or (len(self.good), len(self.bad))
+        return costs.of(passed / len(self.bad), diverted / len(self.good))
+
+
+def proposals(
+    stored: Sequence[StoredPress], marked: Mapping[int, Mark], own: Mapping[str, Recipe], recipe: Recipe, costs: Costs
+) -> list[Proposal]:
+    """A limit for each closing that enough of the fruit reached, the cheapest first.
+
+    Args:
+        stored: the marked presses.
+        marked: good or bad, by their sequence.
+        own: the recipes that they were pressed by, by their hash.
+        recipe: whose limit is looked for.
+        costs: of the errors.
+    """
+    closings = {*recipe.steps.result_closings_mm, *(each.closing_mm for each in recipe.damage.area)}
+    found = [_at(closing_mm, stored, marked, own, recipe, costs) for closing_mm in sorted(closings)]
+    known = [each for each in found if each is not None]
+    return sorted(known, key=lambda each: (each.cost(costs), each.closing_mm))
+
+
+def _at(
+    closing_mm: float,
+    stored: Sequence[StoredPress],
+    marked: Mapping[int, Mark],
+    own: Mapping[str, Recipe],
+    recipe: Recipe,
+    costs: Costs,
+) -> Proposal | None:
+    seen = [
+        (each, marked_fruit(each.press, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good"))
+        for each in stored
+    ]
+    fruit = tuple(one for _, one in seen if one is not None)
+    reached = sum(one.area_mm2 is not None for one in fruit if one.good)
+    all_good = sum(marked[each.sequence] == "good" for each in stored)
+    found, rule = exponent_of(fruit), recipe.damage.size
+    exponent = 0.0 if rule is None else rule.exponent
+    if rule is not None and found is not None and abs(found.value - exponent) > _SURE * found.standard_error:
+        exponent = round(min(max(found.value, 0.05), 3.0), 2)
+    good, bad = at_reference(fruit, exponent, 1.0 if rule is None else rule.reference_mm)
+    if reached < _KNOWN_SHARE * all_good or not np.isfinite(good).any() or not len(bad):
+        return None
+    return Proposal(
+        closing_mm=closing_mm,
+        fruit=fruit,
+        unknown=len(seen) - len(fruit),
+        exponent=exponent,
+        found_exponent=found,
+        good=good,
+        bad=bad,
+        limit_mm2=choose(good, bad, costs),
+        left_out=cross_validated(good, bad, costs),
+    )
+
+
+def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
+    """A proposal's figures by name.
+
+    Args:
+        proposal: which.
+        costs: that it was chosen for.
+    """
+    good, bad, limit = proposal.good, proposal.bad, np.array([proposal.limit_mm2])
+    diverted, passed = (int(count[0]) for count in errors(good, bad, limit))
+    found = proposal.found_exponent
+    return {
+        "closing_mm": proposal.closing_mm,
+        "limit_mm2": proposal.limit_mm2,
+        "exponent": proposal.exponent,
+        "exponent_of_these_fruit": None
+        if found is None
+        else {"value": found.value, "standard_error": found.standard_error, "fruit": found.fruit},
+        "not_known": proposal.unknown,
+        "at_least": sum(one.at_least for one in proposal.fruit),
+        "good_diverted": _share(diverted, len(good)),
+        "bad_passed": _share(passed, len(bad)),
+        "left_out": None
+        if proposal.left_out is None
+        else {
+            "good_diverted": _share(proposal.left_out[0], len(good)),
+            "bad_passed": _share(proposal.left_out[1], len(bad)),
+        },
+        "cost": proposal.cost(costs),
+        "bad_needed_to_show": {f"{rate:g}": fewest_fruit(rate) for rate in _RATES_TO_SHOW},
+        "curve": _curve(proposal),
+    }
+
+
+def _curve(proposal: Proposal) -> list[dict[str, Any]]:
+    """Both errors over the limit, each with its interval."""
+    known = np.concatenate([proposal.good, proposal.bad])
+    known = known[np.isfinite(known)]
+    limits = np.linspace(0.95 * known.min(), 1.05 * known.max(), _CURVE_POINTS)
+    counts = zip(limits, *errors(proposal.good, proposal.bad, limits), strict=True)
+    return [
+        {
+            "limit_mm2": float(limit),
+            "good_diverted": _share(int(diverted), len(proposal.good)),
+            "bad_passed": _share(int(passed), len(proposal.bad)),
+        }
+        for limit, diverted, passed in counts
+    ]
+
+
+def _share(count: int, of: int) -> dict[str, Any]:
+    interval = rate_interval(count, of)
+    return {"count": count, "of": of, "share": count / of if of else None, "interval": [interval.low, interval.high]}

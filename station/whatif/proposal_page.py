@@ -1,0 +1,127 @@
+"""A proposed limit in sentences and on a page: good and bad fruit, and both errors over the limit."""
+
+import base64
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import jinja2
+import numpy as np
+from matplotlib.figure import Figure
+
+from station.whatif.proposal import Proposal
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>Thresholds: {{ title }}</title>
+<style>body { font: 15px/1.45 system-ui, sans-serif; max-width: 900px; margin: 0 auto; padding: 20px 16px; }
+img { max-width: 100%; }</style></head><body>
+<h1>Thresholds: {{ title }}</h1>
+{% for line in lines %}<p>{{ line }}</p>{% endfor %}
+<img src="{{ histogram }}" alt="histogram of good and bad fruit">
+<img src="{{ errors }}" alt="both errors over the limit">
+</body></html>
+"""
+
+
+def lines_of(told: dict[str, Any]) -> list[str]:
+    """The sentences of a proposal, for the terminal and the page.
+
+    Args:
+        told: all its figures, by name.
+    """
+    best = told["proposed"]
+    costs = f"costs {told['false_accept_cost']:g} sound ones diverted and {100 * told['damaged_share']:g} % are damaged"
+    lines = [
+        f"proposed: {best['limit_mm2']:.1f} mm² at {best['closing_mm']:g} mm, where a damaged fruit passed {costs}",
+        f"of the marked fruit: {_of(best['good_diverted'])} good diverted, {_of(best['bad_passed'])} bad passed",
+    ]
+    if best["left_out"] is None:
+        lines.append("too few to try the limit on fruit that it was not chosen on: two of either kind are needed")
+    else:
+        left_out = best["left_out"]
+        lines.append(
+            f"each left out once, judged by the limit of the others: {_of(left_out['good_diverted'])} good diverted, "
+            f"{_of(left_out['bad_passed'])} bad passed"
+        )
+    needed = best["bad_needed_to_show"]
+    shares = ", ".join(f"{number} to show that at most {100 * float(rate):g} % pass" for rate, number in needed.items())
+    lines.append(f"{best['bad_passed']['of']} bad fruit, none of them passed, would not show much: it takes {shares}")
+    if found := best["exponent_of_these_fruit"]:
+        lines.append(
+            f"exponent of the size: {best['exponent']:g}; these {found['fruit']} fruit by themselves give "
+            f"{found['value']:.2f} ± {found['standard_error']:.2f}"
+        )
+    if best["at_least"]:
+        lines.append(
+            f"{best['at_least']} fruit ended before {best['closing_mm']:g} mm: their area is only known to be larger"
+        )
+    if best["not_known"]:
+        lines.append(f"{best['not_known']} marked fruit tell nothing: a fault ended their steps")
+    lines.extend(
+        f"at {other['closing_mm']:g} mm: {other['limit_mm2']:.1f} mm², costs {_times(other, best)}"
+        for other in told["other_closings"]
+    )
+    for name, rate in told["by_the_proposed_recipe"].items():
+        low, high = ("not known" if end is None else f"{100 * end:.1f} %" for end in rate["interval"])
+        lines.append(
+            f"{name} fruit rejected by the proposed recipe: {rate['rejected']} of {rate['decided']} decided "
+            f"({rate['marked']} marked), 95 % interval {low} to {high}"
+        )
+    return lines
+
+
+def _of(share: dict[str, Any]) -> str:
+    low, high = share["interval"]
+    return f"{share['count']} of {share['of']} ({100 * low:.1f} to {100 * high:.1f} %)"
+
+
+def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
+    return f"{other['cost'] / best['cost']:.1f} times as much" if best["cost"] else f"{other['cost']:.3f} in place of 0"
+
+
+def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
+    """The page with its two pictures, in one file.
+
+    Args:
+        title: the recipe's.
+        best: what is proposed.
+        told: all its figures, by name.
+    """
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    pictures = {"histogram": _histogram(best), "errors": _errors(best, told["proposed"]["curve"])}
+    return environment.from_string(_PAGE).render(title=title, lines=lines_of(told), **pictures)
+
+
+def _histogram(best: Proposal) -> str:
+    """Good and bad beside each other, with the limit; a data URI."""
+    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    axes = figure.add_subplot()
+    groups = [values[np.isfinite(values)] for values in (best.good, best.bad)]
+    axes.hist(groups, bins=30, label=["good", "bad"], color=["#1f4e79", "#b3261e"])
+    axes.axvline(best.limit_mm2, color="#222222")
+    axes.set_xlabel(f"least limit by which the fruit passes, at {best.closing_mm:g} mm of closing [mm²]")
+    axes.set_ylabel("fruit")
+    axes.legend(frameon=False)
+    return _data_uri(figure)
+
+
+def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
+    """Both errors over the limit, with their intervals; a data URI."""
+    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    axes = figure.add_subplot()
+    limits = [point["limit_mm2"] for point in curve]
+    for name, told, colour in (("good_diverted", "good diverted", "#1f4e79"), ("bad_passed", "bad passed", "#b3261e")):
+        axes.plot(limits, [100 * point[name]["share"] for point in curve], color=colour, label=told)
+        low, high = ([100 * point[name]["interval"][end] for point in curve] for end in (0, 1))
+        axes.fill_between(limits, low, high, color=colour, alpha=0.15)
+    axes.axvline(best.limit_mm2, color="#222222")
+    axes.set_xlabel(f"limit at {best.closing_mm:g} mm of closing [mm²]")
+    axes.set_ylabel("share of the fruit, with its 95 % interval [%]")
+    axes.legend(frameon=False)
+    return _data_uri(figure)
+
+
+def _data_uri(figure: Figure) -> str:
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=110)
+    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()

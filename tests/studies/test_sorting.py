@@ -1,0 +1,210 @@
+"""The sorting run: what it draws, presses, decides closing by closing, keeps and counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.sorting import presses, tables
+from benchmarks.sorting.cycle import (
+    Inspected,
+    Practice,
+    Unmeasured,
+    as_stopped,
+    inspect,
+    looks_again,
+    move_mm,
+    sized_by,
+    together,
+)
+from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
+from benchmarks.sorting.specimens import KINDS, Task, draw
+from station.inspection.judge import judge
+from station.inspection.press import Flag, Measured, Press
+from station.settings.recipe import find_recipe
+from station.twin.fruit import Kind
+from station.vision.scale import TYPICAL_MM_PER_PX
+from station.vocabulary import Reason
+
+BLUEBERRY = Task(Kind.BLUEBERRY, "sound", "tuning", 0)
+CLOSINGS_MM = (0.0, 1.12, 1.87, 3.0, 4.12)
+SOUND_MM2 = (3.0, 19.0, 27.0, 37.0, 47.0)
+
+
+def pressed(areas_mm2=SOUND_MM2, offset_px=(0.0, 0.0), flags=()) -> Pressed:
+    """A closing on the blueberry above, in its own unit's pixels; the flags are the third step's."""
+    scale = draw(BLUEBERRY).calibrated_mm_per_px
+    steps = [
+        Step(closing_mm, round(area_mm2 / scale**2), 0.9, flags if number == 3 else (), offset_px, number / 2)
+        for number, (closing_mm, area_mm2) in enumerate(zip(CLOSINGS_MM, areas_mm2, strict=True))
+    ]
+    return Pressed(15.9, 0.1, tuple(steps))
+
+
+class Looks:
+    """Closings handed out in turn, and which were asked for."""
+
+    def __init__(self, *answers: Pressed | None) -> None:
+        self.answers, self.asked = list(answers), []
+
+    def __call__(self, closing: Closing) -> Pressed | None:
+        self.asked.append(closing)
+        return self.answers.pop(0)
+
+
+@pytest.fixture
+def recipe():
+    return find_recipe("blueberry")
+
+
+class TestSpecimens:
+    def test_a_fruit_is_drawn_again_alike_and_no_two_sets_share_one(self):
+        assert draw(BLUEBERRY) == draw(BLUEBERRY)
+        others = [BLUEBERRY._replace(seeds="judging"), BLUEBERRY._replace(number=1), BLUEBERRY._replace(group="mild")]
+        assert len({draw(task).fruit.length_mm for task in (BLUEBERRY, *others)}) == 4
+
+    def test_units_lie_in_their_range_and_graders_and_calibrations_err_as_they_say(self):
+        drawn = [draw(BLUEBERRY._replace(number=number)) for number in range(300)]
+        assert all(0.0255 <= one.mm_per_px <= 0.0291 for one in drawn)
+        graded = np.array([one.graded_mm - one.fruit.length_mm for one in drawn])
+        assert 0.9 < np.abs(graded).max() <= 1.0
+        errors = np.array([one.calibrated_mm_per_px / one.mm_per_px - 1 for one in drawn])
+        assert errors.std() == pytest.approx(0.011, rel=0.15)
+
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_the_group_says_how_it_is_damaged(self, kind):
+        task = Task(kind, "sound", "tuning", 3)
+        assert not draw(task).fruit.bruised
+        assert draw(task._replace(group="mild")).fruit.damage.softening == 0.6
+
+
+class TestPressing:
+    def test_the_arm_brings_the_contact_to_the_middle(self):
+        """A closing off the middle, its move, and the next closing: nearer than a move is made for."""
+        task = next(
+            task for number in range(50) if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
+        )
+        _, first = presses.press(Closing(task, 0, (0.0, 0.0)))
+        move = move_mm(first.steps[0])
+        assert move is not None
+        _, second = presses.press(Closing(task, 1, move))
+        for step in second.steps[:4]:
+            assert step.offset_px is not None
+            assert np.hypot(*step.offset_px) * TYPICAL_MM_PER_PX < 0.4
+        # Later closings are not taken as far as the early stops of the first.
+        assert first.steps[-1].closing_mm > second.steps[-1].closing_mm > 4
+
+    def test_an_arm_moves_by_its_own_steps_within_its_bounds(self):
+        step = Step(0.0, 500, 0.9, (), None, 0.1)
+        assert move_mm(step) is None
+        assert move_mm(step._replace(offset_px=(10.0, 0.0))) is None
+        assert move_mm(step._replace(offset_px=(30.0, -20.0))) == (-0.8, 0.55)
+        assert move_mm(step._replace(offset_px=(120.0, 0.0))) is None
+
+
+class TestDeciding:
+    def test_one_closing_decides_a_sound_fruit_in_the_middle(self, recipe):
+        looks = Looks(pressed())
+        one = inspect(BLUEBERRY, recipe, Practice(), looks)
+        assert (one.outcome, one.closings) == ("PASS", 1)
+        assert looks.asked == [Closing(BLUEBERRY, 0, (0.0, 0.0))]
+        assert one.most_force_n == (one.steps) / 2
+
+    def test_a_contact_off_the_middle_is_centred_before_it_is_judged(self, recipe):
+        looks = Looks(pressed((9.0,) * 5, offset_px=(40.0, 0.0)), pressed())
+        one = inspect(BLUEBERRY, recipe, Practice(), looks)
+        assert (one.outcome, one.closings) == ("PASS", 2)
+        assert looks.asked[1] == Closing(BLUEBERRY, 1, (-1.05, 0.0))
+        assert inspect(BLUEBERRY, recipe, Practice(centring=False), Looks(pressed(offset_px=(40.0, 0.0)))).closings == 1
+
+    def test_an_inconclusive_fruit_is_pressed_once_more(self, recipe):
+        doubtful = pressed(flags=("low_confidence",))
+        assert inspect(BLUEBERRY, recipe, Practice(), Looks(doubtful, pressed())).outcome == "PASS"
+        assert inspect(BLUEBERRY, recipe, Practice(second_look=False), Looks(doubtful)).outcome == "NO_RESULT"
+        twice = inspect(BLUEBERRY, recipe, Practice(), Looks(doubtful, doubtful))
+        assert (twice.outcome, twice.reasons, twice.closings) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,), 2)
+
+    def test_a_damaged_fruit_is_not(self, recipe):
+        looks = Looks(pressed((9.0, 40.0, 60.0, 80.0, 100.0)))
+        assert inspect(BLUEBERRY, recipe, Practice(), looks).outcome == "FAIL"
+
+    def test_what_is_not_measured_is_asked_for(self, recipe):
+        with pytest.raises(Unmeasured) as missing:
+            inspect(BLUEBERRY, recipe, Practice(), Looks(pressed(offset_px=(40.0, 0.0)), None))
+        assert missing.value.closing == Closing(BLUEBERRY, 1, (-1.05, 0.0))
+
+    @pytest.mark.parametrize(
+        ("size", "told"), [("length", (True, False)), ("class", (False, True)), ("none", (False,) * 2)]
+    )
+    def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, told):
+        practice = Practice(size=size)
+        by = sized_by(practice, recipe)
+        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice)
+        assert (press.size.length_mm is not None, press.size.size_class is not None) == told
+        assert by.damage.size is not None
+        assert by.damage.size.judged_by == ("class" if size == "class" else "length")
+
+    def test_the_usual_scale_stands_in_where_a_unit_was_never_calibrated(self, recipe):
+        one = replace(draw(BLUEBERRY), mm_per_px=0.029, calibrated_mm_per_px=0.029)
+        areas = [
+            as_stopped(pressed(), one, recipe, Practice(calibrated=calibrated))[0].points[2].area_mm2
+            for calibrated in (True, False)
+        ]
+        assert areas[1] == pytest.approx(areas[0] * (0.0266 / 0.029) ** 2)
+
+
+class TestTogether:
+    def press(self, area_mm2: float, *flags: Flag) -> Press:
+        return Press(15.9, 0.1, (Measured(3.0, area_mm2, round(area_mm2 * 1400), 0.9, frozenset(flags)),))
+
+    @pytest.mark.parametrize(
+        ("first", "second", "area_mm2"),
+        [((30.0,), (34.0,), 32.0), ((30.0, Flag.SATURATED), (34.0,), 34.0), ((30.0,), (34.0, Flag.SATURATED), 30.0)],
+    )
+    def test_the_mean_of_what_is_trusted(self, first, second, area_mm2):
+        [point] = together([self.press(*first), self.press(*second)]).points
+        assert (point.area_mm2, point.flags) == (area_mm2, frozenset())
+
+    def test_two_doubtful_ones_stay_doubtful(self):
+        [point] = together([self.press(30.0, Flag.SATURATED), self.press(34.0, Flag.CUT_BY_BORDER)]).points
+        assert (point.area_mm2, point.flags) == (34.0, {Flag.CUT_BY_BORDER})
+
+    def test_a_fault_is_no_reason_to_look_again(self, recipe):
+        assert not looks_again(judge(Press(None, 0.0, (), (Reason.CAMERA_FAULT,)), recipe))
+
+
+class TestCache:
+    def test_closings_are_measured_once_and_kept(self, tmp_path, monkeypatch, capsys):
+        made = []
+
+        def press(closing: Closing) -> tuple[Closing, Pressed]:
+            made.append(closing)
+            return closing, pressed()
+
+        monkeypatch.setattr(presses, "press", press)
+        wanted = [Closing(BLUEBERRY._replace(number=number), 0, (0.0, 0.0)) for number in range(3)]
+        PressCache(tmp_path, 1).measure([*wanted, wanted[0]])
+        again = PressCache(tmp_path, 1)
+        again.measure(wanted)
+        assert made == wanted
+        assert again.get(wanted[2]) == pressed()
+        assert "3 of 3" in capsys.readouterr().err
+        monkeypatch.setattr(presses, "_hashes", {Kind.BLUEBERRY: "other code"})
+        assert PressCache(tmp_path, 1).get(wanted[0]) is None
+
+
+class TestTables:
+    def test_wilsons_interval_has_its_known_values(self):
+        assert tables.wilson(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
+        assert tables.wilson(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-4)
+
+    def test_both_errors_are_counted(self):
+        def one(group, outcome):
+            return Inspected(BLUEBERRY._replace(group=group), outcome, (), 1, 3, 1.0)
+
+        inspected = [one("sound", "PASS"), one("sound", "NO_RESULT"), one("severe", "FAIL"), one("mild", "PASS")]
+        row = tables.errors(inspected)[2]
+        assert row.startswith("| blueberry | 1 of 2, 50.0 %")
+        assert "| 0 of 1, 0.0 %" in row
+        assert "| 1 of 1, 100.0 %" in row
+        assert row.endswith("| not run |")
