@@ -356,7 +356,8 @@ class RobustMethod:
         if state.outlines or "weak contact" in self._without:
             return
         place = self._weak.place(self._weak_response(state))
-        if place is None:
+        least = self._constants.weak_least_curvature * state.threshold
+        if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
             return
         state.weak_at = place
         state.candidates = around(place, state.moved, self._constants)
@@ -440,7 +441,8 @@ class RobustMethod:
             return outline
         if self._one_colour(state, outline, sure=sure):
             return None
-        return outline if sure or state.weak_at is not None or outline.confidence >= p.support_least else None
+        supported = sure or state.weak_at is not None or self._sureness(outline, state) >= p.support_least
+        return outline if supported else None
 
     def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
         """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.

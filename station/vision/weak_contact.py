@@ -74,13 +74,13 @@ class WeakContactDetector:
         self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
         sigma_px = constants.dent_sigma * min(1.0, max(height, width) / _LONG_SIDE_PX)
-        reach_px = int(np.ceil(_REACH * sigma_px))
-        x = np.arange(-reach_px, reach_px + 1, dtype=np.float32)
+        self._reach_px = int(np.ceil(_REACH * sigma_px))
+        x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
         self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
         cut_off = (((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit).any(axis=2)
         blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
-        side = 2 * reach_px + 1
+        side = 2 * self._reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
         self._valid = (cv2.dilate(blind, around) == 0).astype(np.float32)
         down = ((np.arange(height) + 0.5) / height - 0.5)[:, None]
@@ -141,6 +141,16 @@ class WeakContactDetector:
         """
         _, strongest, _, (x, y) = cv2.minMaxLoc(response.field)
         return (x, y) if strongest > self.threshold * response.compression else None
+
+    def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
+        """Rows and columns within the dent's reach of a place.
+
+        Args:
+            place: x and y, px.
+        """
+        x, y = place
+        reach_px = self._reach_px
+        return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
     def supports(self, region: Mask, response: WeakResponse) -> bool:
         """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
