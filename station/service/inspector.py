@@ -9,6 +9,7 @@ from station.devices.gripper.errors import GripperLinkLostError, GripperSilentEr
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, Event
+from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
@@ -51,6 +52,8 @@ class Inspector:
         self._reached: MoveResult | None = None
         self._glanced: Seen | None = None
         self._examining: asyncio.Future[bool] | None = None
+        self._goes_on = asyncio.Event()
+        """Set when a measured step lets another one be made."""
 
     async def open_jaws(self) -> Event:
         """Let go of whatever is held."""
@@ -133,9 +136,23 @@ class Inspector:
         return Event.ONSET_FOUND
 
     async def close_step(self, now: Inspection) -> Event:
-        """Close by one step, counted in measured widths from the first."""
+        """Close by one step, counted in measured widths from the first.
+
+        The step before is measured meanwhile, unless it may be the last: then its measurement comes first.
+        """
+        if self._may_decide(now) and len(now.seen) < len(now.steps):
+            self._goes_on.clear()
+            await self._goes_on.wait()
         self._reached = await self._grip(now).close_to(now.next_width_mm)
         return Event.REACHED
+
+    @staticmethod
+    def _may_decide(now: Inspection) -> bool:
+        """Whether the last captured step reaches the last damage threshold of a recipe that stops when decided."""
+        recipe, onset_mm = now.active.recipe, now.onset_mm
+        if not recipe.steps.stop_when_decided or onset_mm is None:
+            return False
+        return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.area[-1].closing_mm - AT_MM
 
     async def settle(self, now: Inspection) -> Event:
         """Let fruit and gel come to rest: every step waits as long, because fruit creeps."""
@@ -159,7 +176,10 @@ class Inspector:
     async def measure(self, now: Inspection) -> Event:
         """Measure the captured step that is next in order, and say whether the recipe lets another one be made."""
         now.seen.append(await self._eye.measure(now.steps[len(now.seen)]))
-        return Event.MEASURED if early_stop(now.press(), now.active.recipe) is None else Event.EARLY_STOP
+        if early_stop(now.press(), now.active.recipe) is not None:
+            return Event.EARLY_STOP
+        self._goes_on.set()
+        return Event.MEASURED
 
     async def judge(self, now: Inspection) -> Event:
         """Judge what was measured."""

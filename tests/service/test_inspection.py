@@ -13,7 +13,7 @@ from station.vocabulary import Reason
 
 @pytest.mark.parametrize(("kind", "seed"), [("strawberry", 4), ("raspberry", 4), ("blueberry", 1)])
 def test_a_sound_fruit_is_measured_and_a_bruised_one_never_passes(bench, kind, seed):
-    """The area at each step lies near what the twin's gel truly felt."""
+    """The area at the last step is near what the gel truly felt: after the step that decides nothing is pressed on."""
     truths = {}
 
     async def scenario():
