@@ -14,7 +14,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from drawn_ball import DrawnBall
 
 from station.calibration import figures
 from station.calibration.bench import Place, Unit
@@ -24,6 +23,7 @@ from station.calibration.verifying import Verifying
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.segmentation import Segmentation
+from station.studies.drawn_ball import DrawnBall
 from station.twin.digit.sensor import Image
 from station.vision.methods import make_method, median_image
 from station.vision.scale import TYPICAL_MM_PER_PX

@@ -44,10 +44,10 @@ from step to step, from before the first touch.
 
 A data set's cost is the sum of these means; a perfect measurement has 0.
 
-- Over contacts above 2 mm²: the error of the area, at most 1; 1 more for a judged area that is wrong by 35 % or
-  more, rising from nothing at 15 %; 0.05 more for one that is not judged; 0.5 more for a drop, a judged area more than
-  25 % under an earlier judged one of its press. An area is worth judging if it is wrong in fewer than one of twenty
-  cases.
+- Over contacts above 2 mm²: the error of the area, at most 1; what the outline's intersection over union with the
+  truth lacks to 1; 1 more for a judged area that is wrong by 35 % or more, rising from nothing at 15 %; 0.05 more for
+  one that is not judged; 0.5 more for a drop, a judged area more than 25 % under an earlier judged one of its press. An
+  area is worth judging if it is wrong in fewer than one of twenty cases.
 - Over untouched frames: 1 for a false area, 1 more if it is judged. Against another unit's reference, 1 for what is
   judged.
 - Over weak contacts: 1 for one that is not found.

@@ -2,8 +2,9 @@
 
 A data set's cost is the sum of these means; a perfect measurement has 0.
 
-- over contacts above 2 mm²: the error of the area, |measured / true - 1|, at most 1; and beside it `WRONG` for a judged
-  area that is wrong by 35 % or more, rising from nothing at 15 %, `DOUBTED` for one that is not judged, and `DROP` for
+- over contacts above 2 mm²: the error of the area, |measured / true - 1|, at most 1; `SHAPE` times what the outline's
+  intersection over union lacks to 1, since an area can be right by chance; and beside them `WRONG` for a judged area
+  that is wrong by 35 % or more, rising from nothing at 15 %, `DOUBTED` for one that is not judged, and `DROP` for
   a judged area more than 25 % under an earlier judged one of its press (followed presses only);
 - over untouched frames: 1 for an area where there is none, and `WRONG` more where it is judged; with another unit's
   reference 1 for what is judged only;
@@ -22,7 +23,7 @@ import numpy.typing as npt
 from fit.evaluation import LEAST_MM2, PressScore, Scores
 from fit.parts import Groups
 
-WRONG, DOUBTED, DROP, UNORDERED = 1.0, 0.05, 0.5, 0.1
+SHAPE, WRONG, DOUBTED, DROP, UNORDERED = 1.0, 1.0, 0.05, 0.5, 0.1
 ORDERED = 0.99
 RAMP = (0.15, 0.35)
 """Errors from which on a judged area counts as wrong, and counts in full: a step at 25 % would be all noise."""
@@ -45,7 +46,7 @@ def sums(score: PressScore, scored: str) -> Floats:
         if scored == "found":
             found[0] += (not step.has_area, 1) if 0 < step.true_mm2 <= LEAST_MM2 + 0.5 else (0, 0)
         elif step.true_mm2 > LEAST_MM2:
-            loss = min(1.0, step.error) + DROP * step.dropped
+            loss = min(1.0, step.error) + SHAPE * (1 - step.overlap) + DROP * step.dropped
             loss += (
                 WRONG * float(np.clip((step.error - RAMP[0]) / (RAMP[1] - RAMP[0]), 0, 1)) if step.judged else DOUBTED
             )

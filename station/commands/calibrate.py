@@ -81,20 +81,29 @@ def calibrate(
         return
     site = load_configuration(config)
     draft = _run(site, operator, places, bench=bench, yes=yes)
-    folder = _store(site, operator, draft)
+    folder = store(site, operator, draft)
     _tell(draft.calibration.checks)
     click.echo(f"calibration {draft.calibration.in_words()}")
     click.echo(f"stored; look at {folder / PAGE}")
 
 
-def _store(site: Configuration, operator: str, draft: Draft) -> Path:
-    """Store it and tell the audit trail, or neither where one of them cannot be written."""
-    store, new = CalibrationStore(site.home), draft.calibration
-    before = store.current(new.serial)
+def store(site: Configuration, operator: str, draft: Draft) -> Path:
+    """Store a calibration and tell the audit trail, or neither where one of them cannot be written.
+
+    Args:
+        site: whose home it goes to.
+        operator: who calibrated.
+        draft: what was found.
+
+    Raises:
+        StationError: nothing was stored.
+    """
+    calibrations, new = CalibrationStore(site.home), draft.calibration
+    before = calibrations.current(new.serial)
     with writing(records_folder(site.home)) as connection:
         old = None if before is None else before.id
         append_audit(connection, calibration_stored(operator, "", f"sensor {new.serial}", old, new.id))
-        return store.add_calibration(new, calibration_files(draft))
+        return calibrations.add_calibration(new, calibration_files(draft))
 
 
 def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:

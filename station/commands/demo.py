@@ -16,6 +16,7 @@ from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
 from station.commands.run import addresses
+from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
@@ -59,7 +60,8 @@ def demo(
     """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
 
     Arm, gripper, sensor and PLC are simulated, what is between them is real: RTDE, the gripper's socket, camera frames
-    and Modbus TCP. Logs and records lie in the home folder's `demo`.
+    and Modbus TCP. The first time, the simulated sensor is calibrated by a drawn ball, in a few seconds. Logs and
+    records lie in the home folder's `demo`.
     """
     asked = load_configuration()
     os.environ["STATION_HOME"] = str(asked.home.resolve() / "demo")
@@ -71,6 +73,9 @@ def demo(
     nest = TwinNest(console, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed, graded=graded)
     plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
     pace = Pace(every_s=60 / speed if speed else 0.0)
+    new = calibrate_simulated_unit(site)
+    if new is not None:
+        click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.in_words()}")
     supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])
     asyncio.run(_run(site, supervisor, nest, LineProgram(plan, _LOT), pace, count))
 

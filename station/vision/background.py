@@ -22,9 +22,14 @@ _HIGHEST_COSINE = 4
 _ITERATIONS = 3
 _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
-_STRIP_PX = 10
+_LEAST_SPREAD_LEVELS = 0.01
+"""No division by the spread of an image without noise."""
+_STRIP_PX = 5
+"""At half the working size."""
 _MEDIAN_SIDE = 20
 _NO_PRIOR = 1e-3
+_FREE = 10.0
+"""So wide a prior only keeps the equations solvable, where a reference has no light."""
 
 Coefficients = npt.NDArray[np.float32]
 """A fitted model, shape (3, shapes, 1), dtype float32, one row for each colour."""
@@ -35,9 +40,9 @@ class Background:
     """The background found in one frame."""
 
     levels: FloatImage
-    """What to take off the difference, shape (height, width, 3), grey levels."""
+    """What to take off the difference, shape (height, width, 3) of half the working size, grey levels."""
     weight: FloatImage
-    """How surely a place is background, shape (height, width), 0 to 1."""
+    """How surely a place is background, shape (height, width) of half the working size, 0 to 1."""
     share: float
     """Mean of the weight: how much of the frame is background, 0 to 1. The one measure of that for every stage."""
     spread_levels: float
@@ -46,8 +51,6 @@ class Background:
     """Root mean square of the model over places and channels."""
     coefficients: Coefficients
     """For the press's next step."""
-    load_levels: float
-    """Root mean square of what the frame differs by from the reference: contact, and all else that the load changes."""
 
 
 class BackgroundModel:
@@ -63,11 +66,11 @@ class BackgroundModel:
         self._constants = constants
         height, width = reference.shape[:2]
         cell = max(height, width) / _GRID_LONG_SIDE
-        self._size = (width, height)
         self._grid = (max(2, round(width / cell)), max(2, round(height / cell)))
-        self._half = ((width + 1) // 2, (height + 1) // 2)
-        self._light = clipped(reference)
-        pattern = cv2.GaussianBlur(self._light, (0, 0), constants.pattern_blur)
+        self._half = (-(-width // 2), -(-height // 2))
+        light = clipped(reference)
+        self._light = resized(light, self._half)
+        pattern = cv2.GaussianBlur(light, (0, 0), constants.pattern_blur)
         # Cosines and bands are products of a function of x and one of y: each is drawn as two short matrices.
         orders = [
             (i, j)
@@ -89,7 +92,7 @@ class BackgroundModel:
         shared = [resized(shape, self._grid).ravel() for shape in separable]
         grids: list[FloatImage] = []
         for channel in range(3):
-            gained = resized(self._light[..., channel], self._grid).ravel()
+            gained = resized(light[..., channel], self._grid).ravel()
             moved = [
                 resized(slope[..., channel] * stretch, self._grid).ravel() for slope in slopes for stretch in stretches
             ]
@@ -100,35 +103,31 @@ class BackgroundModel:
         self._across = np.repeat(np.linspace(-1, 1, self._half[0], dtype=np.float32), 3)
         self._down = np.linspace(-1, 1, self._half[1], dtype=np.float32)[:, None]
         prior = [
-            constants.gain_prior,
-            *(constants.cosine_prior / (1 + i * i + j * j) for i, j in orders),
-            *([constants.band_prior] * (len(places) - len(orders))),
+            _FREE,  # the gain: a contact resembles no gain of the whole light
+            *(constants.light_prior / (1 + i * i + j * j) for i, j in orders),
+            *([constants.light_prior] * (len(places) - len(orders))),
             *([constants.displacement_prior] * (len(slopes) * len(stretches))),
         ]
-        self._ridge = np.diag((constants.cell_noise / np.array(prior)) ** 2).astype(np.float32)
+        self._ridge = np.diag(np.array(prior) ** -2.0).astype(np.float32)
 
     def fit(self, difference: FloatImage, first_guess: FloatImage, before: Coefficients | None = None) -> Background:
         """Find the background of a frame.
 
         Args:
-            difference: frame minus reference, shape (height, width, 3), float32, grey levels.
+            difference: frame minus reference, any size, shape (height, width, 3), float32, grey levels.
             first_guess: where nothing touches, any size, float32, 0 to 1.
             before: the press's last step; the model is then expected to have changed little.
         """
         p = self._constants
         samples = np.ascontiguousarray(resized(difference, self._grid).reshape(-1, 3).T)
         expected = np.zeros((3, self._coarse.shape[2], 1), np.float32) if before is None else before
-        load = float(np.sqrt(np.mean(samples**2)))
         # The fit is of what has changed since the expected model, so that the prior draws towards that model.
         expected_levels = (self._coarse @ expected)[..., 0]
         samples -= expected_levels
-        weight = resized(first_guess, self._grid).ravel()
-        trust = p.late_weight + (1 - p.late_weight) * weight
+        trust = weight = resized(first_guess, self._grid).ravel()
         # The less background there is, the more of a contact's own slopes the shapes could explain.
         known = float(np.clip(weight.mean() / p.known_share, _LEAST_KNOWN, 1))
         ridge = self._ridge / known**3
-        if before is not None:  # from step to step the light drifts by less than since the reference
-            ridge = ridge / p.step_share**2
         spread = p.most_spread / 2
         change = np.zeros_like(expected)
         fitted = np.zeros_like(samples)
@@ -138,17 +137,16 @@ class BackgroundModel:
             fitted = (self._coarse @ change)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             if weight.sum() >= _LEAST_KNOWN * weight.size:
-                spread = float(np.clip(weighted_median(residual, weight), p.least_spread, p.most_spread))
+                spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, p.most_spread))
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         coefficients = expected + change
         strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
-        certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._size)
-        return Background(
-            self._drawn(coefficients[..., 0]), certain, float(weight.mean()), spread, strength, coefficients, load
-        )
+        certain = resized(np.asarray(weight.reshape(self._grid[1], self._grid[0]), np.float32), self._half)
+        share = float(weight.mean())
+        return Background(self._drawn(coefficients[..., 0]), certain, share, spread, strength, coefficients)
 
     def _drawn(self, coefficients: npt.NDArray[np.float32]) -> FloatImage:
-        """The model at the reference's size: its smooth parts drawn at half of it and enlarged, its gain exactly."""
+        """The model at half the working size."""
         end = 1 + self._places.shape[1]
         waves = np.zeros((3, len(self._upward), len(self._along)), np.float32)
         waves[:, self._places[1], self._places[0]] = coefficients[:, 1:end]
@@ -157,9 +155,8 @@ class BackgroundModel:
             displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
             still, along, up = np.tile(displaced, self._half[0]).astype(np.float32)
             lines += slope * ((still + along * self._across) + up * self._down)
-        levels = resized(lines.reshape(self._half[1], self._half[0], 3), self._size)
-        _rows(levels)[:] += _rows(self._light) * np.tile(coefficients[:, 0], self._size[0]).astype(np.float32)
-        return levels
+        lines += _rows(self._light) * np.tile(coefficients[:, 0], self._half[0]).astype(np.float32)
+        return lines.reshape(self._half[1], self._half[0], 3)
 
 
 def _profiles(length: int, band_reach: float) -> npt.NDArray[np.float32]:
@@ -181,7 +178,7 @@ def destriped(change: FloatImage, background: FloatImage, constants: Constants) 
     pull it; a line of which little is background is corrected by less.
 
     Args:
-        change: shape (height, width, 3), grey levels.
+        change: at half the working size, shape (height, width, 3), grey levels.
         background: any size, 0 to 1.
         constants: the prior of an offset.
 
@@ -205,7 +202,7 @@ def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: C
     known = np.clip(float(background.mean()) / constants.known_share, _LEAST_KNOWN, 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
-    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), constants.least_spread**2)
+    limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)
 

@@ -41,7 +41,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     Args:
         moved: from `region.movement`.
         threshold: the detection threshold, grey levels per pixel; each region reaches it.
-        constants: window, share and the gaps that are bridged.
+        constants: window and share.
     """
     curvature = moved.curvature
     level, spread = level_of(moved, constants.level_window)
@@ -51,11 +51,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
     lowest = max(_OVER_SPREAD * spread, constants.candidate_share * quantile(strong, _LOW_QUANTILE))
     seen = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
-    gap = round(constants.bridge)
-    bridge = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (gap, gap))
-    framed = cv2.copyMakeBorder(seen, gap, gap, gap, gap, cv2.BORDER_CONSTANT)
-    bridged = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, bridge)[gap:-gap, gap:-gap]
-    found = [part for part in _parts(np.asarray(bridged, np.uint8)) if curvature[part > 0].max() > threshold]
+    found = [part for part in _parts(seen) if curvature[part > 0].max() > threshold]
     return Candidates(_heaviest_first(level, found), level)
 
 

@@ -5,13 +5,11 @@ grey levels. It takes in the halo around a contact and misses a flat centre, so 
 with the contact whatever the body, and where it and the contour disagree, the contour is not to be trusted.
 """
 
-import cv2
 import numpy as np
 
 from station.vision.constants import Constants
 from station.vision.contact import Mask
 from station.vision.region import Movement
-from station.vision.working import length_squared
 
 _PER_E_FOLD = 4.0
 """How fast the confidence falls with the logarithm by which only the contour has shrunk: to a half at 16 %."""
@@ -25,13 +23,12 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
     Args:
         moved: from `region.movement`.
         noise_levels: the change's standard deviation where nothing touches.
-        constants: threshold and smoothing.
+        constants: the threshold.
 
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
     """
-    smooth = cv2.GaussianBlur(moved.change, (0, 0), constants.changed_blur)
-    length = np.sqrt(length_squared(np.asarray(smooth, np.float32))) * moved.flat_field
+    length = np.sqrt(moved.squared) * moved.flat_field
     return (length > max(constants.changed_levels, _NOISES * noise_levels)).astype(np.uint8)
 
 

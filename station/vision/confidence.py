@@ -30,21 +30,19 @@ def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> fl
     """Signal to noise across the edge times the share of the edge that is seen to fall, 0 to 1.
 
     The first factor is q²/(q² + 4²) of the median drop q in units of the noise; the second is the share of the seen
-    rays on which the drop is at least twice the noise. Both rise with the contrast and fall with the noise. Where less
-    than a quarter of the rays is seen, it falls with their share.
+    rays on which the change falls at all.
 
     Args:
         edge: with its drops in grey levels.
         noise_levels: from `background_spread`.
-        constants: the three ratios.
+        constants: the drop at which the confidence is one half.
     """
     if not edge.seen.any():
         return 0.0
     ratio = edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)
     signal = max(0.0, float(np.median(ratio)))
-    support = float(np.mean(ratio >= constants.visible_ratio))
-    seen = min(1.0, float(np.mean(edge.seen)) / constants.well_seen)
-    return seen * support * signal**2 / (signal**2 + constants.reliable_ratio**2)
+    support = float(np.mean(ratio > 0))
+    return support * signal**2 / (signal**2 + constants.reliable_ratio**2)
 
 
 def agreement(areas: Sequence[float]) -> float:

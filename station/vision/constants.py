@@ -34,66 +34,52 @@ class Constants:
 
     # Reference and input
     lit_share: float = constant(0.25, "of the brightest colour's mean", "a colour below it has no light", "fit")
-    most_drift_share: float = constant(0.35, "of the light", "more drift than this is another light", "fit")
+    most_drift_share: float = constant(
+        0.35, "of the light", "more drift is another light: an LED is off, or the camera", "measured: drift 0.05"
+    )
     saturated_share: float = constant(
         0.05, "of a contact", "from here on it is flagged as saturated", "measured: none on real presses"
     )
     # Background model
-    gain_prior: float = constant(0.1, "relative", "prior standard deviation of the light's gain", "fit")
-    cosine_prior: float = constant(10.0, "grey level", "prior standard deviation of the lowest cosine", "fit")
-    displacement_prior: float = constant(
-        2.0, "px", "prior standard deviation of the pattern's displacement", "fit", "working"
+    light_prior: float = constant(
+        5.0, "of a cell's noise", "prior standard deviation of the lowest cosine and of a border band", "fit"
     )
-    band_prior: float = constant(10.0, "grey level", "prior standard deviation of a border band", "fit")
+    displacement_prior: float = constant(
+        1.0, "px", "the same of the pattern's displacement, for each grey level of a cell's noise", "fit", "working"
+    )
     band_reach: float = constant(0.07, "of the side", "a border band falls by e over this length", "fit")
-    cell_noise: float = constant(2.0, "grey level", "noise of one cell of the fit's grid", "fit")
-    step_share: float = constant(0.3, "of the priors", "how much the light changes from step to step", "fit")
     known_share: float = constant(0.2, "of the frame", "with less background the priors are drawn in", "fit")
-    least_spread: float = constant(0.5, "grey level", "the background's residual is never taken as smaller", "fit")
     most_spread: float = constant(8.0, "grey level", "the background's residual is never taken as larger", "fit")
-    late_weight: float = constant(0.02, "", "weight of a place that the first guess took for contact", "fit")
     calm_ratio: float = constant(2.2, "", "background bends less than this times the calmest twentieth", "fit")
     calm_limit: float = constant(1.6, "of least_bend", "background never bends more", "fit")
     stripe_prior: float = constant(0.03, "of a line's cells", "prior of a row's or column's offset", "fit")
-    calm_trust: float = constant(0.25, "", "trust in a calm place that the model does not fit", "fit")
     pattern_blur: float = constant(
         4.0, "px", "smoothing of the reference whose displacement is fitted", "fit", "working"
     )
     # Detection
     curvature_blur: float = constant(5.0, "px", "smoothing before the slopes", "fit", "working")
     curvature_window: float = constant(7.5, "px", "window of the structure tensor", "fit", "working")
-    curvature_noise_cap: float = constant(
-        0.35, "grey level/px", "the background's curvature is never taken as larger", "measured: the noise of 20 units"
-    )
     sure_gate: float = constant(2.0, "of the threshold", "from here on contact is sure", "fit")
-    wide_share: float = constant(0.3, "of the frame", "a body so large curves the gel evenly", "fit")
-    wide_levels: float = constant(6.0, "grey level", "and moves so much of it as far", "measured: drift reaches 0.5")
-    wide_threshold: float = constant(0.6, "of the threshold", "is enough for such a body", "fit")
     # Candidates
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
     candidate_share: float = constant(0.5, "of the strong level", "a place from here on belongs to a candidate", "fit")
-    bridge: int = constant(9, "px", "gaps up to this are bridged", "fit", "half")
     # Region
-    region_window: float = constant(0.08, "of the radius", "window of the level", "fit")
+    region_window: float = constant(0.06, "of the radius", "window of the level", "fit")
     cap_quantile: float = constant(0.38, "", "quantile of the region's level at which the gain is capped", "fit")
     share_random: float = constant(0.33, "of the cap", "the region's end where directions are random", "fit")
     share_coherent: float = constant(1.6, "of the cap", "how much higher it is per unit of coherence", "fit")
     share_field: float = constant(-0.2, "of the cap", "how much lower it is per share of the field", "fit")
-    share_least: float = constant(0.2, "of the cap", "the region's end is never lower", "fit")
     share_most: float = constant(0.76, "of the cap", "the region's end is never higher", "fit")
     region_span: float = constant(1.9, "radii", "how far beyond its start the region is looked for", "fit")
     path_stiffness: float = constant(0.05, "", "price of a jump of the region's outline", "fit")
-    hull_share: float = constant(0.6, "of the hull", "within it a flat centre costs nothing", "fit")
+    hull_share: float = constant(0.8, "of the hull", "within it a flat centre costs nothing", "fit")
     flat_field_floor: float = constant(0.6, "of the mean light", "limits the flat-field correction in the dark", "fit")
     flat_field_blur: float = constant(4.0, "px", "smoothing of the light for the flat-field correction", "fit", "half")
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
-    skin_window: float = constant(
-        0.11, "of the radius", "window of the coherence that separates skin from smooth", "fit"
-    )
     skin_left_out: float = constant(0.25, "of the region", "the weakest places say nothing of the texture", "fit")
     smooth_small: float = constant(0.7, "", "coherence from which a small body is smooth", "fit")
-    smooth_at_one: float = constant(1.393, "", "the same, extrapolated to a radius of one pixel", "fit")
+    smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
     halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
@@ -107,27 +93,12 @@ class Constants:
     element_random: float = constant(
         0.04, "of the strong change", "level of an element where directions are random", "fit"
     )
-    element_coherent: float = constant(0.65, "of the strong change", "how much higher per unit of coherence", "fit")
-    element_few: float = constant(0.22, "of the strong change", "how much higher for a lone element", "fit")
-    element_few_radius: float = constant(
-        34.0, "px", "radius up to which a region holds a lone element", "fit", "working"
-    )
-    element_many_radius: float = constant(50.0, "px", "radius from which it holds many", "fit", "working")
-    element_noises: float = constant(1.7, "times the noise", "an element's level is never lower", "fit")
-    element_rise: float = constant(
-        5.0, "per radius", "how the level rises outwards where nothing stands out of the noise", "fit"
-    )
-    element_weak: float = constant(5.0, "times the noise", "strength below which the region decides", "fit")
-    element_level_radius: float = constant(0.8, "radii", "where the rising level is as it is", "fit")
-    faint_coherence: float = constant(0.62, "", "below it a faint body is outlined as skin", "fit")
-    faint_noises: float = constant(15.0, "times the noise", "below it a body is faint", "fit")
+    element_coherent: float = constant(0.72, "of the strong change", "how much higher per unit of coherence", "fit")
     half_sure: float = constant(
-        0.45, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
+        0.38, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
     )
     # Contour
-    contour_blur: float = constant(0.045, "of the radius", "smoothing before the edge", "fit")
-    contour_blur_least: float = constant(1.0, "px", "at least", "fit", "working")
-    contour_blur_most: float = constant(3.5, "px", "at most", "fit", "working")
+    contour_blur: float = constant(1.0, "px", "smoothing before the edge", "fit", "half")
     strong_quantile: float = constant(0.75, "", "quantile of the rays' falls that is called strong", "fit")
     least_steepness: float = constant(0.4, "of a strong fall", "a fall below it is no edge", "fit")
     highest_harmonic: float = constant(3.0, "", "of the start's radius around the circle", "fit")
@@ -135,8 +106,6 @@ class Constants:
         0.65, "of the extent", "a contact that reaches so far along a border is mirrored", "fit"
     )
     corner_chord: float = constant(0.4, "of the extent", "the same about a corner", "fit")
-    whole_fall: float = constant(0.68, "of a strong fall", "an edge that falls so far all around is no cut one", "fit")
-    whole_area: float = constant(0.55, "of the mirrored one", "and encloses more than this", "fit")
     # Weak contact
     dent_sigma: float = constant(2.5, "px", "size of the dent that is looked for, 0.27 mm", "fit", "half")
     weak_threshold: float = constant(
@@ -148,28 +117,18 @@ class Constants:
         "variance of the slopes over that of the fine noise, from which on compression shows",
         "measured: a DIGIT's noise 0.16, with a contact of 5 mm² 0.3, compressed images 0.4 and more",
     )
-    weak_least_curvature: float = constant(0.3, "of the threshold", "curvature that a weak contact shows too", "fit")
-    weak_support: float = constant(
-        6.0, "of the noise", "a doubtful outline shows at least this somewhere", "measured: none of 3,600 contacts less"
-    )
     # Press
-    floor_erosion: float = constant(0.04, "of the radius", "by how much the contact so far may seem to shrink", "fit")
     released_share: float = constant(0.5, "of the load's change", "below it the body has been let go", "fit")
     confirmed_share: float = constant(
         0.9, "of the last area", "the next step confirms a contact that it contains", "fit"
     )
-    confirmed_growth: float = constant(2.5, "", "and that has grown at most by this factor", "fit")
     # Witness
     changed_levels: float = constant(4.0, "grey level", "a place has changed from here on", "fit")
-    changed_blur: float = constant(1.5, "px", "smoothing before", "fit", "half")
     witness_most: float = constant(4.5, "of the contact area", "more changed than this is a disagreement", "fit")
     witness_least: float = constant(0.1, "of the contact area", "less changed than this is a disagreement", "fit")
     # Confidence
     reliable_ratio: float = constant(4.0, "times the noise", "drop at which the confidence is one half", "fit")
-    visible_ratio: float = constant(2.0, "times the noise", "drop from which a ray supports the edge", "fit")
-    well_seen: float = constant(0.25, "of the rays", "with fewer in the image the confidence falls", "fit")
     support_least: float = constant(0.03, "", "confidence below which an outline is dropped", "fit")
-    support_cut: float = constant(0.25, "", "the same where the border cuts it", "fit")
     one_colour: float = constant(0.85, "of the change's power", "a change of one colour is dirt or shadow", "fit")
 
 

@@ -26,9 +26,7 @@ _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
 _ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
 """Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
-_HALF_FROM_PX = 2.0
-_LEAST_FALL_LEVELS = 1e-3
-_REACH_STEP_PX = 2.0
+_REACH_STEP_PX = 1.0
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -93,15 +91,6 @@ class Rays(NamedTuple):
         """
         return self.middle + (self.axes @ (_CIRCLE * radii)).T
 
-    def scaled(self, scale: tuple[float, float]) -> Self:
-        """The same rays in an image of another size; distances grow by the first factor.
-
-        Args:
-            scale: of that size over this, along x and y, nearly equal.
-        """
-        middle = ((self.middle[0] + 0.5) * scale[0] - 0.5, (self.middle[1] + 0.5) * scale[1] - 0.5)
-        return self._replace(middle=middle)
-
     def moved_to(self, points: _Floats, shape: tuple[int, int]) -> tuple[Self, _Floats]:
         """Rays from the middle of a closed line, and that line's distances on them.
 
@@ -135,28 +124,18 @@ class Edge:
     """Shape (64,): by how much the change falls across the edge there, grey levels."""
 
 
-def change_length(change: FloatImage, half: FloatImage, radius_px: float, constants: Constants) -> FloatImage:
-    """The change's length over the channels, smoothed as far as a contact of that size allows.
+def change_length(change: FloatImage, constants: Constants) -> FloatImage:
+    """The change's smoothed length over the channels.
 
     Args:
-        change: without background, shape (height, width, 3), grey levels.
-        half: the same averaged down to half the size.
-        radius_px: of a circle of the region's area, at the change's size.
-        constants: how far.
+        change: without background, at half the working size, shape (height, width, 3), grey levels.
+        constants: how much is smoothed.
 
     Returns:
         Shape (height, width), grey levels.
     """
-    sigma = float(
-        np.clip(constants.contour_blur * radius_px, constants.contour_blur_least, constants.contour_blur_most)
-    )
-    if sigma < _HALF_FROM_PX:
-        smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32)
-        return np.asarray(cv2.sqrt(length_squared(smooth)), np.float32)
-    # So much smoothing leaves nothing that half the size does not show.
-    length = cv2.sqrt(length_squared(np.asarray(cv2.GaussianBlur(half, (0, 0), sigma / 2), np.float32)))
-    size = (change.shape[1], change.shape[0])
-    return np.asarray(cv2.resize(length, size, interpolation=cv2.INTER_LINEAR), np.float32)
+    smooth = cv2.GaussianBlur(change, (0, 0), constants.contour_blur)
+    return np.asarray(cv2.sqrt(length_squared(np.asarray(smooth, np.float32))), np.float32)
 
 
 def find_edge(
@@ -179,10 +158,9 @@ def find_edge(
         constants: what is a steep fall.
         floor: what surely lies within the edge, 0 or not.
     """
-    edge = _closed_edge(length, rays, radii, stiffness, constants, floor)
-    left, top, right, bottom = _mirrored(region, constants)
-    if floor is not None or not (left or top or right or bottom):
-        return edge
+    left, top, right, bottom = (0, 0, 0, 0) if floor is not None else _mirrored(region, constants)
+    if not (left or top or right or bottom):
+        return _closed_edge(length, rays, radii, stiffness, constants, floor)
     # With its middle near the border a contact shows part of its edge only, and the way to its flat centre falls like
     # an edge. With its mirror image it is closed.
     sides = (top, bottom, left, right, cv2.BORDER_REFLECT_101)
@@ -193,8 +171,7 @@ def find_edge(
     completed = _closed_edge(length_twice, rays_twice, radii_twice, stiffness, constants, None)
     points = completed.points - (left, top)
     shape = (length.shape[0], length.shape[1])
-    completed = Edge(points, inside_image(points, shape), completed.drop_levels)
-    return edge if _is_whole(edge, completed, shape, constants) else completed
+    return Edge(points, inside_image(points, shape), completed.drop_levels)
 
 
 def _closed_edge(
@@ -211,25 +188,6 @@ def _closed_edge(
     radii, drop = _steepest(length, rays, radii, np.linspace(*_SECOND_SPAN, _SECOND_STEPS), stiffness, constants, floor)
     points = rays.points(radii)
     return Edge(points, inside_image(points, shape), drop)
-
-
-def _is_whole(edge: Edge, completed: Edge, shape: tuple[int, int], constants: Constants) -> bool:
-    """Whether an edge lies in the image and falls all around, so that the border cuts no more than the halo.
-
-    On the way to a cut contact's flat centre the change falls by less, or what falls is a part of the contact.
-    """
-    if not edge.seen.all():
-        return False
-    drops = (edge.drop_levels, completed.drop_levels[completed.seen])
-    strong = float(np.quantile(np.concatenate(drops), constants.strong_quantile))
-    if np.clip(edge.drop_levels / max(strong, _LEAST_FALL_LEVELS), 0, 1).mean() < constants.whole_fall:
-        return False
-    return _area(edge.points, shape) > constants.whole_area * _area(completed.points, shape)
-
-
-def _area(points: _Floats, shape: tuple[int, int]) -> int:
-    mask = np.zeros(shape, np.uint8)
-    return cv2.countNonZero(cv2.fillPoly(mask, [np.rint(points).astype(np.int32)], 1))
 
 
 def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:

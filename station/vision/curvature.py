@@ -71,15 +71,14 @@ def calm(response: FloatImage, least_curvature: float, constants: Constants) -> 
     return np.square(np.maximum(0, 1 - fourth)) * (enclosed == 0)
 
 
-def curvature_noise(response: FloatImage, background: Background, constants: Constants) -> float:
-    """The curvature that the background shows: its median there, at most what noise has been seen to reach.
+def curvature_noise(response: FloatImage, background: Background) -> float:
+    """The curvature that the background shows: its median there.
 
     Args:
         response: of the change without its background, grey levels per pixel.
         background: of the same frame.
-        constants: the cap.
     """
     if background.share < _LEAST_BACKGROUND:
         return 0.0
     weight = resized(background.weight, (response.shape[1], response.shape[0]))
-    return min(weighted_median(response, weight), constants.curvature_noise_cap)
+    return weighted_median(response, weight)

@@ -46,32 +46,30 @@ class Debris:
         seen = ((labels > 0) & (longest <= _LONGEST_PX)[labels]).astype(np.uint8)
         self.clean = np.asarray(1 - seen, np.float32)
         """Where there is none, at half the working size, 0 or 1."""
-        self._places = cv2.resize(seen, (width, height), interpolation=cv2.INTER_NEAREST) > 0
-        self._pattern = _pattern(light, self._places) if seen.any() else None
+        self._places = seen > 0
+        wide = cv2.resize(seen, (width, height), interpolation=cv2.INTER_NEAREST) > 0
+        self._pattern = resized(_pattern(light, wide), self._half) if seen.any() else None
 
     def bridged(self, change: FloatImage) -> FloatImage:
         """A change in which debris neither hides nor feigns a contact, in place.
 
         Args:
-            change: shape (height, width, 3), grey levels.
+            change: at half the working size, shape (height, width, 3), grey levels.
 
         Returns:
             The change.
         """
         if self._pattern is None:
             return change
-        half = resized(change, self._half)
-        given_back = half + resized(self._pattern, self._half)
-        shown, hidden = (cv2.GaussianBlur(length_squared(one), (0, 0), _COMPARED_PX) for one in (half, given_back))
-        valid = np.maximum(self.clean, hidden < shown)
-        half = np.where((hidden < shown)[..., None], given_back, half) * valid[..., None]
+        given_back = change + self._pattern
+        shown, hidden = (cv2.GaussianBlur(length_squared(one), (0, 0), _COMPARED_PX) for one in (change, given_back))
+        is_hidden = hidden < shown
+        valid = np.maximum(self.clean, is_hidden)
+        known = np.where(is_hidden[..., None], given_back, change) * valid[..., None]
         weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _AROUND_PX), _LEAST_SEEN)
-        filled = np.asarray(cv2.GaussianBlur(half, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
-        around = resized(filled, self._places.shape[::-1])
-        is_hidden = cv2.resize(valid, self._places.shape[::-1], interpolation=cv2.INTER_NEAREST)[self._places] > 0
-        change[self._places] = np.where(
-            is_hidden[:, None], (change + self._pattern)[self._places], around[self._places]
-        )
+        around = np.asarray(cv2.GaussianBlur(known, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
+        filled = np.where(is_hidden[..., None], given_back, around)
+        change[self._places] = filled[self._places]
         return change
 
 

@@ -21,11 +21,13 @@ _WITHIN, _BEYOND = 0.8, 1.2
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """One contact's outline at the working size."""
+    """One contact's outline."""
 
     edge: Edge
+    """At half the working size."""
     inside: Mask
-    """What the edge encloses, or of textured skin the union of its elements there; 0 or 255."""
+    """What the edge encloses, at half the working size, or of textured skin the union of its elements there, at the
+    working size; 0 or 255."""
     textured: bool
     confidence: float
 
@@ -48,46 +50,36 @@ def find_outline(
     """Find the outline of the contact in a body's region.
 
     Args:
-        length: of the smoothed change, shape (height, width), grey levels.
-        body: found at half that size.
+        length: of the smoothed change, at half the working size, shape (height, width), grey levels.
+        body: found at that size.
         background: of the same frame.
         stiffness: as for `find_edge`.
         constants: as for `find_edge` and the texture.
         floor: what surely lies within, shape of `length`, 0 or not.
     """
     height, width = length.shape
-    region = np.asarray(cv2.resize(body.mask, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-    scale = width / body.mask.shape[1], height / body.mask.shape[0]
-    rays, radii = body.rays.scaled(scale), body.radii * scale[0]
-    noise = texture.noise_level(length, background, constants) if texture.has_room_for_few(region, constants) else 0.0
-    if not body.textured and not _is_faint_skin(length, region, body, noise, constants):
-        edge = find_edge(length, region, rays, radii, stiffness, constants, floor)
+    if not body.textured:
+        edge = find_edge(length, body.mask, body.rays, body.radii, stiffness, constants, floor)
         confidence = edge_confidence(edge, background_spread(length, background.weight), constants)
         return Outline(edge, filled(edge, (height, width)), textured=False, confidence=confidence)
-    points = rays.points(radii)
+    points = body.rays.points(body.radii)
     edge = Edge(points, inside_image(points, (height, width)), _fall(body))
-    level = texture.element_level(length, region, body, noise, constants)
-    inside, sure = texture.union(length, region, level, noise, constants)
+    size = (2 * width, 2 * height)
+    length = np.asarray(cv2.resize(length, size, interpolation=cv2.INTER_LINEAR), np.float32)
+    region = np.asarray(cv2.resize(body.mask, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    level = texture.element_level(length, region, body.coherence, constants)
+    inside, sure = texture.union(length, region, level, constants)
     confidence = sure * edge_confidence(edge, body.spread_levels, constants)
     return Outline(edge, inside, textured=True, confidence=confidence)
-
-
-def _is_faint_skin(length: FloatImage, region: Mask, body: Region, noise: float, constants: Constants) -> bool:
-    """Whether a body that passes for smooth stands so little out of the noise that the edge found may be an achene's.
-
-    Not where directions agree as they hardly do on skin. Where the noise is not known, directions say little.
-    """
-    faint = texture.strength(length, region) < constants.faint_noises * noise
-    return body.coherence < constants.faint_coherence and faint
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
     """What an edge encloses.
 
     Args:
-        edge: in pixels of the working size.
+        edge: in pixels of half the working size.
         shape: height and width of the mask.
-        scale: of the mask over the working size, along x and y.
+        scale: of the mask over half the working size, along x and y.
 
     Returns:
         Of that shape, 0 or 255.

@@ -9,7 +9,7 @@ from station.vision.contour import Edge
 
 _GREY = 128.0
 _AMPLIFICATION = 4.0
-_BLUR_PX = 2.0
+_BLUR_PX = 1.0
 _SUBPIXEL_BITS = 4
 _LEVEL_SHOWN = 8.0
 """Grey levels: twice as much is brightest where nothing has moved more."""
@@ -34,7 +34,7 @@ def emit(
     Args:
         on_stage: takes name and picture.
         names: eight, in the order of the stages.
-        difference: frame minus reference, shape (height, width, 3), grey levels.
+        difference: frame minus reference, at half the working size, shape (height, width, 3), grey levels.
         change: the same without drift and streaks.
         curvature: shape (height, width), grey levels per pixel.
         threshold: the detection threshold of the curvature.
@@ -44,10 +44,12 @@ def emit(
         edges: of the contacts found, in pixels of `change`.
         mask: 0 or 255, at the input's size.
     """
+    size = (mask.shape[1], mask.shape[0])
     denoised = np.asarray(cv2.GaussianBlur(change, (0, 0), _BLUR_PX), np.float32)
-    outlined = _signed(denoised, _AMPLIFICATION)
+    outlined = cv2.resize(_signed(denoised, _AMPLIFICATION), size, interpolation=cv2.INTER_NEAREST)
+    scale = np.divide(size, (change.shape[1], change.shape[0]))
     for edge in edges:
-        points = np.rint(edge.points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        points = np.rint(((edge.points + 0.5) * scale - 0.5) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
         cv2.polylines(
             outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
         )
@@ -60,7 +62,6 @@ def emit(
         _strength(candidates.level, _LEVEL_SHOWN),
         outlined,
     )
-    size = (mask.shape[1], mask.shape[0])
     for name, picture in zip(names, pictures, strict=False):
         on_stage(name, np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST), np.uint8))
     on_stage(names[-1], mask)

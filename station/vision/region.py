@@ -17,7 +17,7 @@ from station.vision.background import Background, quantile, thinned, weighted_me
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
-from station.vision.working import length_squared, resized
+from station.vision.working import blurred, length_squared, resized
 
 _CHANGE_BLUR_PX = 1.0
 _STEPS = 80
@@ -29,6 +29,7 @@ _FLOOR_QUANTILE = 0.03
 _LEAST_BACKGROUND = 0.02
 _LEAST_WINDOW_PX = 1.5
 _LEAST_RADIUS_PX = 3.0
+_STRONG_QUANTILE = 0.9
 _SUBPIXEL_BITS = 4
 
 _Floats = npt.NDArray[np.float64]
@@ -144,7 +145,7 @@ def find_region(
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
             share = p.share_random + p.share_coherent * coherence + p.share_field * float(mask.mean())
-            share = float(np.clip(share, p.share_least, p.share_most))
+            share = min(share, p.share_most)
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
         # A flat centre has not moved; it lies within what has, and costs nothing.
         np.maximum(gain, 0, out=gain, where=inner > 0)
@@ -152,18 +153,20 @@ def find_region(
             gain[others > 0] = -share
         if floor is not None:
             gain[floor > 0] = 1 - share
-        rays = Rays.about(inner | mask)._replace(axes=Rays.about(mask | start).axes)
+        rays = Rays.about(inner | mask)
         every = 1 if last else _FIRST_EVERY
         radii = _most_gained(gain, rays, p.region_span * rays.reach(inner | mask), every, p.path_stiffness)
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
-    textured = is_textured(moved, mask, p) if texture is None else texture
-    if textured and moved.share < p.known_share / 2:
+    is_known = moved.share >= p.known_share / 2
+    if texture is None:
+        texture = _is_skin(moved, mask, p) if is_known else _is_skin_by_curvature(moved, mask, p)
+    if texture and not is_known:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
             mask |= floor
-    return Region(mask, rays, radii, level, spread, coherence, textured)
+    return Region(mask, rays, radii, level, spread, coherence, texture)
 
 
 def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants: Constants) -> tuple[Mask, _Floats]:
@@ -172,9 +175,8 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    least = quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
-    floor = min(p.halo_over_least * least, p.halo_curvature)
-    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(floor**2), 0), dtype=np.float32)
+    halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
+    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
     gain = np.minimum(curvature * np.float32(1 / cap), 1) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
@@ -182,23 +184,20 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     return (curved, curved_radii) if curved.any() else (region, radii)
 
 
-def is_textured(moved: Movement, region: Mask, constants: Constants) -> bool:
-    """Whether the change turns from place to place; the larger the body, the more places there are to disagree.
+def _is_skin(moved: Movement, region: Mask, constants: Constants) -> bool:
+    """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
+    p, radius = constants, radius_of(region)
+    smooth = min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
+    return _coherence(moved, region, p.coherence_window * radius, p.skin_left_out) < smooth
 
-    Without background directions say little: there skin is what is finer than the body's own slopes, times how much
-    the strongest tenth curves.
 
-    Args:
-        moved: from `movement`.
-        region: at half the working size, 0 or 1, not empty.
-        constants: windows and limits.
+def _is_skin_by_curvature(moved: Movement, region: Mask, constants: Constants) -> bool:
+    """Whether a region is skin where there is hardly any background, so that directions say little.
+
+    Skin is what is finer than the body's own slopes, times how much the strongest tenth curves.
     """
-    p = constants
-    if moved.share < p.known_share / 2:
-        return _fine_share(moved.change, region, p) * quantile(moved.curvature[region > 0], 0.9) > p.fine_on_skin
-    radius = radius_of(region)
-    coherence = _coherence(moved, region, p.skin_window * radius, p.skin_left_out)
-    return coherence < min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
+    strong = quantile(moved.curvature[region > 0], _STRONG_QUANTILE)
+    return _fine_share(moved.change, region, constants) * strong > constants.fine_on_skin
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
@@ -214,20 +213,6 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
     return fine / max(whole, _LEAST_LEVEL)
 
 
-def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift leaves over.
-
-    A large smooth body curves the gel evenly and leaves its halo for background, above whose curvature it hardly stands
-    out. On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² 15.
-
-    Args:
-        moved: from `movement`.
-        constants: how much of the frame, and how far.
-    """
-    level, _ = level_of(moved, constants.level_window)
-    return quantile(thinned(level), 1 - constants.wide_share) > constants.wide_levels
-
-
 def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     """The change's root mean square over a window above the background's, and that root's spread in the background.
 
@@ -238,7 +223,7 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     Returns:
         Shape (height, width) and the spread, grey levels.
     """
-    mean = cv2.GaussianBlur(moved.squared, (0, 0), window_px)
+    mean = blurred(moved.squared, window_px)
     few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.weight)
     seen = moved.share >= _LEAST_BACKGROUND
     floor = weighted_median(few, weight) if seen else quantile(few, _FLOOR_QUANTILE)

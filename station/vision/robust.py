@@ -28,9 +28,7 @@ from station.vision.region import (
     Region,
     find_region,
     flat_field_correction,
-    has_moved_widely,
     movement,
-    radius_of,
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
@@ -40,6 +38,7 @@ PRINTED_IMAGE_PX = 640 * 480
 """The image for which the recipe's parameters in pixels are given; they scale with the image."""
 
 _COARSE_STEP, _FINE_STEP = 4, 2
+"""By how much the fields of the first guess and of all else are smaller than the working image."""
 _WEAK_REACHES_PX, _REACHED = (18, 36, 72), 0.9
 """How far a weak contact may reach, at half the working size; the next where its region fills the one before."""
 _WEAK_DOUBT = 0.5
@@ -84,14 +83,19 @@ class State:
 
     work: Image
     """The frame at the working size, shape (height, width, 3), dtype uint8."""
+    frame: FloatImage
+    """Cut off where it saturates, at half the working size, shape (height, width, 3), grey levels."""
     difference: FloatImage
-    """Frame minus reference, shape (height, width, 3), grey levels; afterwards without its background: the change."""
+    """Frame minus reference, shape of `frame`; afterwards without its background: the change."""
     before: Trace | None
+    """Of the press's last step; None of a single image, and once the body has been let go."""
+    quarter: FloatImage = field(init=False)
+    """The difference averaged down to a quarter of the working size."""
+    load_levels: float = 0.0
+    """Root mean square of the difference: contact, and all else that the load changes."""
     calm: FloatImage = field(init=False)
     """First guess of the background, at a quarter of the working size, 0 to 1."""
     background: Background = field(init=False)
-    half: FloatImage = field(init=False)
-    """The change averaged down to half the working size."""
     moved: Movement = field(init=False)
     threshold: float = field(init=False)
     """The detection threshold of the curvature, grey levels per pixel."""
@@ -156,22 +160,24 @@ class RobustMethod:
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
         self._check = ReferenceCheck(self._reference)
-        self._light = clipped(self._reference)
+        self._model = BackgroundModel(self._reference, constants)
+        light = clipped(self._reference)
+        height, width = light.shape[:2]
+        self._half = (-(-width // 2), -(-height // 2))
+        self._light = resized(light, self._half)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
-        half = self._reduced(self._light, _FINE_STEP)
-        self._flat_field = flat_field_correction(half, constants)
+        self._flat_field = flat_field_correction(self._light, constants)
         if "flat field" in without:
             self._flat_field = np.ones_like(self._flat_field)
-        self._model = BackgroundModel(self._reference, constants)
-        means = np.asarray(cv2.mean(self._light)[:3])
+        means = np.asarray(cv2.mean(light)[:3])
         lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
-        self._debris = Debris(self._light)
+        self._debris = Debris(light)
         # The detector needs the mean of the references: a median's noise is not that of the frames.
-        halves = [resized(clipped(working_image(one)), (half.shape[1], half.shape[0])) for one in references]
+        halves = [resized(clipped(working_image(one)), self._half) for one in references]
         mean = np.asarray(np.mean(halves, axis=0), np.float32)
         self._weak = WeakContactDetector(mean, lit, self._debris.clean, constants, parameters.gate_ratio)
-        unsaturated = (self._reference < SATURATED_LEVEL).all(axis=2, keepdims=True)
-        self._unsaturated = np.repeat(unsaturated, 3, axis=2).astype(np.float32)
+        unsaturated = np.asarray((self._reference < SATURATED_LEVEL).all(axis=2), np.float32)
+        self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
         least = float(np.mean(lit)) * parameters.least_bend
         self._least_curvature = least * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
@@ -180,12 +186,12 @@ class RobustMethod:
         """The stages in their order."""
         return (
             self._check_reference,
+            self._follow,
             self._subtract_background,
             self._destripe,
             self._bridge_debris,
             self._respond,
             self._see_what_changed,
-            self._follow,
             self._find_candidates,
             self._outline_candidates,
             self._drop_unsupported,
@@ -245,9 +251,8 @@ class RobustMethod:
             )
         before = previous.trace if previous is not None and "following" not in self._without else None
         work = working_image(image)
-        difference = clipped(work)
-        difference -= self._light
-        return State(work, difference, before if isinstance(before, Trace) else None)
+        frame = resized(clipped(work), self._half)
+        return State(work, frame, frame - self._light, before if isinstance(before, Trace) else None)
 
     # The stages
 
@@ -258,24 +263,24 @@ class RobustMethod:
 
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
-        quarter = self._reduced(state.difference, _COARSE_STEP)
-        state.calm = calm(curvature(quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants)
+        state.calm = calm(
+            curvature(state.quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants
+        )
         before = state.before
-        if before is not None and before.floor is not None:
+        if state.floor is not None:
             size = (state.calm.shape[1], state.calm.shape[0])
-            state.calm *= 1 - resized(before.floor.astype(np.float32), size)
-        state.background = self._model.fit(quarter, state.calm, None if before is None else before.coefficients)
+            state.calm *= 1 - resized(state.floor.astype(np.float32), size)
+        state.background = self._model.fit(state.quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
             state.difference = state.difference - state.background.levels
         state.difference *= self._unsaturated
 
     def _destripe(self, state: State) -> None:
-        """Take rows' and columns' noise off, as far as what is calm is background too."""
+        """Take rows' and columns' noise off, by what is calm."""
         if "destriping" in self._without:
             return
         size = (state.calm.shape[1], state.calm.shape[0])
-        fits = resized(state.background.weight, size)
-        trusted = np.minimum(state.calm * resized(self._debris.clean, size), self._constants.calm_trust + fits)
+        trusted = state.calm * resized(self._debris.clean, size)
         state.difference = destriped(state.difference, trusted, self._constants)
 
     def _bridge_debris(self, state: State) -> None:
@@ -285,30 +290,27 @@ class RobustMethod:
 
     def _respond(self, state: State) -> None:
         """Compute the curvature response and the threshold from which on something touches."""
-        state.half = self._reduced(state.difference, _FINE_STEP)
-        response = curvature(state.half, _FINE_STEP, self._constants)
-        noise = curvature_noise(response, state.background, self._constants)
+        response = curvature(state.difference, _FINE_STEP, self._constants)
+        noise = curvature_noise(response, state.background)
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
-        state.moved = movement(state.half, state.background, self._flat_field, response)
-        if response.max() <= state.threshold and has_moved_widely(state.moved, self._constants):
-            state.threshold *= self._constants.wide_threshold
+        state.moved = movement(state.difference, state.background, self._flat_field, response)
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
         state.changed = changed(state.moved, state.background.spread_levels, self._constants)
 
     def _follow(self, state: State) -> None:
-        """Take over what was in contact at the last trusted step, unless the body has been let go."""
+        """Take over what was in contact at the last trusted step; once the body has been let go the press is over."""
+        width, height = self._half
+        state.quarter = resized(state.difference, (-(-width // 2), -(-height // 2)))
+        state.load_levels = float(np.sqrt(np.mean(np.square(state.quarter))))
         before = state.before
         if before is None or before.floor is None or self._parameters.contacts == "several":
             return
-        if state.background.load_levels < self._constants.released_share * before.floor_load_levels:
-            return
-        room_px = self._constants.floor_erosion * radius_of(before.floor)
-        side = 2 * round(room_px) + 1
-        framed = cv2.copyMakeBorder(before.floor, side, side, side, side, cv2.BORDER_REPLICATE)
-        eroded = cv2.erode(framed, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
-        state.floor = np.ascontiguousarray(eroded[side:-side, side:-side], np.uint8)
+        if state.load_levels < self._constants.released_share * before.floor_load_levels:
+            state.before = None
+        else:
+            state.floor = before.floor
 
     def _find_candidates(self, state: State) -> None:
         """Find where contacts may lie."""
@@ -354,8 +356,7 @@ class RobustMethod:
         if state.outlines or "weak contact" in self._without:
             return
         place = self._weak.place(self._weak_response(state))
-        least = self._constants.weak_least_curvature * state.threshold
-        if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
+        if place is None:
             return
         state.weak_at = place
         state.candidates = around(place, state.moved, self._constants)
@@ -429,23 +430,17 @@ class RobustMethod:
     def _outlined(self, state: State, body: Region) -> Outline | None:
         """The outline of a region, or None where the image does not support it."""
         p = self._constants
-        height, width = state.difference.shape[:2]
-        scale = width / body.mask.shape[1]
-        length = change_length(state.difference, state.half, body.radius_px * scale, p)
-        floor = None
-        if state.floor is not None:
-            floor = np.asarray(cv2.resize(state.floor, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
-        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, floor)
-        smallest_px = self._parameters.smallest_contact_px * height * width / PRINTED_IMAGE_PX
+        length = change_length(state.difference, p)
+        sure = state.gate > p.sure_gate
+        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, state.floor)
+        smallest_px = self._parameters.smallest_contact_px * outline.inside.size / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None
         if state.floor is not None:
             return outline
-        sure = state.gate > p.sure_gate
         if self._one_colour(state, outline, sure=sure):
             return None
-        support = p.support_least if outline.edge.seen.all() else p.support_cut
-        return outline if sure or state.weak_at is not None or outline.confidence >= support else None
+        return outline if sure or state.weak_at is not None or outline.confidence >= p.support_least else None
 
     def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
         """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
@@ -454,9 +449,9 @@ class RobustMethod:
         """
         if "one colour" in self._without or (sure and not outline.edge.seen.all()):
             return False
-        half = state.half
-        inside = cv2.resize(outline.inside, (half.shape[1], half.shape[0]), interpolation=cv2.INTER_NEAREST)
-        mean, deviation = cv2.meanStdDev(half, mask=inside)
+        change = state.difference
+        inside = cv2.resize(outline.inside, (change.shape[1], change.shape[0]), interpolation=cv2.INTER_NEAREST)
+        mean, deviation = cv2.meanStdDev(change, mask=inside)
         power = float((mean**2).sum())
         return power > self._constants.one_colour * (power + float((deviation**2).sum()))
 
@@ -476,8 +471,7 @@ class RobustMethod:
         return agreed
 
     def _weak_response(self, state: State) -> WeakResponse:
-        height, width = self._debris.clean.shape
-        return self._weak.response(resized(clipped(state.work), (width, height)))
+        return self._weak.response(state.frame)
 
     def _trace(self, state: State) -> Trace | None:
         if not state.outlines and state.floor is None:
@@ -492,10 +486,10 @@ class RobustMethod:
         if contact_px and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
             # Together with what was known: each step may seem to shrink a little, and many must not add up.
             known_before = None if before is None or state.floor is None else before.floor
-            floor, load_levels = mask if known_before is None else mask | known_before, background.load_levels
+            floor, load_levels = mask if known_before is None else mask | known_before, state.load_levels
         elif before is not None and self._confirms(mask, before.contact):
             floor = before.contact if floor is None else floor | before.contact
-            load_levels = max(load_levels, background.load_levels)
+            load_levels = max(load_levels, state.load_levels)
         textured = None if before is None else before.textured
         if state.outlines and known:
             textured = state.outlines[0].textured
@@ -504,17 +498,12 @@ class RobustMethod:
         return Trace(coefficients, floor, load_levels, mask, cv2.countNonZero(state.changed), textured)
 
     def _confirms(self, contact: Mask, before: Mask) -> bool:
-        """Whether a contact holds nearly all of the last step's and has not grown too much: chance does neither."""
+        """Whether a contact holds nearly all of the last step's: chance does not."""
         area_px = cv2.countNonZero(before)
-        kept = cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
-        return area_px > 0 and kept and cv2.countNonZero(contact) <= self._constants.confirmed_growth * area_px
+        return area_px > 0 and cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
 
     def _at_input_size(self, half_px: int, state: State) -> int:
         return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
-
-    def _reduced(self, field_: FloatImage, step: int) -> FloatImage:
-        height, width = field_.shape[:2]
-        return resized(field_, (-(-width // step), -(-height // step)))
 
     def _show(self, on_stage: StageSink, state: State, difference: FloatImage) -> None:
         response = self._weak_response(state)

@@ -55,7 +55,7 @@ class WeakContactDetector:
             grey levels.
         lit: which colours have light, shape (3,); the others are left out.
         clean: where there is no debris, shape (height, width), 0 or 1.
-        constants: the dent's size and the thresholds.
+        constants: the dent's size and the threshold.
         gate_ratio: the recipe's.
     """
 
@@ -69,20 +69,18 @@ class WeakContactDetector:
     ) -> None:
         height, width = clean.shape
         # A lower ratio than the default does not lower the thresholds: noise would reach them.
-        strictness = max(1.0, gate_ratio / _GATE_RATIO)
-        self.threshold = constants.weak_threshold * strictness
+        self.threshold = constants.weak_threshold * max(1.0, gate_ratio / _GATE_RATIO)
         """What the response has to reach."""
-        self._support = constants.weak_support * strictness
         self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
         sigma_px = constants.dent_sigma * min(1.0, max(height, width) / _LONG_SIDE_PX)
-        self._reach_px = int(np.ceil(_REACH * sigma_px))
-        x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
+        reach_px = int(np.ceil(_REACH * sigma_px))
+        x = np.arange(-reach_px, reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
         self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
         cut_off = (((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit).any(axis=2)
         blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
-        side = 2 * self._reach_px + 1
+        side = 2 * reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
         self._valid = (cv2.dilate(blind, around) == 0).astype(np.float32)
         down = ((np.arange(height) + 0.5) / height - 0.5)[:, None]
@@ -144,16 +142,6 @@ class WeakContactDetector:
         _, strongest, _, (x, y) = cv2.minMaxLoc(response.field)
         return (x, y) if strongest > self.threshold * response.compression else None
 
-    def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
-        """Rows and columns within the dent's reach of a place.
-
-        Args:
-            place: x and y, px.
-        """
-        x, y = place
-        reach_px = self._reach_px
-        return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
-
     def supports(self, region: Mask, response: WeakResponse) -> bool:
         """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
 
@@ -166,7 +154,7 @@ class WeakContactDetector:
         with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
         # A large contact's own slopes are what raises the ratio, and no codec.
         compression = response.compression if np.mean(region > 0) < _LARGE_SHARE else 1.0
-        return float(response.field[with_rim].max()) > self._support * compression
+        return float(response.field[with_rim].max()) > self.threshold * compression
 
 
 def _inner(field: FloatImage) -> FloatImage:

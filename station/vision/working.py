@@ -11,6 +11,7 @@ LONG_SIDE_PX = 320
 SATURATED_LEVEL = 248
 """Grey level from which a channel is taken as saturated: the sensor's own processing stops short of 255."""
 
+_HALF_FROM_PX = 2.5
 _SUM = np.ones((1, 3), np.float32)
 
 
@@ -49,6 +50,20 @@ def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
     shrinking = size[0] < field.shape[1]
     method = cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(np.ascontiguousarray(field, np.float32), size, interpolation=method), np.float32)
+
+
+def blurred(field: FloatImage, sigma_px: float) -> FloatImage:
+    """A field under a Gaussian window: a wide one at half the size, which loses nothing and takes less time.
+
+    Args:
+        field: shape (height, width) or (height, width, channels), float32.
+        sigma_px: the window's standard deviation.
+    """
+    if sigma_px <= _HALF_FROM_PX:
+        return np.asarray(cv2.GaussianBlur(field, (0, 0), sigma_px), np.float32)
+    size = (field.shape[1], field.shape[0])
+    half = resized(field, (-(-size[0] // 2), -(-size[1] // 2)))
+    return resized(np.asarray(cv2.GaussianBlur(half, (0, 0), sigma_px / 2), np.float32), size)
 
 
 def length_squared(change: FloatImage) -> FloatImage:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import importlib.util
 import itertools
 import os
 import signal
@@ -22,17 +21,11 @@ from station.calibration.report import calibration_files
 from station.calibration.store import CalibrationStore
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
+from station.studies.drawn_ball import DrawnBall
 from station.twin.console import ask
 
-ROOT = Path(__file__).resolve().parents[2]
 UNIT = Unit("T0001", "drawn DIGIT", simulated=True)
 _NUMBERS = itertools.count(1)
-
-_spec = importlib.util.spec_from_file_location("drawn_ball", ROOT / "benchmarks" / "drawn_ball.py")
-assert _spec is not None
-assert _spec.loader is not None
-_module = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(_module)
 
 
 @pytest.fixture(autouse=True)
@@ -42,8 +35,8 @@ def one_thread() -> None:
 
 @pytest.fixture(scope="session")
 def drawn_ball() -> Callable[..., Any]:
-    """Makes a drawn ball; see `benchmarks/drawn_ball.py`."""
-    return _module.DrawnBall
+    """Makes a drawn ball; see `station/studies/drawn_ball.py`."""
+    return DrawnBall
 
 
 def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress] | None = None) -> Draft:
@@ -66,7 +59,7 @@ def calibrate_drawn_fixture() -> Callable[..., Draft]:
 def draft() -> Draft:
     """A good calibration on two places."""
     cv2.setNumThreads(1)
-    return calibrate_drawn(_module.DrawnBall(1, mm_per_px=0.0285), (-2.5, 0.0), (0.0, 3.0))
+    return calibrate_drawn(DrawnBall(1, mm_per_px=0.0285), (-2.5, 0.0), (0.0, 3.0))
 
 
 @pytest.fixture

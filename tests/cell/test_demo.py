@@ -35,8 +35,8 @@ def demo(tmp_path, unused_ports, own_host):
     return begin
 
 
-def records_of(home):
-    command = [sys.executable, "-m", "station", "records", "list", "--last", "100"]
+def records_of(home, *ask):
+    command = [sys.executable, "-m", "station", "records", *(ask or ("list", "--last", "100"))]
     environment = {**os.environ, "STATION_HOME": str(home)}
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, env=environment).stdout
 
@@ -54,6 +54,10 @@ def test_every_fruit_is_decided_once_and_the_records_agree(demo, tmp_path):
     for name in ("plc", "hmi"):
         lines = (tmp_path / "demo" / "logs" / f"{name}.log").read_text().splitlines()
         assert {json.loads(line)["process"] for line in lines} == {name}
+    assert "calibrated the simulated sensor by its drawn ball" in output
+    shown = records_of(tmp_path / "demo", "show", "1")
+    assert re.search(r"size: +fruit length \d+\.\d mm \(given by the PLC\)", shown), shown
+    assert re.search(r"calibration \d{8}T\d{6}Z: 0\.02\d+ mm/px ± \d\.\d%, measured", shown), shown
     listed = records_of(tmp_path / "demo")
     for row in rows:
         if row[5] in {"PASS", "FAIL", "NO_RESULT"}:

@@ -25,15 +25,14 @@ async def interface(file):
     command = (sys.executable, "-m", "station", "plc", "run", "--config", str(file))
     process = await asyncio.create_subprocess_exec(*command, env=environment)
     try:
-        async with asyncio.timeout(60), contextlib.AsyncExitStack() as stack:
-            while True:
-                with contextlib.suppress(UnreachableError):
-                    plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
-                    break
-                await asyncio.sleep(0.1)
+        async with contextlib.AsyncExitStack() as stack:
+            async with asyncio.timeout(60):
+                while True:
+                    with contextlib.suppress(UnreachableError):
+                        plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
+                        break
+                    await asyncio.sleep(0.1)
             await plc.arm()
-            while "trigger_ready" not in await plc.status():
-                await asyncio.sleep(0.02)
             yield plc
     finally:
         process.terminate()

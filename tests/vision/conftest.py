@@ -102,6 +102,6 @@ def background_of() -> Callable[[np.ndarray], Background]:
     def make(weight: np.ndarray) -> Background:
         levels = np.zeros((*weight.shape, 3), np.float32)
         coefficients = np.zeros((3, 1, 1), np.float32)
-        return Background(levels, np.asarray(weight, np.float32), float(weight.mean()), 1.0, 0.0, coefficients, 0.0)
+        return Background(levels, np.asarray(weight, np.float32), float(weight.mean()), 1.0, 0.0, coefficients)
 
     return make

@@ -33,10 +33,9 @@ def test_it_falls_with_the_share_of_the_edge_that_falls():
     assert edge_confidence(half, 1.0, CONSTANTS) < 0.5 * edge_confidence(edge(), 1.0, CONSTANTS)
 
 
-def test_it_falls_with_the_share_of_the_edge_that_is_seen_once_that_is_small():
-    whole, most, few, none = (edge_confidence(edge(seen=share), 1.0, CONSTANTS) for share in (1, 0.5, 0.125, 0))
+def test_an_edge_beyond_the_border_is_never_sure():
+    whole, most, none = (edge_confidence(edge(seen=share), 1.0, CONSTANTS) for share in (1, 0.5, 0))
     assert most == pytest.approx(whole)
-    assert few == pytest.approx(whole * 0.125 / CONSTANTS.well_seen)
     assert none == 0
 
 

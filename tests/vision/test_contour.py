@@ -80,13 +80,6 @@ def test_a_closed_line_is_the_same_on_rays_from_its_own_middle(region):
     assert np.count_nonzero(masks[0] & masks[1]) > 0.95 * np.count_nonzero(masks[0] | masks[1])
 
 
-def test_rays_scale_with_the_image():
-    rays = Rays.about(ellipse(90, 150, 40, 40))
-    scaled = rays.scaled((2.0, 2.0))
-    points, scaled_points = rays.points(np.full(RAYS, 30.0)), scaled.points(np.full(RAYS, 60.0))
-    assert scaled_points == pytest.approx(2 * points + 0.5)
-
-
 def steep_rim(radius, x=120.0, y=160.0):
     """A change that rises to a contact's rim, and falls in the halo around it."""
     away = np.hypot(COLUMNS - x, ROWS - y) / radius

@@ -9,6 +9,7 @@ from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition
 from station.vision.debris import Debris
 from station.vision.robust import RobustMethod
+from station.vision.working import resized
 
 SHAPE = (320, 240)
 
@@ -26,9 +27,13 @@ def light():
     return np.stack([70 + 40 * rows, 90 + 50 * columns, 120 - 50 * columns * rows], axis=-1).astype(np.float32)
 
 
+def halved(change):
+    return resized(change.astype(np.float32), (SHAPE[1] // 2, SHAPE[0] // 2))
+
+
 def test_a_gel_without_debris_is_left_as_it_is():
     debris = Debris(light())
-    change = np.random.default_rng(1).normal(size=(*SHAPE, 3)).astype(np.float32)
+    change = halved(np.random.default_rng(1).normal(size=(*SHAPE, 3)))
     assert debris.clean.all()
     assert debris.bridged(change) is change
 
@@ -36,11 +41,10 @@ def test_a_gel_without_debris_is_left_as_it_is():
 def test_a_particle_that_a_contact_hides_does_not_show_in_the_change():
     particle = bump(10, 45).astype(np.float32)
     debris = Debris(light() + particle)
-    contact = np.full((*SHAPE, 3), 3.0, np.float32)
-    seen = (contact - particle).astype(np.float32)
+    seen = halved(3.0 - particle)
     assert (debris.clean == 0).any()
-    before = np.abs(seen - contact).max()
-    assert np.abs(debris.bridged(seen) - contact).max() < before / 3
+    before = np.abs(seen - 3.0).max()
+    assert np.abs(debris.bridged(seen) - 3.0).max() < before / 3
 
 
 def test_a_particle_that_still_stands_out_is_filled_from_around():
@@ -48,7 +52,7 @@ def test_a_particle_that_still_stands_out_is_filled_from_around():
     seen = np.full((*SHAPE, 3), 3.0, np.float32)
     rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
     seen[np.hypot(columns - 120, rows - 160) < 13] = 0
-    assert debris.bridged(seen)[160, 120] == pytest.approx(3.0, abs=1.0)
+    assert debris.bridged(halved(seen))[80, 60] == pytest.approx(3.0, abs=1.0)
 
 
 def test_two_particles_side_by_side_are_no_edge_of_a_beam_of_light():

@@ -11,7 +11,6 @@ from station.twin.digit.loaded import band_share
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.soft.body import Foundation, SoftBody, SoftKind
 from station.twin.soft.contact import SoftOnGel
-from station.vision.constants import CONSTANTS
 from station.vision.contact import Flag
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
@@ -108,9 +107,8 @@ def errors(presses, found, below=1.0):
     ]
 
 
-def test_the_area_of_a_press_does_not_fall_by_more_than_a_floor_may_shrink(followed):
-    assert max(largest_falls(followed)) < 1 - (1 - CONSTANTS.floor_erosion) ** 2
-    assert np.median(largest_falls(followed)) < 0.04
+def test_the_area_of_a_press_does_not_fall(followed):
+    assert max(largest_falls(followed)) < 0.01
 
 
 def test_it_stays_close_to_the_truth_while_the_edge_is_in_the_field(presses, followed):

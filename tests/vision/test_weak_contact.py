@@ -98,13 +98,6 @@ def test_a_lower_gate_ratio_does_not_let_noise_through():
     assert detector(gate_ratio=GATE_RATIO / 2).threshold == detector().threshold == CONSTANTS.weak_threshold
 
 
-def test_the_surroundings_of_a_place_end_at_the_border():
-    weak = detector()
-    whole, corner = (np.zeros(SHAPE)[weak.near(place)].shape for place in ((60, 80), (0, 159)))
-    assert whole[0] == whole[1]
-    assert corner == ((whole[0] + 1) // 2,) * 2
-
-
 def test_a_colour_without_light_adds_nothing():
     weak = detector(lit=(True, True, False))
     flicker = dent(levels=40.0) * np.array([0, 0, 1], np.float32)
