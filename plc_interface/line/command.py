@@ -10,7 +10,7 @@ from rich.console import Console
 from plc_interface.codec import WordOrder
 from plc_interface.line.display import LineDisplay, summary_line
 from plc_interface.line.faults import FaultPlan, LineFault
-from plc_interface.line.nest import Nest, RealNest, TwinNest
+from plc_interface.line.nest import SEVERITIES, Nest, RealNest, TwinNest
 from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
@@ -61,6 +61,13 @@ _ENDING_S = 0.5
     help="Share of damaged fruit in the twin.",
 )
 @click.option(
+    "--severity",
+    type=click.Choice(SEVERITIES),
+    default=SEVERITIES[0],
+    show_default=True,
+    help="How the twin's damaged fruit are damaged.",
+)
+@click.option(
     "--grader/--no-grader",
     "graded",
     default=True,
@@ -86,6 +93,7 @@ def line(
     console_port: int | None,
     kinds: tuple[str, ...],
     damaged_share: float,
+    severity: str,
     graded: bool,  # noqa: FBT001 (click passes arguments by name)
     seed: int,
     faults: tuple[str, ...],
@@ -101,7 +109,8 @@ def line(
         raise BadInputError(f"--lot: expected at most 32 printable ASCII characters, got {lot!r}")
     nest: Nest = RealNest()
     if console_port is not None:
-        nest = TwinNest(console_port, _numbers(kinds, site.recipes_folder), damaged_share, seed, graded=graded)
+        numbers = _numbers(kinds, site.recipes_folder)
+        nest = TwinNest(console_port, numbers, damaged_share, seed, graded=graded, severity=severity)
     elif kinds:
         raise BadInputError("--fruit: only the twin can lay fruit of a kind; give its console with --twin")
     program = LineProgram(FaultPlan([LineFault(fault) for fault in faults], fault_every), lot)

@@ -11,6 +11,8 @@ from station.errors import StationError
 
 GRADER_ERROR_MM = 1.0
 """Largest error of a length; an estimate of what an optical sizer resolves on soft fruit, no source found."""
+SEVERITIES = ("severe", "mild", "patch")
+"""How the twin's damaged fruit may be damaged, as its console names it."""
 _ANSWER_LIMIT_S = 5.0
 _LOOPBACK = "127.0.0.1"
 _SEEDS = 2**31
@@ -81,11 +83,20 @@ class TwinNest:
         damaged_share: of the fruit, from 0 to 1.
         seed: the same gives the same fruits.
         graded: whether a grader upstream tells their length.
+        severity: of the damage, one of `SEVERITIES`.
     """
 
     def __init__(
-        self, console_port: int, recipes: Mapping[str, int], damaged_share: float, seed: int, *, graded: bool = True
+        self,
+        console_port: int,
+        recipes: Mapping[str, int],
+        damaged_share: float,
+        seed: int,
+        *,
+        graded: bool = True,
+        severity: str = SEVERITIES[0],
     ) -> None:
+        self._severity = severity
         self._grader = Grader(seed) if graded else None
         self._port, self._recipes, self._damaged_share = console_port, dict(recipes), damaged_share
         self._random = random.Random(seed)  # noqa: S311 (a simulation)
@@ -99,7 +110,8 @@ class TwinNest:
         kind = self._random.choice(list(self._recipes))
         damaged = self._random.random() < self._damaged_share
         seed = self._random.randrange(_SEEDS)
-        await self._ask({"do": "fruit", "kind": kind, "seed": seed, "bruised": damaged})
+        how = {"bruised": damaged, "severity": self._severity}
+        await self._ask({"do": "fruit", "kind": kind, "seed": seed, **how})
         graded = 0
         if self._grader is not None:
             graded = self._grader.length_mm_x10((await self._ask({"do": "state"}))["fruit_length_mm"])

@@ -11,7 +11,7 @@ from rich.console import Console
 from plc_interface.codec import WordOrder
 from plc_interface.line.display import LineDisplay, summary_line
 from plc_interface.line.faults import FaultPlan, LineFault
-from plc_interface.line.nest import TwinNest
+from plc_interface.line.nest import SEVERITIES, TwinNest
 from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
@@ -44,6 +44,9 @@ _PATIENCE = {"stale_after_s": 0.5, "link_lost_after_s": 2.0}
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Which fruits.")
 @click.option("--damaged", type=click.FloatRange(0, 1), default=0.25, show_default=True, help="Share of damaged fruit.")
+@click.option(
+    "--severity", type=click.Choice(SEVERITIES), default=SEVERITIES[0], show_default=True, help="Of the damage."
+)
 @click.option("--console", default=49211, show_default=True, type=click.IntRange(1, 65535), help="The twin's console.")
 @click.option("--grader/--no-grader", "graded", default=True, help="Whether the PLC sends each fruit's length.")
 @click.option("--faults", is_flag=True, help=f"The PLC does something wrong at every {_FAULT_EVERY}th fruit.")
@@ -53,6 +56,7 @@ def demo(
     speed: float | None,
     seed: int,
     damaged: float,
+    severity: str,
     console: int,
     graded: bool,  # noqa: FBT001 (click passes arguments by name)
     faults: bool,  # noqa: FBT001
@@ -70,7 +74,8 @@ def demo(
     site = load_configuration()
     _refuse_real_devices(site)
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
-    nest = TwinNest(console, {name: numbers[name] for name in fruits or FRUITS}, damaged, seed, graded=graded)
+    kinds = {name: numbers[name] for name in fruits or FRUITS}
+    nest = TwinNest(console, kinds, damaged, seed, graded=graded, severity=severity)
     plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
     pace = Pace(every_s=60 / speed if speed else 0.0)
     new = calibrate_simulated_unit(site)

@@ -9,9 +9,11 @@ import click
 from station.errors import BadInputError, StationError
 from station.recipe_store.difference import differences
 from station.records.database import reading, records_folder
+from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.recipe_form import content_sha256
+from station.whatif.against_marks import Compared, compared
 from station.whatif.outcome_table import Counted, as_csv, counted
 from station.whatif.page import MOST_SHOWN, Page, as_json, render, shown
 from station.whatif.progress_file import ProgressFile
@@ -39,13 +41,15 @@ def whatif(
 ) -> None:
     """Judge stored inspections again by DRAFT, and show which fruit would have changed sides.
 
-    Writes DIR/whatif.html, changes.csv and summary.json. A run that was ended goes on where it was. What cannot be
+    Fruit that people have marked good or bad are counted by the errors. Writes DIR/whatif.html, changes.csv and
+    summary.json. A run that was ended goes on where it was. What cannot be
     known, as where a curve was stopped early, is counted apart and never guessed.
     """
     site = load_configuration(config)
     draft, folder = find_recipe(recipe_name, site.recipes_folder), records_folder(site.home)
     with reading(folder) as connection:
         wanted, own = sequences(connection, draft.name, lots, last), snapshots(connection, draft.name)
+        marks: dict[int, Mark] = {each.sequence: each.mark for each in read_marked(connection)}
     if not wanted:
         raise BadInputError(f"no judged inspection of {draft.name} is in {folder}" + _of(lots))
     with ProgressFile(out, draft) as progress:
@@ -57,21 +61,27 @@ def whatif(
                 progress.add(results)
                 bar.update(len(results))
         results = [progress.done[sequence] for sequence in wanted if sequence in progress.done]
-    told = counted(results)
-    page = _page(folder, results, told, own, draft, lots)
+    told, against = counted(results), compared(results, marks)
+    page = _page(folder, results, told, against, own, draft, lots)
     try:
         (out / "whatif.html").write_text(page, encoding="utf-8")
         (out / "changes.csv").write_text(as_csv(results), encoding="utf-8")
-        (out / "summary.json").write_text(as_json(told), encoding="utf-8")
+        (out / "summary.json").write_text(as_json(told, against), encoding="utf-8")
     except OSError as error:
         raise StationError(
             f"--out {out}: {(error.strerror or str(error)).lower()}; free space and try again"
         ) from error
-    _say(told, out)
+    _say(told, against, out)
 
 
 def _page(
-    folder: Path, results: list[Replayed], told: Counted, own: dict[str, str], draft: Recipe, lots: tuple[str, ...]
+    folder: Path,
+    results: list[Replayed],
+    told: Counted,
+    against: Compared | None,
+    own: dict[str, str],
+    draft: Recipe,
+    lots: tuple[str, ...],
 ) -> str:
     known = [recipe for text in own.values() if (recipe := recipe_of_snapshot(text)) is not None]
     single = known[-1] if known else None
@@ -84,17 +94,19 @@ def _page(
         ("recipes of then", ", ".join(sha256[:12] for sha256 in own)),
     ]
     changes = () if single is None else differences(single, draft)
-    return render(Page(f"What if: {draft.title}", facts, changes, told, tiles, len(changed)))
+    return render(Page(f"What if: {draft.title}", facts, changes, told, against, tiles, len(changed)))
 
 
 def _of(lots: tuple[str, ...]) -> str:
     return f", of lot {', '.join(lots)}" if lots else ""
 
 
-def _say(told: Counted, out: Path) -> None:
+def _say(told: Counted, against: Compared | None, out: Path) -> None:
     click.echo(f"{told.total} inspections, {told.decided} decided by the draft")
     click.echo(f"rejects: {told.rejects_before()} before, {told.rejects_after()} after")
     click.echo(f"{told.newly_rejected} newly rejected, {told.newly_passed} newly passed")
+    for line in [] if against is None else against.lines():
+        click.echo(line)
     if told.measured_again:
         click.echo(f"{told.measured_again} measured again in their stored images")
     for why, number in told.undecidable.most_common(5):

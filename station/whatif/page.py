@@ -19,6 +19,7 @@ from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
+from station.whatif.against_marks import Compared
 from station.whatif.outcome_table import AFTER, BEFORE, Counted
 from station.whatif.replay import Replayed
 from station.whatif.stored import read_gate_factor
@@ -52,6 +53,8 @@ class Page:
     facts: Sequence[tuple[str, str]]
     changes: Sequence[Difference]
     counted: Counted
+    against: Compared | None
+    """What people found of the fruit; None where none is marked."""
     shown: Sequence[Shown]
     changed: int
     """How many change sides, shown or not."""
@@ -168,10 +171,12 @@ def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
 
 
-def as_json(counted: Counted) -> str:
+def as_json(counted: Counted, against: Compared | None) -> str:
     """The figures as a file.
 
     Args:
         counted: all results.
+        against: the marked ones; None where there are none.
     """
-    return json.dumps(counted.summary(), indent=2, ensure_ascii=False) + "\n"
+    figures = {**counted.summary(), "marked": None if against is None else against.figures()}
+    return json.dumps(figures, indent=2, ensure_ascii=False) + "\n"

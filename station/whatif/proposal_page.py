@@ -19,6 +19,20 @@ img { max-width: 100%; }</style></head><body>
 {% for line in lines %}<p>{{ line }}</p>{% endfor %}
 <img src="{{ histogram }}" alt="histogram of good and bad fruit">
 <img src="{{ errors }}" alt="both errors over the limit">
+<p><label>Another limit: <input id="limit" type="range" min="0" max="{{ curve|length - 1 }}" value="{{ chosen }}"
+style="width: 60%"></label> <output id="told"></output></p>
+<script>
+const curve = {{ curve|tojson }}, slider = document.getElementById("limit");
+const share = (name, errors) => `${errors.count} of ${errors.of} ${name} ` +
+  `(${errors.interval.map(end => (100 * end).toFixed(1)).join(" to ")} %)`;
+const show = () => {
+  const point = curve[slider.value];
+  document.getElementById("told").textContent = `${point.limit_mm2.toFixed(1)} mm²: ` +
+    `${share("good diverted", point.good_diverted)}, ${share("bad passed", point.bad_passed)}`;
+};
+slider.addEventListener("input", show);
+show();
+</script>
 </body></html>
 """
 
@@ -80,7 +94,7 @@ def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
 
 
 def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
-    """The page with its two pictures, in one file.
+    """The page with its two pictures and a slider on the limit, in one file.
 
     Args:
         title: the recipe's.
@@ -88,8 +102,12 @@ def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
         told: all its figures, by name.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    pictures = {"histogram": _histogram(best), "errors": _errors(best, told["proposed"]["curve"])}
-    return environment.from_string(_PAGE).render(title=title, lines=lines_of(told), **pictures)
+    curve = told["proposed"]["curve"]
+    chosen = min(range(len(curve)), key=lambda place: abs(curve[place]["limit_mm2"] - best.limit_mm2))
+    pictures = {"histogram": _histogram(best), "errors": _errors(best, curve)}
+    return environment.from_string(_PAGE).render(
+        title=title, lines=lines_of(told), curve=curve, chosen=chosen, **pictures
+    )
 
 
 def _histogram(best: Proposal) -> str:

@@ -1,7 +1,7 @@
 """One stored inspection judged by a draft, as the station would have done; where that cannot be known, it says so.
 
 A stored curve ends where the recipe of then ended it. A draft that would have pressed on has no verdict but what is
-proven by then: a proof of damage stands, whatever would have come, since no further point can make such a fruit pass.
+certain by then: damage that is proven, and a fruit that cannot pass any more, whatever would have come.
 """
 
 import json
@@ -134,6 +134,8 @@ def _judged(
     )
     if proven or void or ended or verdict.stopped is not None:
         return _decided(stored, verdict, faithful=faithful)
+    if (hopeless := judge(press, _stopping(draft))).stopped is not None and hopeless.outcome != "PASS":
+        return _decided(stored, hopeless, faithful=faithful)
     reached_mm = press.points[-1].closing_mm if press.points else 0.0
     cut = ", where it was stopped early" if stopped else ""
     why = f"the curve ends at {reached_mm:.1f} mm of closing{cut}, and the draft would have pressed on"
@@ -147,6 +149,11 @@ def _until_stop(press: Press, draft: Recipe) -> Press:
         if early_stop(replace(press, points=points[:number]), draft) is not None:
             return replace(press, points=points[:number])
     return replace(press, points=points)
+
+
+def _stopping(draft: Recipe) -> Recipe:
+    """The draft as it would be if no step were made that cannot change the outcome."""
+    return draft.model_copy(update={"steps": draft.steps.model_copy(update={"stop_when_decided": True})})
 
 
 def _fits(onset_mm: float | None, draft: Recipe) -> bool:

@@ -200,7 +200,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
     records = await Records.open(folder, RecordsSettings(deadline_s=30.0, free_reserve_mb=1), "boot")
     try:
         for number in range(fruit):
-            drawn = replace(draw_fruit("strawberry", 51 + number), bruised=number % 4 == 3)
+            drawn = replace(draw_fruit("strawberry", 71 + number), bruised=number % 4 == 3)
             closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
             shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3, references=3))
             length_mm = round(drawn.length_mm)

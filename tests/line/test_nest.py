@@ -5,9 +5,10 @@ import os
 
 import pytest
 
-from plc_interface.line.nest import GRADER_ERROR_MM, Grader, TwinNest
+from plc_interface.line.nest import GRADER_ERROR_MM, SEVERITIES, Grader, TwinNest
 from station.settings.camera import TwinCameraSettings
 from station.settings.gripper import GripperSettings
+from station.twin.damage import DAMAGES, Severity
 from station.twin.process import Twin, TwinOptions
 
 RECIPES = {"strawberry": 1, "blueberry": 2}
@@ -33,7 +34,7 @@ def test_the_length_is_of_the_fruit_that_the_twin_has_laid(graded, unused_port):
         twin = Twin(TwinOptions(bench=True, gripper=gripper, camera=camera, console_port=0))
         await twin.start()
         try:
-            nest = TwinNest(twin.console.address[1], RECIPES, 0.5, 3, graded=graded)
+            nest = TwinNest(twin.console.address[1], RECIPES, 0.5, 3, graded=graded, severity="mild")
             laid = []
             for _ in range(8):
                 fruit = await nest.arrive()
@@ -47,8 +48,13 @@ def test_the_length_is_of_the_fruit_that_the_twin_has_laid(graded, unused_port):
     assert {fruit.kind for fruit, _ in laid} == set(RECIPES)
     for fruit, truth in laid:
         assert (fruit.kind, fruit.damaged) == (truth.kind, truth.bruised)
+        assert truth.damage == DAMAGES[Severity.MILD]
         if graded:
             assert abs(fruit.length_mm_x10 / 10 - truth.length_mm) <= GRADER_ERROR_MM + 0.05
         else:
             assert fruit.length_mm_x10 == 0
     assert [fruit.length_mm_x10 for fruit, _ in laid] != [round(10 * truth.length_mm) for _, truth in laid]
+
+
+def test_the_line_names_the_severities_that_the_twin_knows():
+    assert tuple(Severity) == SEVERITIES

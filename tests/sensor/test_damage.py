@@ -9,6 +9,7 @@ from station.twin.contact import FruitOnGel, Pose
 from station.twin.damage import DAMAGES, Damage, Severity, SoftPatch
 from station.twin.fruit import Kind, draw_fruit
 from station.twin.gel import Gel
+from station.twin.process import Twin, TwinOptions
 from station.twin.squeeze import Squeeze
 
 FRUITS = (Kind.STRAWBERRY, Kind.RASPBERRY, Kind.BLUEBERRY)
@@ -63,3 +64,12 @@ def test_the_force_never_falls_as_the_contact_grows_onto_a_patch(kind, radius_mm
     squeeze = Squeeze(draw_fruit(kind, 1, bruised=True, damage=damage), Gel())
     steps = [squeeze.at(closing_mm) for closing_mm in np.linspace(0, 8, 81)]
     assert (np.diff([step.force_n for step in steps]) >= 0).all()
+
+
+def test_the_twin_lays_fruit_by_severity_and_refuses_one_that_it_does_not_know():
+    twin = Twin(TwinOptions(bench=True))
+    twin._lay({"kind": "blueberry", "bruised": True, "severity": "mild"})
+    assert twin.world.fruit is not None
+    assert twin.world.fruit.damage == DAMAGES[Severity.MILD]
+    with pytest.raises(ValueError, match="severity: expected one of severe, mild, patch, found 'dreadful'"):
+        twin._lay({"kind": "blueberry", "bruised": True, "severity": "dreadful"})

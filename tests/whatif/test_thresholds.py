@@ -168,7 +168,11 @@ def test_a_limit_is_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
     assert "# the paper" in file.read_text(), "comments are kept"
     rates = figures["by_the_proposed_recipe"]
     assert (rates["bad"]["rejected"], rates["good"]["rejected"]) == (5, 0)
-    assert (out / "thresholds.html").read_text().count("data:image/png") == 2
+    page = (out / "thresholds.html").read_text()
+    assert page.count("data:image/png") == 2
+    told_by_slider = json.loads(page.split("const curve = ")[1].split(", slider = ")[0])
+    assert told_by_slider == best["curve"]
+    assert "http" not in page, "it needs no network"
     again = ("thresholds", "--recipe", "strawberry", "--out", tmp_path / "again")
     code, told = station(*again)
     assert (code, "no fruit is marked" in told) == (2, True)
