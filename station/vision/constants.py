@@ -64,7 +64,7 @@ class Constants:
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
     candidate_share: float = constant(0.5, "of the strong level", "a place from here on belongs to a candidate", "fit")
     # Region
-    region_window: float = constant(0.06, "of the radius", "window of the level", "fit")
+    region_window: float = constant(0.08, "of the radius", "window of the level", "fit")
     cap_quantile: float = constant(0.38, "", "quantile of the region's level at which the gain is capped", "fit")
     share_random: float = constant(0.33, "of the cap", "the region's end where directions are random", "fit")
     share_coherent: float = constant(1.6, "of the cap", "how much higher it is per unit of coherence", "fit")
