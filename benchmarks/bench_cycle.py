@@ -31,6 +31,7 @@ from station.channel.line import (
     Published,
     StationState,
 )
+from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
@@ -256,6 +257,7 @@ def main() -> None:
             "service: {patience: 10.0}\n"
         )
         configuration = load_configuration(file, {})
+        calibrate_simulated_unit(configuration, "bench")
         twin = start("twin", file, "--console", str(CONSOLE))
         try:
             service = start("service", file)

@@ -26,6 +26,7 @@ from plc_interface.line.nest import TwinNest
 from plc_interface.line.program import LineProgram
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
+from station.commands.simulated_unit import calibrate_simulated_unit
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
@@ -213,7 +214,9 @@ def main() -> None:
     (home / "station.yaml").write_text(CONFIGURATION, encoding="utf-8")
     os.environ["STATION_HOME"] = str(home)
     try:
-        phases = asyncio.run(measure(load_configuration(), count))
+        site = load_configuration()
+        calibrate_simulated_unit(site, "bench")
+        phases = asyncio.run(measure(site, count))
         text = written(phases, disk(home, 2 * count), count)
     finally:
         shutil.rmtree(home)

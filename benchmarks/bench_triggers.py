@@ -24,6 +24,7 @@ from plc_interface.line.nest import LaidFruit, TwinNest
 from plc_interface.line.program import Decision, LineProgram, Passage
 from plc_interface.line.scan import Scanner
 from plc_interface.line.simulator import LineSimulator, Pace
+from station.commands.simulated_unit import calibrate_simulated_unit
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
 from station.settings.configuration import Configuration, load_configuration
@@ -187,6 +188,7 @@ def main() -> None:
         file.write_text(CONFIGURATION, encoding="utf-8")
         os.environ |= {"STATION_HOME": home, "STATION_CONFIG": str(file)}
         site = load_configuration()
+        calibrate_simulated_unit(site, "bench")
         began_s = time.monotonic()
         rows, counted = asyncio.run(inspect(site, count))
         wrong = disagreements(site, rows, counted)

@@ -3,10 +3,10 @@
 --   psql --set ON_ERROR_STOP=1 --single-transaction --file schema.sql fruit
 -- then give each station a login that is a member of fruit_station, and readers one of fruit_reader:
 --   CREATE ROLE station_7 LOGIN PASSWORD '…' IN ROLE fruit_station;
--- TimescaleDB is optional: timescaledb.sql, loaded after this file.
+-- A database of version 1 becomes one of this version by schema-1-to-2.sql. TimescaleDB is optional: timescaledb.sql, loaded after this file.
 
 CREATE TABLE schema_version (version integer PRIMARY KEY);
-INSERT INTO schema_version VALUES (1);
+INSERT INTO schema_version VALUES (2);
 
 -- What each station has told so far, by the database that counted. Written in the transaction of the rows themselves,
 -- so that nothing is lost or doubled wherever a connection is cut.
@@ -60,10 +60,13 @@ CREATE TABLE inspections (
     origin text NOT NULL,
     entry bigint NOT NULL,
     arrived bigint GENERATED ALWAYS AS IDENTITY,
+    fruit_length_mm double precision,
+    size_class integer,
     -- the time is part of the key because TimescaleDB wants it so; a number's begin never changes
     PRIMARY KEY (station, sequence, began)
 );
 COMMENT ON COLUMN inspections.images IS 'kind, step, sha256, size_bytes of each; the file is at the station: images/<first two of sha256>/<sha256>.png';
+COMMENT ON COLUMN inspections.fruit_length_mm IS 'as the line''s PLC gave it with the trigger, size_class likewise; null where it gave none';
 COMMENT ON COLUMN inspections.arrived IS 'rises in the order in which the rows came; per station that of the entries';
 CREATE INDEX inspections_began ON inspections (began DESC);
 CREATE INDEX inspections_lot ON inspections (lot, station);

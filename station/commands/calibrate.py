@@ -13,14 +13,12 @@ from station.calibration.bench import Place, Unit
 from station.calibration.calibrating import Calibrating, Draft, Evidence
 from station.calibration.errors import CalibrationError, RefusedError
 from station.calibration.model import Check, Refusal, stamp
-from station.calibration.report import calibration_files, refusal_files
+from station.calibration.report import refusal_files
 from station.calibration.store import PAGE, CalibrationStore
 from station.commands.ball import at_the_bench, cancelled_by_signals, show
+from station.commands.calibration_storing import store_calibration
+from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError
-from station.records.audit import append_audit
-from station.records.database import records_folder
-from station.records.direct import writing
-from station.service.trail import calibration_stored
 from station.settings.configuration import Configuration, load_configuration
 
 _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
@@ -81,29 +79,10 @@ def calibrate(
         return
     site = load_configuration(config)
     draft = _run(site, operator, places, bench=bench, yes=yes)
-    folder = store(site, operator, draft)
+    folder = store_calibration(site, operator, draft)
     _tell(draft.calibration.checks)
     click.echo(f"calibration {draft.calibration.in_words()}")
     click.echo(f"stored; look at {folder / PAGE}")
-
-
-def store(site: Configuration, operator: str, draft: Draft) -> Path:
-    """Store a calibration and tell the audit trail, or neither where one of them cannot be written.
-
-    Args:
-        site: whose home it goes to.
-        operator: who calibrated.
-        draft: what was found.
-
-    Raises:
-        StationError: nothing was stored.
-    """
-    calibrations, new = CalibrationStore(site.home), draft.calibration
-    before = calibrations.current(new.serial)
-    with writing(records_folder(site.home)) as connection:
-        old = None if before is None else before.id
-        append_audit(connection, calibration_stored(operator, "", f"sensor {new.serial}", old, new.id))
-        return calibrations.add_calibration(new, calibration_files(draft))
 
 
 def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:
@@ -153,6 +132,23 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
 def _tell(checks: tuple[Check, ...]) -> None:
     for check in checks:
         click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:12}{check.found}")
+
+
+@calibrate.command("simulated")
+@_CONFIG
+def simulated_command(config: Path | None) -> None:
+    """Calibrate the twin's sensor where it never was, in a few seconds: on a drawn ball at three places.
+
+    No device is asked, so that the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
+    """
+    site = load_configuration(config)
+    if site.camera.driver != "twin":
+        raise BadInputError(
+            f"camera.driver is {site.camera.driver}: only the twin's sensor is calibrated so; lay the ball in and run "
+            "station calibrate"
+        )
+    made = calibrate_simulated_unit(site, getpass.getuser())
+    click.echo(f"calibration {made.in_words()}" if made else "it is calibrated already; see station calibrate list")
 
 
 @calibrate.command("list")

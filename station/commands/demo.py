@@ -78,7 +78,7 @@ def demo(
     nest = TwinNest(console, kinds, damaged, seed, graded=graded, severity=severity)
     plan = FaultPlan(tuple(LineFault) if faults else (), _FAULT_EVERY)
     pace = Pace(every_s=60 / speed if speed else 0.0)
-    new = calibrate_simulated_unit(site)
+    new = calibrate_simulated_unit(site, "demo")
     if new is not None:
         click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.in_words()}")
     supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])

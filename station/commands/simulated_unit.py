@@ -1,4 +1,4 @@
-"""The demonstration's calibration: the station's own procedure on the simulated sensor's ball, without the wire."""
+"""The simulated sensor's calibration: the station's own procedure on the simulated sensor's ball, without the wire."""
 
 import asyncio
 from importlib.metadata import version
@@ -7,25 +7,25 @@ from station.calibration.bench import Place, Unit
 from station.calibration.calibrating import Calibrating
 from station.calibration.model import Calibration
 from station.calibration.store import CalibrationStore
-from station.commands.calibrate import store
+from station.commands.calibration_storing import store_calibration
 from station.devices.camera.twin import TwinCamera
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
 from station.studies.drawn_ball import DrawnBall
 
-OPERATOR = "demo"
 PLACES = (Place(-2.5, 0.0), Place(0.0, 3.0))
 """Beside the first, as docs/calibration.md asks of a person: so the scale is measured."""
 
 
-def calibrate_simulated_unit(site: Configuration) -> Calibration | None:
+def calibrate_simulated_unit(site: Configuration, operator: str) -> Calibration | None:
     """Calibrate the twin's sensor where it never was, in a few seconds.
 
     The ball is drawn as the twin draws it, at the gripper's counts and with the sensor's noise; arm, gripper and frames
     do not go over the wire, which would take minutes. All else is what `station calibrate` does and stores.
 
     Args:
-        site: of the demonstration: its home, and the twin's camera.
+        site: its home, and the twin's camera.
+        operator: who calibrates.
 
     Returns:
         What was stored; None where the unit has a calibration already.
@@ -43,10 +43,10 @@ def calibrate_simulated_unit(site: Configuration) -> Calibration | None:
             find_recipe(site.calibration.recipe, site.recipes_folder),
             site.calibration,
             PLACES,
-            OPERATOR,
+            operator,
             version("fruit-station"),
             lambda _: None,
         ).run()
     )
-    store(site, OPERATOR, draft)
+    store_calibration(site, operator, draft)
     return draft.calibration

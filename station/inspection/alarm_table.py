@@ -339,9 +339,10 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.CALIBRATION_OLD: AlarmRow(
         31,
         Priority.LOW,
-        "The sensor's calibration is older than allowed, or its last verification failed.",
-        "Areas in mm² may be wrong; where verification is demanded, triggers are refused.",
-        "At the next pause stop the station, run `station verify`, and where it fails `station calibrate`.",
+        "The sensor is not calibrated, its calibration is older than allowed, or its last verification failed.",
+        "Areas in mm² may be wrong; without a calibration, and where verification is demanded, triggers are refused.",
+        "At the next pause stop the station and run `station verify`; where that fails, or there is no calibration, "
+        "`station calibrate`.",
         (P("camera", "gel_worn"),),
     ),
     AlarmId.HMI_LOST: AlarmRow(

@@ -17,7 +17,7 @@ from station.settings.outbox import OutboxPostgresqlSettings
 
 log = logging.getLogger(__name__)
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 NAME = "postgresql"
 _CONNECT_S = 5
 _STATEMENT_MS = 60_000
@@ -28,7 +28,7 @@ _INSPECTION: tuple[LiteralString, ...] = (
     "station", "sequence", "began", "ended", "duration_ms", "published", "lot", "fruit", "recipe_sha256", "outcome",
     "reasons", "judged", "explanation", "late", "partial", "simulated", "area_mm2", "area_px", "closing_mm",
     "confidence", "trigger_id", "encoder", "boot", "curve", "images", "images_state", "phases_s", "measures",
-    "devices", "versions", "origin", "entry",
+    "devices", "versions", "fruit_length_mm", "size_class", "origin", "entry",
 )  # fmt: skip
 _LOT: tuple[LiteralString, ...] = ("station", "name", "grower", "began", "ended", "revision", "origin", "entry")
 _AUDIT: tuple[LiteralString, ...] = (
@@ -108,7 +108,10 @@ class Postgresql:
         found = await (await connection.execute("SELECT max(version) FROM schema_version")).fetchone()
         if found != (SCHEMA_VERSION,):
             version = found and found[0]
-            raise OutboxError(f"the database's form is {version}, not {SCHEMA_VERSION}", "see deploy/postgresql")
+            upgrade = f"deploy/postgresql/schema-{version}-to-{SCHEMA_VERSION}.sql"
+            older = isinstance(version, int) and version < SCHEMA_VERSION
+            remedy = f"load {upgrade} there" if older else "bring this station to the version of the others"
+            raise OutboxError(f"the database's form is {version}, not {SCHEMA_VERSION}", remedy)
         lock = "SELECT pg_try_advisory_lock(hashtextextended('fruit-station ' || %s, 0))"
         if await (await connection.execute(lock, (self._station,))).fetchone() != (True,):
             raise OutboxError(

@@ -1,4 +1,4 @@
-"""The sensor's calibration as the station uses it: scale, gate, golden reference, age, and whether it is verified."""
+"""The sensor's calibration as the station uses it: scale, gate, golden reference, age, and whether it is due."""
 
 import time
 from collections.abc import Callable
@@ -48,6 +48,7 @@ class Calibrated:
     ) -> None:
         self._store, self._home = CalibrationStore(configuration.home), configuration.home
         self._settings, self._usual_mm_per_px = configuration.calibration, configuration.camera.mm_per_px
+        self._required = configuration.service.uncalibrated == "refuse"
         self._serial, self._clock = serial, clock
         self._seen: object = None
         self._calibration: Calibration | None = None
@@ -64,7 +65,8 @@ class Calibrated:
         """The scale that areas are told by, and whose it is."""
         calibration = self.calibration
         if calibration is None:
-            words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration"
+            allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
+            words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration{allowed}"
             return InUse(self._usual_mm_per_px, words, _UNMEASURED)
         measured = calibration.scale_measured
         scale = calibration.mm_per_px if measured else self._usual_mm_per_px
@@ -90,15 +92,18 @@ class Calibrated:
             None if verified is None else verified.drift,
         )
 
-    def not_verified(self) -> str:
-        """Why nothing may be inspected, with what to do; empty where verification is not demanded, or was passed."""
-        limit_h = self._settings.verify_every_h
+    def refusal(self) -> str:
+        """Why nothing may be inspected, with what to do; empty where all that is demanded was done."""
+        limit_h, calibration = self._settings.verify_every_h, self.calibration
+        if calibration is None and (self._required or limit_h is not None):
+            return (
+                "The sensor is not calibrated: calibrate it with the ball on the page Maintenance in manual mode, "
+                "or by `station calibrate` with the station stopped."
+            )
         if limit_h is None:
             return ""
-        calibration, verified, age_s = self.calibration, self._verification, self.figures.verification_age_s
+        verified, age_s = self._verification, self.figures.verification_age_s
         how = "on the page Maintenance in manual mode, or by `station verify` with the station stopped."
-        if calibration is None:
-            return f"The sensor is not calibrated: calibrate it with the ball, then verify; {how}"
         if verified is None or age_s is None:
             return f"The calibration was never verified, and it is demanded: verify it with the ball; {how}"
         if not verified.passed:
@@ -112,7 +117,7 @@ class Calibrated:
         """What the alarm calibration_old tells; empty where there is nothing."""
         calibration, verified = self.calibration, self._verification
         if calibration is None:
-            return ""
+            return "the sensor is not calibrated: calibrate it first" if self._required and self._serial() else ""
         age_days = (self.figures.age_s or 0.0) / _DAY_S
         if age_days > self._settings.oldest_days:
             return f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"

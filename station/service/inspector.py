@@ -107,6 +107,8 @@ class Inspector:
             return False
         now.reference_image = Image("reference", None, image)
         now.measures["gate_factor"] = self._calibrated.gate_factor  # without it no image can be measured again
+        if self._calibrated.calibration is None:
+            now.measures["uncalibrated"] = "allow"
         for alarm in ALARMS:
             self._alarms.clear(alarm)
         drift, most = looks.drift_levels, self._settings.reference.most_drift_levels

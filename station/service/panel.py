@@ -147,7 +147,7 @@ class Panel:
             plc_connected=told is not None and told.plc_connected,
             plc_alive=told is not None and told.plc_alive,
             line_trouble=self._line.line_trouble(),
-            check_due=self._calibrated.not_verified(),
+            check_due=self._calibrated.refusal(),
             alarms=self._alarms.standing(),
             devices=tuple(
                 DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)

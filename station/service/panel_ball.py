@@ -130,7 +130,7 @@ class PanelBall:
             verification_age_s=figures.verification_age_s,
             oldest_days=settings.oldest_days,
             verify_every_h=settings.verify_every_h,
-            trouble=self._calibrated.not_verified() or self._calibrated.trouble(),
+            trouble=self._calibrated.refusal() or self._calibrated.trouble(),
             ball_mm=settings.ball_mm,
             run=None if self._run is None else _told(self._run),
             run_refused=self._why_not(serial),

@@ -26,7 +26,7 @@ class Gate:
         book: the recipes there are.
         lots: why a lot could not begin.
         liveness: what has to make progress.
-        calibrated: whether the sensor is verified where that is demanded.
+        calibrated: whether the sensor is calibrated, and verified where that is demanded.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Gate:
             numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
             why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
             return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
-        if why := self._calibrated.not_verified():
+        if why := self._calibrated.refusal():
             return Refusal.NOT_READY, why
         if self._orders.mode != PRODUCTION:
             return Refusal.NOT_READY, "The station is not in production mode: set mode 1."

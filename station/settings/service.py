@@ -70,6 +70,12 @@ class ServiceSettings(Settings):
         description="Make ready after a start, and after a fault that is gone: the jaws open and the arm goes home. "
         "After a safety stop, or with a fruit left between the jaws, a person's reset is always needed.",
     )
+    uncalibrated: Literal["refuse", "allow"] = setting(
+        "refuse",
+        title="Without a calibration",
+        description="`refuse` inspects nothing with a sensor that was never calibrated: its scale is known to 15 % "
+        "only. `allow` is for a bench or a study; each record states it.",
+    )
     inspection_deadline_s: float | None = setting(
         None,
         title="Inspection's deadline",

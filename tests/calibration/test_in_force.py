@@ -56,7 +56,8 @@ def verification(calibration, made_at, *checks):
 
 def in_use(home, after, serial="T0001", **settings):
     """What the station sees some time after the calibration was made."""
-    configuration = Configuration.model_validate({"home": home, "calibration": settings})
+    service = {"uncalibrated": settings.pop("uncalibrated", "refuse")}
+    configuration = Configuration.model_validate({"home": home, "calibration": settings, "service": service})
     return Calibrated(configuration, lambda: serial, after.timestamp)
 
 
@@ -80,8 +81,8 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     assert prepared is not None
     assert prepared.renewal == "calibrate"
     another = in_use(tmp_path, calibration.made_at, "D11111")
-    assert another.in_force == (0.0266, "none: 0.0266 mm/px, by the configuration")
-    assert (another.gate_factor, another.golden(), another.trouble()) == (1.0, None, "")
+    assert another.in_force[:2] == (0.0266, "none: 0.0266 mm/px, by the configuration")
+    assert (another.gate_factor, another.golden()) == (1.0, None)
 
 
 def test_a_scale_that_was_not_measured_leaves_the_sites_in_force(store, draft, tmp_path):
@@ -105,16 +106,29 @@ def test_age_and_a_failed_verification_are_told(stored, draft, tmp_path):
 
 def test_nothing_is_ready_without_the_verification_that_is_demanded(stored, draft, tmp_path):
     made_at = draft.calibration.made_at
-    assert in_use(tmp_path, made_at).not_verified() == ""
-    assert "not calibrated" in in_use(tmp_path, made_at, "D11111", verify_every_h=8.0).not_verified()
+    assert in_use(tmp_path, made_at).refusal() == ""
+    assert "not calibrated" in in_use(tmp_path, made_at, "D11111", verify_every_h=8.0, uncalibrated="allow").refusal()
     demanded = in_use(tmp_path, made_at + timedelta(hours=9), verify_every_h=8.0)
-    assert "never verified" in demanded.not_verified()
+    assert "never verified" in demanded.refusal()
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=0.5)), {})
-    assert "8.5 h old, at most 8 h" in demanded.not_verified()
+    assert "8.5 h old, at most 8 h" in demanded.refusal()
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8)), {})
-    assert demanded.not_verified() == ""
+    assert demanded.refusal() == ""
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8.5), FAILED), {})
-    assert "by `station verify`" in demanded.not_verified()
+    assert "by `station verify`" in demanded.refusal()
+
+
+def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_allowed(stored, draft, tmp_path):
+    made_at = draft.calibration.made_at
+    calibrated, another = in_use(tmp_path, made_at), in_use(tmp_path, made_at, "D11111")
+    assert (calibrated.refusal(), calibrated.trouble()) == ("", "")
+    assert "not calibrated: calibrate it with the ball on the page Maintenance" in another.refusal()
+    assert another.trouble() == "the sensor is not calibrated: calibrate it first"
+    unknown = in_use(tmp_path, made_at, "")
+    assert (unknown.refusal() != "", unknown.trouble()) == (True, ""), "no sensor was met yet, or it is none"
+    allowed = in_use(tmp_path, made_at, "D11111", uncalibrated="allow")
+    assert (allowed.refusal(), allowed.trouble()) == ("", "")
+    assert "allowed by service.uncalibrated" in allowed.in_force.words
 
 
 @pytest.mark.timeout(600)

@@ -240,7 +240,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         "camera": {"oldest_s": 3.0, "twin": {"port": camera}},
         "handshake": {"station_lost_after_s": 30.0},
         "records": {"free_reserve_mb": 1},
-        "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0},
+        "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow"},
     }
     file = folder / "station.yaml"
     file.write_text(json.dumps(values))

@@ -68,6 +68,9 @@ def test_three_stations_lose_and_double_nothing_while_the_server_is_cut_crashed_
 def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, tmp_path):
     fill(tmp_path, 1, 3, steps=4)
     with changing(tmp_path) as connection:
+        connection.exec_driver_sql(
+            "UPDATE inspections SET fruit_length_mm_x10 = 481, size_class = 3 WHERE sequence = 1"
+        )
         start_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", "Meier")
         end_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}")
         append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing", "to see", {"a": 1}, [2]))
@@ -75,6 +78,10 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
     query = "SELECT lot, outcome, reasons, area_mm2, fruit, jsonb_array_length(curve), began::text FROM inspections"
     first, *_ = rows(server, f"{query} WHERE station = 'as-they-are' ORDER BY sequence")
     assert first == ("L00000", "PASS", [], 21.0, "raspberry", 4, "2026-01-01 00:00:03+00")
+    sizes = rows(
+        server, "SELECT fruit_length_mm, size_class FROM inspections WHERE station = 'as-they-are' ORDER BY sequence"
+    )
+    assert sizes[:2] == [(48.1, 3), (None, None)]
     ((grower, ended, revision),) = rows(server, "SELECT grower, ended, revision FROM lots WHERE name = 'Aü'")
     assert (grower, revision, ended is None) == ("Meier", 2, False)
     ((who, old, new, digest),) = rows(server, "SELECT who, old, new, hash FROM audit WHERE station = 'as-they-are'")
@@ -163,6 +170,53 @@ def test_what_is_wrong_is_said(server, changes, said):
 
     with pytest.raises(OutboxError, match=said):
         asyncio.run(steps())
+
+
+FORM = (
+    (
+        "SELECT table_name, column_name, data_type, is_nullable FROM information_schema.columns "
+        "WHERE table_schema = 'public' ORDER BY 1, 2"
+    ),
+    (
+        "SELECT grantee, table_name, privilege_type FROM information_schema.role_table_grants "
+        "WHERE table_schema = 'public' AND grantee LIKE 'fruit%' ORDER BY 1, 2, 3"
+    ),
+    "SELECT version FROM schema_version",
+)
+
+
+def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_new_one(server):
+    """Version 1 is the present one without the fruit's size."""
+    remedy = "deploy/postgresql/schema-1-to-2.sql"
+    with server.connect() as owner:
+        owner.execute("CREATE DATABASE old TEMPLATE fruit")
+    try:
+        with psycopg.connect(host=str(server.folder), user="fruit", dbname="old", autocommit=True) as old:
+            new = [old.execute(query).fetchall() for query in FORM]
+            old.execute("DROP VIEW inspections_of_growers")
+            old.execute("ALTER TABLE inspections DROP COLUMN fruit_length_mm, DROP COLUMN size_class")
+            old.execute(
+                "CREATE VIEW inspections_of_growers AS SELECT i.*, l.grower FROM inspections i "
+                "LEFT JOIN lots l ON l.station = i.station AND l.name = i.lot"
+            )
+            old.execute("UPDATE schema_version SET version = 1")
+
+            async def connect():
+                async with Postgresql(settings(server, database="old"), "old").connected():
+                    pass
+
+            with pytest.raises(OutboxError, match=f"the database's form is 1, not 2; load {remedy} there"):
+                asyncio.run(connect())
+            old.execute((Path(__file__).resolve().parents[2] / remedy).read_bytes())
+            asyncio.run(connect())
+            upgraded = [old.execute(query).fetchall() for query in FORM]
+            assert upgraded == new
+            old.execute("UPDATE schema_version SET version = 3")
+            with pytest.raises(OutboxError, match="the database's form is 3, not 2; bring this station to the version"):
+                asyncio.run(connect())
+    finally:
+        with server.connect() as owner:
+            owner.execute("DROP DATABASE old WITH (FORCE)")
 
 
 def test_a_station_may_add_to_the_trail_and_not_change_it(server, fill, tmp_path):

@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import socket
+import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from plc_interface.client import StationClient
+from plc_interface.client_errors import UnreachableError
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,
@@ -197,7 +200,7 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
             "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
             "metrics": {"port": free_port()},
             "records": {"free_reserve_mb": 1},
-            "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, **service},
+            "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow", **service},
         }
         file = tmp_path / "station.yaml"
         file.write_text(json.dumps(values))
@@ -245,3 +248,33 @@ def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.Abstra
             await twin.stop()
 
     return begin
+
+
+@contextlib.asynccontextmanager
+async def armed_interface(file: Path) -> AsyncIterator[StationClient]:
+    """`station plc run` with the patience of a busy machine, and a PLC that is armed."""
+    port = free_port()
+    patience = {"BEGIN_DEADLINE_S": "2.5", "STATION_LOST_AFTER_S": "30", "PLC_HEARTBEAT_TIMEOUT_S": "30"}
+    patient = {f"STATION_HANDSHAKE_{name}": value for name, value in patience.items()}
+    environment = {**os.environ, **patient, "STATION_MODBUS_PORT": str(port)}
+    command = (sys.executable, "-m", "station", "plc", "run", "--config", str(file))
+    process = await asyncio.create_subprocess_exec(*command, env=environment)
+    try:
+        async with contextlib.AsyncExitStack() as stack:
+            async with asyncio.timeout(60):
+                while True:
+                    with contextlib.suppress(UnreachableError):
+                        plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
+                        break
+                    await asyncio.sleep(0.1)
+            await plc.arm()
+            yield plc
+    finally:
+        process.terminate()
+        await process.wait()
+
+
+@pytest.fixture
+def plc_interface() -> Callable[[Path], contextlib.AbstractAsyncContextManager[StationClient]]:
+    """`station plc run` for a station's settings, and a PLC that is armed."""
+    return armed_interface

@@ -1,46 +1,16 @@
 """The fruit's size over the real wire: what the PLC wrote reaches the record, and the result as it was recorded."""
 
 import asyncio
-import contextlib
-import os
-import socket
-import sys
 
 import pytest
 
-from plc_interface.client import StationClient
-from plc_interface.client_errors import UnreachableError
 from station.inspection.fruit_size import FruitSize
 
 NOT_GIVEN = FruitSize()
 
 
-@contextlib.asynccontextmanager
-async def interface(file):
-    """`station plc run` for a station's settings, and a PLC that is armed."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    environment = {**os.environ, "STATION_MODBUS_PORT": str(port)}
-    command = (sys.executable, "-m", "station", "plc", "run", "--config", str(file))
-    process = await asyncio.create_subprocess_exec(*command, env=environment)
-    try:
-        async with contextlib.AsyncExitStack() as stack:
-            async with asyncio.timeout(60):
-                while True:
-                    with contextlib.suppress(UnreachableError):
-                        plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
-                        break
-                    await asyncio.sleep(0.1)
-            await plc.arm()
-            yield plc
-    finally:
-        process.terminate()
-        await process.wait()
-
-
 @pytest.mark.timeout(180)
-def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench, tmp_path):
+def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench, plc_interface, tmp_path):
     given = {
         "absent": ({}, NOT_GIVEN),
         "length and class": ({"fruit_length_mm_x10": 161, "size_class": 3}, FruitSize(16.1, 3)),
@@ -53,7 +23,7 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench,
         async with bench() as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
-            async with interface(tmp_path / "station.yaml") as plc:
+            async with plc_interface(tmp_path / "station.yaml") as plc:
                 found = {}
                 for trigger_id, (name, (size, _)) in enumerate(given.items(), start=1):
                     found[name] = await inspected(cell, plc, trigger_id, size)

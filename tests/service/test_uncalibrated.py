@@ -1,0 +1,75 @@
+"""A unit without a calibration takes no fruit, and says what to do; it goes on by itself once it has one."""
+
+import asyncio
+
+import pytest
+
+from plc_interface.register_map import BY_NAME
+from station.commands.simulated_unit import calibrate_simulated_unit
+from station.inspection.alarm_table import ALARMS, AlarmId
+from station.inspection.states import State
+from station.settings.configuration import Configuration
+
+NUMBER = ALARMS[AlarmId.CALIBRATION_OLD].number
+TRIGGER_AND_ENABLE = 3
+
+
+async def until(holds):
+    async with asyncio.timeout(90):
+        while not await holds():
+            await asyncio.sleep(0.02)
+
+
+@pytest.mark.timeout(300)
+def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(bench, plc_interface, tmp_path):
+    async def scenario():
+        async with bench(uncalibrated="refuse") as cell, plc_interface(tmp_path / "station.yaml") as plc:
+            await cell.choose("blueberry")
+            await cell.reach(State.IDLE)
+
+            async def refused():
+                await plc.write({"control": TRIGGER_AND_ENABLE, "trigger_id": 7})
+                return "trigger_acknowledged" in await plc.status()
+
+            async def alarmed():
+                return await plc.read("error_code") == NUMBER
+
+            await until(refused)
+            await until(alarmed)
+            shown = await plc.scan()
+            assert BY_NAME["last_refusal"].codes[shown["last_refusal"]].name == "not_ready"
+            assert shown["accepted_trigger_id"] != 7
+            state = await cell.line.state()
+            assert "calibrate it with the ball on the page Maintenance" in state.why_not_ready
+            assert "`station calibrate`" in state.why_not_ready
+            assert sum((await cell.station.service.ledger.records.totals()).values()) == 0, "nothing was begun or lost"
+
+            await plc.write({"control": 1})
+            shipped = cell.configuration.model_copy(update={"recipes_folder": Configuration().recipes_folder})
+            made = await asyncio.to_thread(calibrate_simulated_unit, shipped, "anna")
+            assert made is not None
+
+            async def ready():
+                return "trigger_ready" in await plc.status() and await plc.read("error_code") == 0
+
+            await until(ready)
+            result = await plc.inspect(8, deadline_s=90)
+            record = await cell.station.service.ledger.records.inspection(result.sequence)
+            assert made.id in record.judged.devices["calibration"]
+            assert "uncalibrated" not in record.judged.measures
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(180)
+def test_where_it_is_allowed_each_record_states_it(bench):
+    async def scenario():
+        async with bench(uncalibrated="allow") as cell:
+            await cell.choose("blueberry")
+            outcome = await cell.line.inspect()
+            record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+            assert record.judged.measures["uncalibrated"] == "allow"
+            assert record.judged.devices["calibration"].endswith("inspecting is allowed by service.uncalibrated")
+            assert cell.station.service.alarms.alarms.get(AlarmId.CALIBRATION_OLD).state == "normal"
+
+    asyncio.run(scenario())
