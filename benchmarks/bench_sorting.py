@@ -2,7 +2,8 @@
 
 Run with `./run bench sorting`. Closings are imaged once and kept below `state/sorting`, by a hash of the code that
 draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
-each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`;
+each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`, and
+both errors into `README.md`;
 `--seeds tuning` and a part of the kinds print them only: what is tuned on must not be published as the result.
 """
 
@@ -22,7 +23,7 @@ from station.twin.damage import Severity
 from station.twin.fruit import Kind
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENT = ROOT / "docs" / "sorting.md"
+DOCUMENT, README = ROOT / "docs" / "sorting.md", ROOT / "README.md"
 CACHE = ROOT / "state" / "sorting"
 AS_PLACED = Practice(centring=False, second_look=False)
 OF_EACH_GROUP = 100
@@ -88,19 +89,20 @@ def main() -> None:
     for lines in sections.values():
         print("\n".join(lines), end="\n\n")
     if asked.seeds == "judging" and set(asked.kinds) == set(KINDS):
-        write(sections)
+        write(DOCUMENT, sections)
+        write(README, {"errors": sections["errors"]})
 
 
-def write(sections: Mapping[str, Sequence[str]]) -> None:
-    """Put the tables between their marks in the document."""
-    text = DOCUMENT.read_text(encoding="utf-8")
+def write(document: Path, sections: Mapping[str, Sequence[str]]) -> None:
+    """Put tables between their marks in a document."""
+    text = document.read_text(encoding="utf-8")
     for name, lines in sections.items():
         pattern = rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)"
         table = "\n".join(lines) + "\n"
         text, times = re.subn(pattern, lambda marks, table=table: marks[1] + table + marks[2], text, flags=re.DOTALL)
         if times != 1:
-            raise SystemExit(f"{DOCUMENT}: expected the marks <!-- {name} --> and <!-- /{name} --> once")
-    DOCUMENT.write_text(text, encoding="utf-8")
+            raise SystemExit(f"{document}: expected the marks <!-- {name} --> and <!-- /{name} --> once")
+    document.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
