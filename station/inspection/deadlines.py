@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.inspection.cycle import Event
+from station.inspection.looks import SEARCH_AGAIN_STEPS
 from station.inspection.states import State
 from station.settings.recipe_model import Recipe
 
@@ -61,6 +62,7 @@ _WAITS_FOR = {
         State.CLOSING_TO_ONSET,
         State.MOVING,
         State.MOVING_MEASURING,
+        State.OPENING_AGAIN,
         State.RELEASING,
         State.RESETTING,
         State.OPENING_TO_CLEAR,
@@ -97,7 +99,7 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """The deadlines of a recipe's inspection on a cell.
 
     Args:
-        recipe: steps, speeds, settling and frames.
+        recipe: steps, speeds, settling, frames, and how often it may press a fruit.
         pace: the cell's.
 
     Raises:
@@ -105,12 +107,15 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """
     expected_s = _expected(recipe, pace)
     step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
+    look_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
+    # To where the fruit was met, and as much again in finer steps.
+    again_s = expected_s[State.OPENING_AGAIN] + 2 * SEARCH_AGAIN_STEPS * (step_s + pace.measure_s)
     inspection_s = GRACE_S + INSPECTION_MARGIN * (
         expected_s[State.REFERENCE]
         + expected_s[State.APPROACHING]
         + expected_s[State.CLOSING_TO_ONSET]
-        + recipe.steps.number * max(step_s, pace.measure_s)
-        + expected_s[State.MEASURING_LAST]
+        + look_s
+        + (recipe.press.looks - 1) * (again_s + look_s)
         + pace.record_s
     )
     if inspection_s > LONGEST_S:
@@ -171,4 +176,11 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
 
 
 def _opening_states() -> tuple[State, ...]:
-    return (State.RELEASING, State.RESETTING, State.OPENING_TO_CLEAR, State.OPENING_HELD, State.OPENING_UNRECORDED)
+    return (
+        State.OPENING_AGAIN,
+        State.RELEASING,
+        State.RESETTING,
+        State.OPENING_TO_CLEAR,
+        State.OPENING_HELD,
+        State.OPENING_UNRECORDED,
+    )

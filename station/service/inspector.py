@@ -11,6 +11,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
+from station.inspection.looks import looks_again
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
 from station.service.calibrated import Calibrated
@@ -71,7 +72,6 @@ class Inspector:
 
     async def take_reference(self, now: Inspection) -> Event:
         """Take the reference with the jaws open; a gripper that is not open may hold something against the gel."""
-        self._reached = None
         gripper = self._crew.cell.gripper
         opened = await gripper.open()
         touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
@@ -119,12 +119,14 @@ class Inspector:
 
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
+        self._reached = self._glanced = None
+        await self._eye.begin_press()
         grip, plan = self._grip(now), now.active.recipe.steps
         try:
             if plan.start_width_mm is not None:
                 start = await grip.step(0, plan.start_width_mm)
             else:
-                before, start = await grip.approach(self._touches)
+                before, start = await grip.approach(self._touches, now.met_mm)
                 now.before_onset_mm = None if before is None else before.move.width_mm
         except (NothingTouchedError, UnseenContactError) as error:
             now.interrupt(Reason.NO_CONTACT, str(error))
@@ -182,7 +184,7 @@ class Inspector:
         return Event.MEASURED
 
     async def judge(self, now: Inspection) -> Event:
-        """Judge what was measured."""
+        """Judge what was measured; an inconclusive fruit may be pressed once more, by the recipe."""
         age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
         self._metrics.reference(age_s, float(now.measures.get("reference_drift_levels") or 0.0))
         if age_s > self._settings.reference.oldest_s:
@@ -191,7 +193,12 @@ class Inspector:
                 f"the reference was {age_s:.0f} s old at the last step, at most "
                 f"{self._settings.reference.oldest_s:g} s are allowed",
             )
-        now.verdict = judge(now.press(), now.active.recipe)
+        recipe = now.active.recipe
+        now.verdict = judge(now.press(), recipe)
+        if now.looks < recipe.press.looks and looks_again(now.verdict):
+            now.look_again()
+            self._metrics.looked_again(recipe.name)
+            return Event.LOOK_AGAIN
         now.outcome_name = now.verdict.outcome
         return Event.JUDGED_ACCEPT if now.outcome_name == "PASS" else Event.JUDGED_REJECT
 

@@ -12,15 +12,11 @@ from benchmarks.sorting.cycle import (
     Unmeasured,
     as_stopped,
     inspect,
-    looks_again,
     move_mm,
     sized_by,
-    together,
 )
 from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
 from benchmarks.sorting.specimens import KINDS, Task, draw
-from station.inspection.judge import judge
-from station.inspection.press import Flag, Measured, Press
 from station.settings.recipe import find_recipe
 from station.twin.fruit import Kind
 from station.vision.scale import TYPICAL_MM_PER_PX
@@ -139,7 +135,7 @@ class TestDeciding:
     def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, told):
         practice = Practice(size=size)
         by = sized_by(practice, recipe)
-        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice)
+        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice, ())
         assert (press.size.length_mm is not None, press.size.size_class is not None) == told
         assert by.damage.size is not None
         assert by.damage.size.judged_by == ("class" if size == "class" else "length")
@@ -147,30 +143,10 @@ class TestDeciding:
     def test_the_usual_scale_stands_in_where_a_unit_was_never_calibrated(self, recipe):
         one = replace(draw(BLUEBERRY), mm_per_px=0.029, calibrated_mm_per_px=0.029)
         areas = [
-            as_stopped(pressed(), one, recipe, Practice(calibrated=calibrated))[0].points[2].area_mm2
+            as_stopped(pressed(), one, recipe, Practice(calibrated=calibrated), ())[0].points[2].area_mm2
             for calibrated in (True, False)
         ]
         assert areas[1] == pytest.approx(areas[0] * (0.0266 / 0.029) ** 2)
-
-
-class TestTogether:
-    def press(self, area_mm2: float, *flags: Flag) -> Press:
-        return Press(15.9, 0.1, (Measured(3.0, area_mm2, round(area_mm2 * 1400), 0.9, frozenset(flags)),))
-
-    @pytest.mark.parametrize(
-        ("first", "second", "area_mm2"),
-        [((30.0,), (34.0,), 32.0), ((30.0, Flag.SATURATED), (34.0,), 34.0), ((30.0,), (34.0, Flag.SATURATED), 30.0)],
-    )
-    def test_the_mean_of_what_is_trusted(self, first, second, area_mm2):
-        [point] = together([self.press(*first), self.press(*second)]).points
-        assert (point.area_mm2, point.flags) == (area_mm2, frozenset())
-
-    def test_two_doubtful_ones_stay_doubtful(self):
-        [point] = together([self.press(30.0, Flag.SATURATED), self.press(34.0, Flag.CUT_BY_BORDER)]).points
-        assert (point.area_mm2, point.flags) == (34.0, {Flag.CUT_BY_BORDER})
-
-    def test_a_fault_is_no_reason_to_look_again(self, recipe):
-        assert not looks_again(judge(Press(None, 0.0, (), (Reason.CAMERA_FAULT,)), recipe))
 
 
 class TestCache:
