@@ -5,12 +5,13 @@ The functions say what the service's cycle does with measured steps; here the st
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import hypot
 
+from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import early_stop, judge
 from station.inspection.looks import looks_again, together
 from station.inspection.press import Flag, Measured, Press
+from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
 from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY
@@ -19,10 +20,6 @@ from station.vocabulary import OutcomeName, Reason
 from .presses import Closing, Pressed, Step
 from .specimens import CALIBRATION_SD, Specimen, Task, draw
 
-CENTRE_FROM_MM = 0.4
-"""First contacts nearer to the field's middle are pressed where they are."""
-CENTRE_UP_TO_MM = 3.0
-"""Farther off, the fruit is not where the cell lays it, and the arm does not follow."""
 _ARM_MM = 0.05
 """The UR10e's repeatability by its data sheet."""
 
@@ -88,7 +85,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
         return pressed
 
     pressed = close()
-    if practice.centring and pressed.steps and (move := move_mm(pressed.steps[0])) is not None:
+    if practice.centring and pressed.steps and (move := move_mm(pressed.steps[0], recipe, shift_mm)) is not None:
         forces.append(pressed.steps[0].force_n)
         shift_mm = move
         pressed = close()
@@ -96,7 +93,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
     while True:
         if presses:
             last = pressed.steps[len(presses[-1].points) - 1]
-            if practice.centring and (move := move_mm(last)) is not None:
+            if practice.centring and (move := move_mm(last, recipe, shift_mm)) is not None:
                 shift_mm = (round(shift_mm[0] + move[0], 2), round(shift_mm[1] + move[1], 2))
             pressed = close()
         press, used = as_stopped(pressed, specimen, recipe, practice, presses)
@@ -109,21 +106,25 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
     return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, max(forces))
 
 
-def move_mm(step: Step) -> tuple[float, float] | None:
+def move_mm(step: Step, recipe: Recipe, shift_mm: tuple[float, float]) -> tuple[float, float] | None:
     """How the arm moves so that a contact comes to the field's middle, as the contact's way in the image.
 
     The usual scale serves: its 9 % are a tenth of a millimetre of the way.
 
     Args:
         step: whose contact.
+        recipe: from where on it is centred.
+        shift_mm: how the arm has moved already, likewise.
 
     Returns:
         mm, to the arm's repeatability; None where the contact is near enough, too far off, or was not seen.
     """
-    if step.offset_px is None:
+    from_mm = recipe.press.centre_from_mm
+    if step.offset_px is None or from_mm is None:
         return None
     x_mm, y_mm = (-offset * TYPICAL_MM_PER_PX for offset in step.offset_px)
-    if not CENTRE_FROM_MM <= hypot(x_mm, y_mm) <= CENTRE_UP_TO_MM:
+    off = Way(x_mm, y_mm)
+    if off.length_mm < from_mm or too_far(off, Way(*shift_mm), ArmSettings().centring.most_mm):
         return None
     return round(round(x_mm / _ARM_MM) * _ARM_MM, 2), round(round(y_mm / _ARM_MM) * _ARM_MM, 2)
 

@@ -38,6 +38,7 @@ COLUMNS: tuple[tuple[str, dict[State, int]], ...] = (
     (
         "while the step before is measured",
         {
+            State.CENTRING: 1,
             State.OPENING_AGAIN: 2,
             State.MOVING_MEASURING: 3,
             State.SETTLING_MEASURING: 4,

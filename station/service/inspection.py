@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass, field
 
 from station.channel.line import Outcome
+from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
 from station.inspection.looks import together
@@ -45,6 +46,14 @@ class Inspection:
     reference_image: Image | None = None
     before_onset_mm: float | None = None
     """The last width at which nothing touched."""
+    met_mm: float | None = None
+    """The width at which an earlier closing met the fruit; None in the first."""
+    closings: int = 0
+    """How often the jaws have closed on the fruit."""
+    moved: Way = NOT_MOVED
+    """Where the sensor is, from its place at the taught nest."""
+    target: Way | None = None
+    """Where it has to go before the next closing; None where it stays."""
     steps: list[GripStep] = field(default_factory=list)
     """Captured, in order."""
     seen: list[Seen] = field(default_factory=list)
@@ -73,11 +82,6 @@ class Inspection:
         return 1 + len(self.earlier)
 
     @property
-    def met_mm(self) -> float | None:
-        """The width at which an earlier press met the fruit; None before there was one."""
-        return self.earlier[-1].onset_mm if self.earlier else None
-
-    @property
     def onset_mm(self) -> float | None:
         """The measured width of the first contact; None before it."""
         return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
@@ -98,7 +102,12 @@ class Inspection:
         """Begin another press on the fruit. Of the one before stays what was measured, not its images."""
         self.first_verdict = self.verdict
         self.earlier.append(self._latest())
-        self.verdict = self.before_onset_mm = None
+        self.verdict = None
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Begin another closing: what this one has shown is done with."""
+        self.met_mm, self.before_onset_mm = self.onset_mm, None
         self.steps.clear()
         self.seen.clear()
 

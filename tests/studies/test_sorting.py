@@ -81,7 +81,7 @@ class TestPressing:
             task for number in range(50) if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
         )
         _, first = presses.press(Closing(task, 0, (0.0, 0.0)))
-        move = move_mm(first.steps[0])
+        move = move_mm(first.steps[0], find_recipe(BLUEBERRY.kind), (0.0, 0.0))
         assert move is not None
         _, second = presses.press(Closing(task, 1, move))
         for step in second.steps[:4]:
@@ -91,11 +91,11 @@ class TestPressing:
         assert first.steps[-1].closing_mm > second.steps[-1].closing_mm > 4
 
     def test_an_arm_moves_by_its_own_steps_within_its_bounds(self):
-        step = Step(0.0, 500, 0.9, (), None, 0.1)
-        assert move_mm(step) is None
-        assert move_mm(step._replace(offset_px=(10.0, 0.0))) is None
-        assert move_mm(step._replace(offset_px=(30.0, -20.0))) == (-0.8, 0.55)
-        assert move_mm(step._replace(offset_px=(120.0, 0.0))) is None
+        step, recipe = Step(0.0, 500, 0.9, (), None, 0.1), find_recipe(BLUEBERRY.kind)
+        assert move_mm(step, recipe, (0.0, 0.0)) is None
+        assert move_mm(step._replace(offset_px=(10.0, 0.0)), recipe, (0.0, 0.0)) is None
+        assert move_mm(step._replace(offset_px=(30.0, -20.0)), recipe, (0.0, 0.0)) == (-0.8, 0.55)
+        assert move_mm(step._replace(offset_px=(120.0, 0.0)), recipe, (0.0, 0.0)) is None
 
 
 class TestDeciding:
