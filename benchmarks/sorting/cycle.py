@@ -3,13 +3,15 @@
 The functions say what the service's cycle does with measured steps; here the steps come from a cache.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import hypot
 
+from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
-from station.inspection.judge import Verdict, early_stop, judge
+from station.inspection.judge import early_stop, judge
+from station.inspection.looks import looks_again, together
 from station.inspection.press import Flag, Measured, Press
+from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
 from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY
@@ -18,16 +20,8 @@ from station.vocabulary import OutcomeName, Reason
 from .presses import Closing, Pressed, Step
 from .specimens import CALIBRATION_SD, Specimen, Task, draw
 
-CENTRE_FROM_MM = 0.4
-"""First contacts nearer to the field's middle are pressed where they are."""
-CENTRE_UP_TO_MM = 3.0
-"""Farther off, the fruit is not where the cell lays it, and the arm does not follow."""
 _ARM_MM = 0.05
 """The UR10e's repeatability by its data sheet."""
-LOOK_AGAIN_AT = frozenset(
-    {Reason.CUT_BY_BORDER, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.AREA_NOT_RISING, Reason.NEAR_LIMIT}
-)
-"""Inconclusive for what another closing may show otherwise."""
 
 Look = Callable[[Closing], Pressed | None]
 
@@ -91,48 +85,53 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
         return pressed
 
     pressed = close()
-    if practice.centring and pressed.steps and (move := move_mm(pressed.steps[0])) is not None:
+    if practice.centring and pressed.steps and (move := move_mm(pressed.steps[0], recipe, shift_mm)) is not None:
         forces.append(pressed.steps[0].force_n)
         shift_mm = move
         pressed = close()
-    verdict = None
-    for again in (False, True):
-        if again:
+    most_looks = recipe.press.looks if practice.second_look else 1
+    while True:
+        if presses:
             last = pressed.steps[len(presses[-1].points) - 1]
-            if practice.centring and (move := move_mm(last)) is not None:
+            if practice.centring and (move := move_mm(last, recipe, shift_mm)) is not None:
                 shift_mm = (round(shift_mm[0] + move[0], 2), round(shift_mm[1] + move[1], 2))
             pressed = close()
-        press, used = as_stopped(pressed, specimen, recipe, practice)
+        press, used = as_stopped(pressed, specimen, recipe, practice, presses)
         presses.append(press)
         steps += max(0, used - 1)
         forces += [step.force_n for step in pressed.steps[:used]]
         verdict = judge(together(presses), recipe)
-        if not (practice.second_look and looks_again(verdict)):
+        if len(presses) >= most_looks or not looks_again(verdict):
             break
-    assert verdict is not None
     return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, max(forces))
 
 
-def move_mm(step: Step) -> tuple[float, float] | None:
+def move_mm(step: Step, recipe: Recipe, shift_mm: tuple[float, float]) -> tuple[float, float] | None:
     """How the arm moves so that a contact comes to the field's middle, as the contact's way in the image.
 
     The usual scale serves: its 9 % are a tenth of a millimetre of the way.
 
     Args:
         step: whose contact.
+        recipe: from where on it is centred.
+        shift_mm: how the arm has moved already, likewise.
 
     Returns:
         mm, to the arm's repeatability; None where the contact is near enough, too far off, or was not seen.
     """
-    if step.offset_px is None:
+    from_mm = recipe.press.centre_from_mm
+    if step.offset_px is None or from_mm is None:
         return None
     x_mm, y_mm = (-offset * TYPICAL_MM_PER_PX for offset in step.offset_px)
-    if not CENTRE_FROM_MM <= hypot(x_mm, y_mm) <= CENTRE_UP_TO_MM:
+    off = Way(x_mm, y_mm)
+    if off.length_mm < from_mm or too_far(off, Way(*shift_mm), ArmSettings().centring.most_mm):
         return None
     return round(round(x_mm / _ARM_MM) * _ARM_MM, 2), round(round(y_mm / _ARM_MM) * _ARM_MM, 2)
 
 
-def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: Practice) -> tuple[Press, int]:
+def as_stopped(
+    pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: Practice, earlier: Sequence[Press]
+) -> tuple[Press, int]:
     """One closing as far as the station goes, and the number of its points.
 
     Args:
@@ -140,6 +139,7 @@ def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: P
         specimen: the fruit and its cell.
         recipe: its recipe.
         practice: which scale and size the station has.
+        earlier: closings on the same fruit, which are judged with this one.
     """
     mm_per_px = specimen.calibrated_mm_per_px if practice.calibrated else TYPICAL_MM_PER_PX
     press = Press(
@@ -153,7 +153,7 @@ def as_stopped(pressed: Pressed, specimen: Specimen, recipe: Recipe, practice: P
     )
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
-        if early_stop(press, recipe) is not None:
+        if early_stop(together([*earlier, press]), recipe) is not None:
             break
     return press, len(press.points)
 
@@ -181,46 +181,6 @@ def _size(specimen: Specimen, recipe: Recipe, practice: Practice) -> FruitSize:
         return FruitSize()
     numbers = (one.number for one in rule.classes if one.smallest_mm <= specimen.graded_mm < one.largest_mm)
     return FruitSize(size_class=next(numbers, None))
-
-
-def looks_again(verdict: Verdict) -> bool:
-    """Whether another closing may decide what this one did not.
-
-    Args:
-        verdict: on all closings so far.
-    """
-    return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= LOOK_AGAIN_AT | {Reason.EARLY_STOP}
-
-
-def together(presses: Iterable[Press]) -> Press:
-    """Closings on one fruit as one press: at each closing the mean of what is trusted, else of the later one.
-
-    What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean.
-
-    Args:
-        presses: one, or two in order.
-    """
-    first, *rest = presses
-    if not rest:
-        return first
-    second = rest[0]
-    theirs = {point.closing_mm: point for point in first.points}
-    points = []
-    for point in second.points:
-        other = theirs.get(point.closing_mm)
-        if other is None or (other.flags and not point.flags) or (other.flags and point.flags):
-            points.append(point)
-        elif point.flags:
-            points.append(other)
-        else:
-            points.append(
-                replace(
-                    point,
-                    area_mm2=(point.area_mm2 + other.area_mm2) / 2,
-                    area_px=(point.area_px + other.area_px) // 2,
-                )
-            )
-    return replace(second, points=tuple(points))
 
 
 def _measured(step: Step, mm_per_px: float) -> Measured:

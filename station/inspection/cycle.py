@@ -26,7 +26,10 @@ class Event(StrEnum):
     ARRIVED = "arrived"
     ONSET_FOUND = "onset_found"
     """The gel is touched, or the recipe's start width is reached; its image is the curve's first point."""
+    OFF_MIDDLE = "off_middle"
+    """The gel is touched too far from the field's middle, and the arm may follow."""
     NO_ONSET = "no_onset"
+    CENTRED = "centred"
     REACHED = "reached"
     SETTLED = "settled"
     CAPTURED = "captured"
@@ -38,6 +41,8 @@ class Event(StrEnum):
     JUDGED_ACCEPT = "judged_accept"
     JUDGED_REJECT = "judged_reject"
     """FAIL or NO_RESULT."""
+    LOOK_AGAIN = "look_again"
+    """The press was inconclusive, and the recipe lets the fruit be pressed once more."""
     RECORDED = "recorded"
     PLACED = "placed"
     """The fruit lies where it belongs and the jaws are open."""
@@ -91,7 +96,9 @@ class Action(StrEnum):
     APPROACH = "approach"
     """ARRIVED, or REFERENCE_BAD where that was found on the way."""
     CLOSE_TO_ONSET = "close_to_onset"
-    """ONSET_FOUND or NO_ONSET."""
+    """ONSET_FOUND, OFF_MIDDLE or NO_ONSET."""
+    CENTRE = "centre"
+    """Go to where the contact will be in the field's middle: CENTRED. On a bench without an arm at once."""
     CLOSE_STEP = "close_step"
     """REACHED."""
     SETTLE = "settle"
@@ -103,7 +110,7 @@ class Action(StrEnum):
     HALT = "halt"
     """Stop arm and gripper where they are and forget what was under way, but for a write: its events come no more."""
     JUDGE = "judge"
-    """JUDGED_ACCEPT or JUDGED_REJECT."""
+    """Judge all presses so far together: JUDGED_ACCEPT, JUDGED_REJECT or LOOK_AGAIN."""
     CLOSE_AS_NO_RESULT = "close_as_no_result"
     """The outcome is NO_RESULT, with the reason of the event and what was measured so far."""
     RECORD = "record"
@@ -177,6 +184,8 @@ BEFORE_LAST_IMAGE = (
     S.CAPTURING,
     *MEASURING,
     S.AWAITING_MEASURE,
+    S.OPENING_AGAIN,
+    S.CENTRING,
 )
 UNJUDGED = (*BEFORE_LAST_IMAGE, *CAPTURED_ALL)
 RECORDING = (S.RECORDING_ACCEPT, S.RECORDING_REJECT, S.RECORDING_RELEASE)
@@ -239,6 +248,10 @@ ROWS: tuple[Row, ...] = (
     Row((S.AWAITING_MEASURE_LAST,), (E.MEASURED,), S.MEASURING_LAST, (A.MEASURE,)),
     Row((S.MEASURING_LAST,), (E.MEASURED, E.EARLY_STOP), S.JUDGING, (A.JUDGE,)),
     Row((*MEASURING, S.AWAITING_MEASURE, S.AWAITING_MEASURE_LAST), (E.EARLY_STOP,), S.JUDGING, (A.HALT, A.JUDGE)),
+    Row((S.CLOSING_TO_ONSET,), (E.OFF_MIDDLE,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
+    Row((S.JUDGING,), (E.LOOK_AGAIN,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
+    Row((S.OPENING_AGAIN,), (E.JAWS_OPEN,), S.CENTRING, (A.CENTRE,)),
+    Row((S.CENTRING,), (E.CENTRED,), S.CLOSING_TO_ONSET, (A.CLOSE_TO_ONSET,)),
     Row((S.JUDGING,), (E.JUDGED_ACCEPT,), S.RECORDING_ACCEPT, (A.RECORD,)),
     Row((S.JUDGING,), (E.JUDGED_REJECT,), S.RECORDING_REJECT, (A.RECORD,)),
     Row((S.RECORDING_ACCEPT,), (E.RECORDED,), S.PLACING_ACCEPT, (A.PUBLISH, A.PLACE_ACCEPT)),

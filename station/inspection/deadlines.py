@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.inspection.cycle import Event
+from station.inspection.looks import SEARCH_AGAIN_STEPS
 from station.inspection.states import State
 from station.settings.recipe_model import Recipe
 
@@ -18,6 +19,8 @@ _RAMP_S = 0.2
 """Acceleration, braking and arrival of one motion of the gripper; 9 ms on the twin (docs/gripper.md), with room for
 fingers that have mass and for a slow line. Unverified on hardware."""
 _SLOWEST_OPENING_MM_S = 20.0
+_CENTRING_S = 0.5
+"""A few millimetres of the tool; 0.2 s on the twin. Unverified on hardware."""
 _RECOVERY_S = 20.0
 """Power, brakes and program of an arm."""
 
@@ -56,11 +59,19 @@ class Late(NamedTuple):
 
 
 _WAITS_FOR = {
-    Event.ARM_FAULT: (State.APPROACHING, State.RETREATING, State.HOMING, State.HOMING_UNRECORDED, State.RECOVERING),
+    Event.ARM_FAULT: (
+        State.APPROACHING,
+        State.CENTRING,
+        State.RETREATING,
+        State.HOMING,
+        State.HOMING_UNRECORDED,
+        State.RECOVERING,
+    ),
     Event.GRIPPER_FAULT: (
         State.CLOSING_TO_ONSET,
         State.MOVING,
         State.MOVING_MEASURING,
+        State.OPENING_AGAIN,
         State.RELEASING,
         State.RESETTING,
         State.OPENING_TO_CLEAR,
@@ -97,7 +108,7 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """The deadlines of a recipe's inspection on a cell.
 
     Args:
-        recipe: steps, speeds, settling and frames.
+        recipe: steps, speeds, settling, frames, and how often it may press a fruit.
         pace: the cell's.
 
     Raises:
@@ -105,12 +116,20 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """
     expected_s = _expected(recipe, pace)
     step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
+    look_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
+    # To where the fruit was met, and as much again in finer steps.
+    again_s = (
+        expected_s[State.OPENING_AGAIN]
+        + expected_s[State.CENTRING]
+        + 2 * SEARCH_AGAIN_STEPS * (step_s + pace.measure_s)
+    )
     inspection_s = GRACE_S + INSPECTION_MARGIN * (
         expected_s[State.REFERENCE]
         + expected_s[State.APPROACHING]
         + expected_s[State.CLOSING_TO_ONSET]
-        + recipe.steps.number * max(step_s, pace.measure_s)
-        + expected_s[State.MEASURING_LAST]
+        + look_s
+        + (recipe.press.looks - 1) * (again_s + look_s)
+        + (0.0 if recipe.press.centre_from_mm is None or not pace.arm_move_s else again_s)
         + pace.record_s
     )
     if inspection_s > LONGEST_S:
@@ -151,6 +170,7 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
     expected_s = {
         State.REFERENCE: imaging.reference_frames / pace.frames_per_s,
         State.APPROACHING: 2 * pace.arm_move_s,
+        State.CENTRING: min(pace.arm_move_s, _CENTRING_S),
         State.CLOSING_TO_ONSET: searched * (moving_s + imaging.settle_s + capturing_s + pace.measure_s),
         State.MOVING: moving_s,
         State.MOVING_MEASURING: moving_s,
@@ -171,4 +191,11 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
 
 
 def _opening_states() -> tuple[State, ...]:
-    return (State.RELEASING, State.RESETTING, State.OPENING_TO_CLEAR, State.OPENING_HELD, State.OPENING_UNRECORDED)
+    return (
+        State.OPENING_AGAIN,
+        State.RELEASING,
+        State.RESETTING,
+        State.OPENING_TO_CLEAR,
+        State.OPENING_HELD,
+        State.OPENING_UNRECORDED,
+    )

@@ -38,6 +38,8 @@ COLUMNS: tuple[tuple[str, dict[State, int]], ...] = (
     (
         "while the step before is measured",
         {
+            State.CENTRING: 1,
+            State.OPENING_AGAIN: 2,
             State.MOVING_MEASURING: 3,
             State.SETTLING_MEASURING: 4,
             State.CAPTURING_MEASURING: 5,

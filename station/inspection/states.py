@@ -31,6 +31,8 @@ class State(StrEnum):
     AWAITING_MEASURE_LAST = "awaiting_measure_last"
     MEASURING_LAST = "measuring_last"
     JUDGING = "judging"
+    OPENING_AGAIN = "opening_again"
+    CENTRING = "centring"
     RECORDING_ACCEPT = "recording_accept"
     RECORDING_REJECT = "recording_reject"
     RECORDING_RELEASE = "recording_release"
@@ -110,6 +112,8 @@ STATES: dict[State, StateFacts] = {
     State.AWAITING_MEASURE_LAST: _inspecting("All images are taken; the last but one is measured."),
     State.MEASURING_LAST: _inspecting("All images are taken; the last is measured."),
     State.JUDGING: _inspecting("The curve is judged."),
+    State.OPENING_AGAIN: _inspecting("The jaws open, to close on the fruit once more."),
+    State.CENTRING: _inspecting("The arm goes to where the contact will be in the field's middle."),
     State.RECORDING_ACCEPT: _inspecting("PASS is made durable."),
     State.RECORDING_REJECT: _inspecting("FAIL or NO_RESULT is made durable."),
     State.RECORDING_RELEASE: _inspecting("NO_RESULT is made durable."),

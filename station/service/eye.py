@@ -94,8 +94,16 @@ class Eye:
 
         return await self._do(take)
 
+    async def begin_press(self) -> None:
+        """Measure each step by itself again, against the same reference: the jaws were opened."""
+
+        def begin() -> None:
+            self._tracker, self._follows = None, False
+
+        await self._do(begin)
+
     async def follow(self, contact: Contact) -> None:
-        """Measure every later step as a step of one press, until the next reference.
+        """Measure every later step as a step of one press, until the next press or reference.
 
         Args:
             contact: of the press's first step, against this reference.

@@ -11,6 +11,7 @@ from station.devices.camera.interface import Camera, Frame, FrameFault, Image
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
+from station.inspection.looks import SEARCH_AGAIN_STEPS
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 from station.vision.step import mean_image
@@ -140,7 +141,7 @@ class Grip:
         grip = self._recipe.gripper
         return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
 
-    async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
+    async def approach(self, touches: Touches, met_mm: float | None = None) -> tuple[GripStep | None, GripStep]:
         """Close step by step until the gel is touched, then once more, as finely as the gripper can.
 
         The onset's width is what every closing is counted from, so it is found to a count of the gripper. On the way
@@ -148,6 +149,7 @@ class Grip:
 
         Args:
             touches: judges a step's frames.
+            met_mm: where the same fruit was met before, so that the way there needs no images; None for a new fruit.
 
         Returns:
             The last step before the contact, with one frame, and the first with it.
@@ -158,7 +160,8 @@ class Grip:
         """
         expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
         widest_mm = self._cell.gripper.max_width_mm
-        seen_mm, _ = await self._search(min(expected.largest_mm, widest_mm), step_mm, touches, one_ahead=True)
+        from_mm = expected.largest_mm if met_mm is None else met_mm + SEARCH_AGAIN_STEPS * step_mm
+        seen_mm, _ = await self._search(min(from_mm, widest_mm), step_mm, touches, one_ahead=True)
         from_mm, before = seen_mm, None
         while before is None and from_mm < widest_mm:  # back to where nothing touches, however faintly it began
             from_mm = min(from_mm + step_mm, widest_mm)

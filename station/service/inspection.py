@@ -4,10 +4,13 @@ import time
 from dataclasses import dataclass, field
 
 from station.channel.line import Outcome
+from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
+from station.inspection.looks import together
 from station.inspection.press import Flag, Measured, Press
 from station.records.judgement import judgement_measures
+from station.records.looks import first_look_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.eye import Seen
 from station.service.grip import GripStep
@@ -43,10 +46,22 @@ class Inspection:
     reference_image: Image | None = None
     before_onset_mm: float | None = None
     """The last width at which nothing touched."""
+    met_mm: float | None = None
+    """The width at which an earlier closing met the fruit; None in the first."""
+    closings: int = 0
+    """How often the jaws have closed on the fruit."""
+    moved: Way = NOT_MOVED
+    """Where the sensor is, from its place at the taught nest."""
+    target: Way | None = None
+    """Where it has to go before the next closing; None where it stays."""
     steps: list[GripStep] = field(default_factory=list)
     """Captured, in order."""
     seen: list[Seen] = field(default_factory=list)
     """Measured, in order."""
+    earlier: list[Press] = field(default_factory=list)
+    """Presses on this fruit that were inconclusive; `steps` and `seen` are those of the present one."""
+    first_verdict: Verdict | None = None
+    """On the first press, where it was inconclusive."""
     interruptions: list[Reason] = field(default_factory=list)
     explanation: list[str] = field(default_factory=list)
     verdict: Verdict | None = None
@@ -60,6 +75,11 @@ class Inspection:
     def next_width_mm(self) -> float:
         """The width of the next step, counted from the measured width of the first."""
         return self.steps[0].move.width_mm - len(self.steps) * self.active.recipe.steps.step_mm
+
+    @property
+    def looks(self) -> int:
+        """How many presses were begun, the present one counted."""
+        return 1 + len(self.earlier)
 
     @property
     def onset_mm(self) -> float | None:
@@ -78,6 +98,19 @@ class Inspection:
         if why and why not in self.explanation:
             self.explanation.append(why)
 
+    def look_again(self) -> None:
+        """Begin another press on the fruit. Of the one before stays what was measured, not its images."""
+        self.first_verdict = self.verdict
+        self.earlier.append(self._latest())
+        self.verdict = None
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Begin another closing: what this one has shown is done with."""
+        self.met_mm, self.before_onset_mm = self.onset_mm, None
+        self.steps.clear()
+        self.seen.clear()
+
     def forget_pictures(self) -> None:
         """Let go of the frames, which are in the records by now or never will be."""
         self.steps.clear()
@@ -85,7 +118,11 @@ class Inspection:
         self.reference_image = None
 
     def press(self) -> Press:
-        """What was measured so far, for the judge."""
+        """What was measured so far, of all presses together, for the judge."""
+        return together([*self.earlier, self._latest()])
+
+    def _latest(self) -> Press:
+        """The present press."""
         onset_mm = self.onset_mm
         if onset_mm is None:
             return self._press(None, 0.0, ())
@@ -132,6 +169,7 @@ class Inspection:
             phases_s=dict(self.phases_s),
             measures={
                 **self.measures,
+                **first_look_measures(self.earlier, self.first_verdict),
                 "onset_mm": onset_mm,
                 "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
                 "mm_per_px": self.mm_per_px,

@@ -1,16 +1,20 @@
 """Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
 
 import asyncio
+import logging
 from collections.abc import Callable
 
 from station.calibration.gate import gated
+from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
 from station.devices.gripper.interface import MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
+from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
+from station.inspection.looks import looks_again
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
 from station.service.calibrated import Calibrated
@@ -20,10 +24,13 @@ from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouche
 from station.service.inspection import Inspection
 from station.service.metrics import Metrics
 from station.service.reference import ALARMS, BadReferenceError
+from station.settings.arm import Centring
 from station.settings.service import ServiceSettings
 from station.vocabulary import Reason
 
 _OPEN_WITHIN_MM = 2.0
+
+log = logging.getLogger(__name__)
 
 
 class Inspector:
@@ -33,6 +40,7 @@ class Inspector:
         crew: the devices.
         eye: the measurement.
         settings: placing, and how old a reference may be.
+        centring: how the arm may follow a contact.
         alarms: told of a reference that cannot serve.
         metrics: counts the frames.
         calibrated: how noisy the sensor is.
@@ -43,12 +51,13 @@ class Inspector:
         crew: Crew,
         eye: Eye,
         settings: ServiceSettings,
+        centring: Centring,
         alarms: AlarmDesk,
         metrics: Metrics,
         calibrated: Calibrated,
     ) -> None:
         self._crew, self._eye, self._settings, self._calibrated = crew, eye, settings, calibrated
-        self._alarms, self._metrics = alarms, metrics
+        self._alarms, self._metrics, self._centring = alarms, metrics, centring
         self._reached: MoveResult | None = None
         self._glanced: Seen | None = None
         self._examining: asyncio.Future[bool] | None = None
@@ -71,7 +80,6 @@ class Inspector:
 
     async def take_reference(self, now: Inspection) -> Event:
         """Take the reference with the jaws open; a gripper that is not open may hold something against the gel."""
-        self._reached = None
         gripper = self._crew.cell.gripper
         opened = await gripper.open()
         touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
@@ -121,12 +129,14 @@ class Inspector:
 
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
+        self._reached = self._glanced = None
+        await self._eye.begin_press()
         grip, plan = self._grip(now), now.active.recipe.steps
         try:
             if plan.start_width_mm is not None:
                 start = await grip.step(0, plan.start_width_mm)
             else:
-                before, start = await grip.approach(self._touches)
+                before, start = await grip.approach(self._touches, now.met_mm)
                 now.before_onset_mm = None if before is None else before.move.width_mm
         except (NothingTouchedError, UnseenContactError) as error:
             now.interrupt(Reason.NO_CONTACT, str(error))
@@ -134,8 +144,59 @@ class Inspector:
         now.steps.append(start)
         known = self._glanced is not None and self._glanced.step is start
         now.seen.append(self._glanced if known and self._glanced else await self._eye.measure(start))
+        now.closings += 1
+        off = self._off_middle(now)
+        if now.closings == 1 and self._sets_out(now, off):
+            now.let_go()
+            return Event.OFF_MIDDLE
+        if now.moved != NOT_MOVED and off is not None:
+            now.measures["left_off_mm"] = round(off.length_mm, 2)
         await self._eye.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
+
+    def _off_middle(self, now: Inspection) -> Way | None:
+        """How far the last measured contact is off the field's middle; None where there is none."""
+        seen = now.seen[-1]
+        centroid_px = seen.contact.centroid_px
+        return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
+
+    def _sets_out(self, now: Inspection, off: Way | None) -> bool:
+        """Whether the arm follows a contact; the record says why not."""
+        from_mm = now.active.recipe.press.centre_from_mm
+        if from_mm is None or off is None:
+            return False
+        now.measures.setdefault("off_right_mm", round(off.right_mm, 2))
+        now.measures.setdefault("off_down_mm", round(off.down_mm, 2))
+        if off.length_mm < from_mm:
+            told = "near enough"
+        elif self._crew.cell.arm is None:
+            told = "no arm"
+        elif too_far(off, now.moved, self._centring.most_mm):
+            told = "too far"
+        else:
+            now.target = now.moved.then(off)
+            now.measures["centring"] = "moved"
+            return True
+        now.measures.setdefault("centring", told)
+        return False
+
+    async def centre(self, now: Inspection) -> Event:
+        """Go to where the contact will be in the field's middle; nothing moves where it is to be pressed as it is."""
+        arm, target = self._crew.cell.arm, now.target
+        if arm is not None and target is not None:
+            now.target = None
+            try:
+                await arm.move_beside_nest(self._centring.in_tool_mm(*target))
+            except ArmFault as fault:
+                if fault.cause is not ArmCause.UNREACHABLE:
+                    raise
+                log.warning("the contact is not centred: %s", fault)
+                now.measures["centring"] = "out of reach"
+                return Event.CENTRED
+            now.moved = target
+            now.measures["moved_right_mm"] = round(target.right_mm, 2)
+            now.measures["moved_down_mm"] = round(target.down_mm, 2)
+        return Event.CENTRED
 
     async def close_step(self, now: Inspection) -> Event:
         """Close by one step, counted in measured widths from the first.
@@ -184,7 +245,7 @@ class Inspector:
         return Event.MEASURED
 
     async def judge(self, now: Inspection) -> Event:
-        """Judge what was measured."""
+        """Judge what was measured; an inconclusive fruit may be pressed once more, by the recipe."""
         age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
         self._metrics.reference(age_s, float(now.measures.get("reference_drift_levels") or 0.0))
         if age_s > self._settings.reference.oldest_s:
@@ -193,7 +254,13 @@ class Inspector:
                 f"the reference was {age_s:.0f} s old at the last step, at most "
                 f"{self._settings.reference.oldest_s:g} s are allowed",
             )
-        now.verdict = judge(now.press(), now.active.recipe)
+        recipe = now.active.recipe
+        now.verdict = judge(now.press(), recipe)
+        if now.looks < recipe.press.looks and looks_again(now.verdict):
+            self._sets_out(now, self._off_middle(now))
+            now.look_again()
+            self._metrics.looked_again(recipe.name)
+            return Event.LOOK_AGAIN
         now.outcome_name = now.verdict.outcome
         return Event.JUDGED_ACCEPT if now.outcome_name == "PASS" else Event.JUDGED_REJECT
 

@@ -94,6 +94,10 @@ class Metrics:
         for phase, seconds in (phases_s or {}).items():
             self._of("phase", phase=phase).observe(seconds)
 
+    def looked_again(self, fruit: str) -> None:
+        """Count a fruit that is pressed once more, by the recipe's name."""
+        self._of("looks", fruit=fruit).inc()
+
     def frame(self, state: str = "good", number: int = 1) -> None:
         """Count frames: `good`, `dropped`, or the name of a `FrameFault`."""
         self._of("frames", state=state).inc(number)

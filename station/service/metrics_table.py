@@ -74,6 +74,9 @@ TABLE: dict[str, Row] = {
         ("fruit", "outcome", "reason"),
         "Inspections whose outcome the PLC was given, by the first reason; none where passed",
     ),
+    "looks": Row(
+        "station_second_looks", "counter", ("fruit",), "Fruit that one press did not decide, pressed once more"
+    ),
     "late": Row("station_inspections_late", "counter", ("fruit",), "Inspections that ended after their deadline"),
     "deadline": Row(
         "station_inspection_deadline_seconds", "gauge", ("fruit",), "Longest that its last inspection might take"

@@ -50,6 +50,53 @@ class ArmPoses(Settings):
         return getattr(self, name)
 
 
+ToolAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+"""One of the tool's axes, forwards or backwards."""
+
+
+class Centring(Settings):
+    """How the arm follows a contact that is off the field's middle, in the tool's own axes."""
+
+    most_mm: float = setting(
+        3.0,
+        title="Farthest",
+        description="So far from the taught nest the arm may follow a contact; there must be as much room all around "
+        "the fingers. A contact farther off is pressed where it is.",
+        unit="mm",
+        ge=0.0,
+        le=10.0,
+    )
+    image_right: ToolAxis = setting(
+        "+x",
+        title="Image's right",
+        description="The tool's axis that points to the right in the sensor's image: moved along it, the sensor shows "
+        "a contact farther to the left. The default suits the twin.",
+    )
+    image_down: ToolAxis = setting(
+        "+z",
+        title="Image's bottom",
+        description="The tool's axis that points down in the sensor's image. The default suits the twin.",
+    )
+
+    @model_validator(mode="after")
+    def _two_axes(self) -> Self:
+        if self.image_right[1] == self.image_down[1]:
+            raise ValueError(f"image_right and image_down: expected two axes, got {self.image_right[1]} for both")
+        return self
+
+    def in_tool_mm(self, right_mm: float, down_mm: float) -> tuple[float, float, float]:
+        """A way in the image as a way along the tool's x, y and z.
+
+        Args:
+            right_mm: to the right in the image.
+            down_mm: down in the image.
+        """
+        way = dict.fromkeys("xyz", 0.0)
+        for (sign, axis), distance_mm in ((self.image_right, right_mm), (self.image_down, down_mm)):
+            way[axis] = -distance_mm if sign == "-" else distance_mm
+        return way["x"], way["y"], way["z"]
+
+
 class ArmSettings(Settings):
     """The UR10e and the driver's patience with it."""
 
@@ -71,6 +118,9 @@ class ArmSettings(Settings):
         le=500.0,
     )
     poses: ArmPoses = setting(ArmPoses(), title="Poses", description="The named places that the arm goes to.")
+    centring: Centring = setting(
+        Centring(), title="Centring", description="How the arm follows a contact that is off the field's middle."
+    )
     joint_speed_rad_s: float = setting(
         1.0,
         title="Joint speed",

@@ -163,6 +163,32 @@ class Imaging(Settings):
     )
 
 
+class PressPlan(Settings):
+    """How often one fruit may be pressed, and whether the arm brings it to the field's middle first."""
+
+    centre_from_mm: float | None = setting(
+        None,
+        title="Centre from",
+        description="Where the first contact is farther from the field's middle, the jaws open, the arm follows it "
+        "within `arm.centring.most_mm`, and they close again; null for never. Without an arm nothing is done.",
+        unit="mm",
+        ge=0.2,
+        le=5.0,
+    )
+    looks: int = setting(
+        1,
+        title="Looks",
+        description="With 2, a fruit of which one press did not tell enough (near a limit, cut by the border, too "
+        "little confidence) is let go and pressed once more, and both presses are judged together.",
+        ge=1,
+        le=2,
+    )
+
+
+PRESS_PLAN = PressPlan()
+"""Of a recipe that says none, as those written before there was one."""
+
+
 class EarlyStop(Settings):
     """What ends the steps before the last one, to spare fruit and gel."""
 
@@ -208,6 +234,10 @@ class Recipe(Settings):
         title="Expected width", description="The widths of fruit that the recipe is meant for."
     )
     steps: WidthSteps = setting(title="Width steps", description="How the gripper closes while images are taken.")
+    # Left out of a recipe's values where it is as in recipes written before it: they keep their content hash.
+    press: Annotated[PressPlan, Field(exclude_if=lambda plan: plan == PRESS_PLAN)] = setting(
+        PRESS_PLAN, title="Press", description="How often one fruit may be pressed, and where."
+    )
     gripper: Grip = setting(title="Gripper", description="How the gripper moves during the steps.")
     imaging: Imaging = setting(title="Imaging", description="When images are taken, and how many.")
     segmentation: Segmentation = setting(

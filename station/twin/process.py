@@ -34,11 +34,15 @@ from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.urcap import UrcapServer
 from station.twin.ur.controller import UrController, arm_faults
 from station.twin.ur.kinematics import Joints, forward
+from station.twin.ur.poses import inverse_transform
 from station.twin.world import World
 
 LOOPBACK = "127.0.0.1"
 CONSOLE_PORT = 49211
 _AT_NEST_MM = 10.0
+_IMAGE_RIGHT, _IMAGE_DOWN = 0, 2
+"""The tool's axes, x and z, along which the sensor is mounted: to the right and down in its image. The fingers close
+along y."""
 _FURTHEST_MM = 6.0
 """From the gel's middle, where a fruit may be laid; the gel ends there."""
 _BALL_HOLDER_MM = 18.0
@@ -106,7 +110,7 @@ class Twin:
         if not options.bench:
             self.boards["arm"] = arm_faults()
             arm = UrController(options.arm.host, clock, self.boards["arm"], polyscope=options.polyscope)
-            self.world.arm_at_nest = _near_nest(arm, options.arm.poses)
+            self.world.sensor_mm = _beside_nest(arm, options.arm.poses)
             self._servers.append(arm)
         actions: dict[str, Action] = {"fruit": self._lay, "remove": self._remove, "state": self._state}
         if options.can.enabled:
@@ -181,14 +185,18 @@ class Twin:
         }
 
 
-def _near_nest(arm: UrController, poses: ArmPoses) -> Callable[[], bool]:
-    nest_m = forward(poses.nest)[:3, 3]
+def _beside_nest(arm: UrController, poses: ArmPoses) -> Callable[[], tuple[float, float] | None]:
+    """How far the sensor is from its place at the nest, as its image has it; None where it is elsewhere."""
+    to_nest = inverse_transform(forward(poses.nest))
 
     @lru_cache(maxsize=1)  # asked many times a cycle, and mostly the arm stands
-    def near(joints_rad: Joints) -> bool:
-        return bool(np.linalg.norm(1000 * (forward(joints_rad)[:3, 3] - nest_m)) < _AT_NEST_MM)
+    def beside(joints_rad: Joints) -> tuple[float, float] | None:
+        way_mm = 1000 * (to_nest @ forward(joints_rad))[:3, 3]
+        if np.linalg.norm(way_mm) >= _AT_NEST_MM:
+            return None
+        return float(way_mm[_IMAGE_RIGHT]), float(way_mm[_IMAGE_DOWN])
 
-    return lambda: near(arm.joints_rad)
+    return lambda: beside(arm.joints_rad)
 
 
 async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:

@@ -14,6 +14,8 @@ DIGIT_MM = 32.0
 _CREEP_STEP_S = 0.5
 _SOFTENING_MAX = 0.5
 _SET_SHARE = 0.25
+_PLACE_DIGITS = 2
+"""Of the sensor's place in mm: the joints' rounding is no motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +44,15 @@ class World:
         self._opening_mm = 85.0
         self._pose = Pose()
         self._fruit: Fruit | None = None
-        self._contact: FruitOnGel | None = None
+        self._contact: tuple[tuple[float, float], FruitOnGel] | None = None
+        """With the sensor's place that it was made for."""
         self._squeeze: Squeeze | None = None
         self._crept_s = 0.0
         self._since_s: float | None = None
         self._worst: Squeezed | None = None
-        self.arm_at_nest: Callable[[], bool] = lambda: True
-        """Whether the fingers are where the fruit lies; always, on a bench without an arm."""
+        self.sensor_mm: Callable[[], tuple[float, float] | None] = lambda: (0.0, 0.0)
+        """How far the sensor is from where the fruit was laid against it, to the right and down in its image; None
+        where the fingers are not around the fruit. On a bench without an arm it stays there."""
         self.opening_mm: Callable[[], float] = lambda: self._opening_mm
         """The gripper's opening now; where no gripper is wired, the one that `force_N` was last asked for."""
 
@@ -98,7 +102,9 @@ class World:
     def touch(self) -> Touch | None:
         """What the sensor feels now, to be drawn; None where nothing touches."""
         squeezed = self.squeezed()
-        return Touch(self._contact, squeezed) if self._contact and squeezed.closing_mm > 0 else None
+        if self._fruit is None or squeezed.closing_mm <= 0:
+            return None
+        return Touch(self._contact_on_gel(self._fruit), squeezed)
 
     def footprint(self) -> Footprint | None:
         """The gel's dent and the true mask now; None where nothing touches."""
@@ -106,7 +112,7 @@ class World:
         return touch.contact.pressed(touch.squeezed) if touch else None
 
     def _squeezed_at(self, opening_mm: float) -> Squeezed:
-        if self._fruit is None or self._squeeze is None or not self.arm_at_nest():
+        if self._fruit is None or self._squeeze is None or self.sensor_mm() is None:
             return Squeezed(-self.width_mm(opening_mm), 0.0, 0.0, 0.0)
         closing_mm = self._fruit.width_mm + self._holder_mm - self.width_mm(opening_mm)
         self._age(self._fruit, touching=closing_mm > 0)
@@ -140,9 +146,19 @@ class World:
         return replace(fruit, width_mm=max(0.5 * fruit.width_mm, fruit.width_mm - set_mm), modulus_mpa=softer)
 
     def _lay(self, fruit: Fruit) -> None:
-        self._fruit = fruit
-        self._contact = FruitOnGel(fruit, self._pose, self._gel)
+        self._fruit, self._contact = fruit, None
+        self._contact_on_gel(fruit)
         self._recurve(fruit, 0.0)
+
+    def _contact_on_gel(self, fruit: Fruit) -> FruitOnGel:
+        """The fruit over the gel where the sensor is now, made anew where that has moved."""
+        right_mm, down_mm = self.sensor_mm() or (0.0, 0.0)
+        place = round(right_mm, _PLACE_DIGITS), round(down_mm, _PLACE_DIGITS)
+        if self._contact is None or self._contact[0] != place:
+            x_px, y_px = (mm / self._gel.mm_per_px for mm in place)
+            pose = replace(self._pose, x_px=self._pose.x_px - x_px, y_px=self._pose.y_px - y_px)
+            self._contact = place, FruitOnGel(fruit, pose, self._gel)
+        return self._contact[1]
 
     def _recurve(self, fruit: Fruit, held_s: float) -> None:
         self._squeeze, self._crept_s = Squeeze(fruit, self._gel, held_s), held_s

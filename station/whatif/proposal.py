@@ -88,7 +88,7 @@ def _at(
     costs: Costs,
 ) -> Proposal | None:
     seen = [
-        (each, marked_fruit(each.press, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good"))
+        (each, marked_fruit(each.judged, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good"))
         for each in stored
     ]
     fruit = tuple(one for _, one in seen if one is not None)

@@ -5,12 +5,14 @@ certain by then: damage that is proven, and a fruit that cannot pass any more, w
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from pydantic import ValidationError
 
 from station.inspection.judge import Verdict, early_stop, judge
+from station.inspection.looks import looks_again, together
 from station.inspection.press import Press
 from station.settings.recipe_form import upgrade
 from station.settings.recipe_model import Recipe
@@ -68,19 +70,22 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
     """
     if own is None:
         return _undecidable(stored, "its own recipe is of a form that this program does not take", faithful=False)
-    then = judge(stored.press, own)
-    faithful, stopped = then.outcome == stored.before, then.stopped is not None
+    faithful = judge(stored.judged, own).outcome == stored.before
     if why := pressed_otherwise(own, draft):
         return _undecidable(stored, why, faithful=faithful)
     press = stored.press
     if press.onset_mm is None or not measured_otherwise(own, draft):
-        return _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
+        presses = [press] if stored.first is None else [stored.first, press]
+        return _judged(stored, [(each, each) for each in presses], own, draft, faithful=faithful)
+    if stored.first is not None:
+        why = "the draft measures otherwise, and of a fruit that was pressed twice the first images are not kept"
+        return _undecidable(stored, why, faithful=faithful)
     try:
-        press = remeasured(stored, own.segmentation, draft.segmentation)
+        again = remeasured(stored, own.segmentation, draft.segmentation)
     except CannotRemeasureError as error:
         return _undecidable(stored, str(error), faithful=faithful)
-    replayed = _judged(stored, press, own, draft, faithful=faithful, stopped=stopped)
-    return replace(replayed, areas_mm2=tuple(point.area_mm2 for point in press.points))
+    replayed = _judged(stored, [(press, again)], own, draft, faithful=faithful)
+    return replace(replayed, areas_mm2=tuple(point.area_mm2 for point in again.points))
 
 
 def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
@@ -118,13 +123,35 @@ def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
 
 
 def _judged(
-    stored: StoredPress, whole: Press, own: Recipe, draft: Recipe, *, faithful: bool, stopped: bool
+    stored: StoredPress, presses: Sequence[tuple[Press, Press]], own: Recipe, draft: Recipe, *, faithful: bool
 ) -> Replayed:
+    """Judge press after press, as often as the draft would have pressed the fruit.
+
+    Args:
+        stored: the inspection.
+        presses: in order, each as it was measured and as the draft measures it.
+        own: the recipe of then.
+        draft: the recipe to try.
+        faithful: as `Replayed` has it.
+    """
+    for looks in range(1, len(presses) + 1):
+        then, now = (together(each) for each in zip(*presses[:looks], strict=True))
+        verdict = _verdict(then, now, own, draft)
+        if isinstance(verdict, str):
+            return _undecidable(stored, verdict, faithful=faithful)
+        if looks >= draft.press.looks or not looks_again(verdict):
+            return _decided(stored, verdict, faithful=faithful)
+    return _undecidable(stored, "the draft would have pressed the fruit once more", faithful=faithful)
+
+
+def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict | str:
+    """The draft's verdict on presses together, or why it is not known."""
     if whole.onset_mm is None:
         sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
         if sooner or whole.interruptions:
-            return _decided(stored, judge(whole, draft), faithful=faithful)
-        return _undecidable(stored, "nothing was touched, and the draft would have closed further", faithful=faithful)
+            return judge(whole, draft)
+        return "nothing was touched, and the draft would have closed further"
+    stopped = judge(then, own).stopped is not None
     press = _until_stop(whole, draft)
     verdict = judge(press, draft)
     proven = verdict.outcome == "FAIL"
@@ -133,13 +160,12 @@ def _judged(
         not stopped and draft.steps.number == own.steps.number and len(press.points) == len(whole.points)
     )
     if proven or void or ended or verdict.stopped is not None:
-        return _decided(stored, verdict, faithful=faithful)
+        return verdict
     if (hopeless := judge(press, _stopping(draft))).stopped is not None and hopeless.outcome != "PASS":
-        return _decided(stored, hopeless, faithful=faithful)
+        return hopeless
     reached_mm = press.points[-1].closing_mm if press.points else 0.0
     cut = ", where it was stopped early" if stopped else ""
-    why = f"the curve ends at {reached_mm:.1f} mm of closing{cut}, and the draft would have pressed on"
-    return _undecidable(stored, why, faithful=faithful)
+    return f"the curve ends at {reached_mm:.1f} mm of closing{cut}, and the draft would have pressed on"
 
 
 def _until_stop(press: Press, draft: Recipe) -> Press:

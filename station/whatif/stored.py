@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,10 @@ from typing import Any
 from sqlalchemy import Connection
 
 from station.inspection.fruit_size import FruitSize
+from station.inspection.looks import together
 from station.inspection.press import Flag, Measured, Press
 from station.records.images import image_path
+from station.records.looks import first_look
 from station.vocabulary import OutcomeName, Reason
 
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
@@ -43,11 +45,18 @@ class StoredPress:
     """As the station judged it then."""
     recipe_sha256: str
     press: Press
-    """With its points in the order of the steps."""
+    """The last one, with its points in the order of the steps."""
     gate_factor: float = 1.0
     """By which the sensor's calibration had raised the robust method's gate."""
     images: tuple[tuple[int | None, bytes], ...] = ()
     """PNG by step, None for the reference; only where they were asked for and kept."""
+    first: Press | None = None
+    """The press before it, which was inconclusive; None where the fruit was pressed once."""
+
+    @property
+    def judged(self) -> Press:
+        """All presses together, as the station judged them."""
+        return self.press if self.first is None else together([self.first, self.press])
 
 
 def sequences(connection: Connection, name: str, lots: Sequence[str], last: int | None) -> list[int]:
@@ -135,7 +144,16 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
         measured.get("scale_uncertainty", 0.0),
     )
     gate_factor = measured.get("gate_factor") or 1.0
-    return StoredPress(sequence, lot, judged, recipe_sha256, press, gate_factor, images)
+    first = first_look(measured)
+    if first is not None:  # of the same fruit, by the same gripper and sensor
+        first = replace(
+            press,
+            onset_mm=first.onset_mm,
+            onset_uncertainty_mm=first.onset_uncertainty_mm,
+            points=first.points,
+            interruptions=(),
+        )
+    return StoredPress(sequence, lot, judged, recipe_sha256, press, gate_factor, images, first)
 
 
 def _points(curve: Iterable[Any]) -> Iterator[Measured]:

@@ -9,7 +9,7 @@ from station.inspection.cycle import LATCHES, START, TABLE, Act, Action, Event, 
 from station.inspection.states import State
 
 JAWS_CLOSE = {Action.CLOSE_TO_ONSET, Action.CLOSE_STEP}
-ARM_LEAVES = {Action.APPROACH, Action.GO_HOME}
+ARM_LEAVES = {Action.APPROACH, Action.CENTRE, Action.GO_HOME}
 MOVES = JAWS_CLOSE | ARM_LEAVES | {Action.OPEN_JAWS, Action.PLACE_ACCEPT, Action.PLACE_REJECT}
 
 

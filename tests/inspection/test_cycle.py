@@ -151,6 +151,35 @@ def test_one_fruit_from_start_to_ready_again():
     assert actions.index(Action.RECORD) < actions.index(Action.PUBLISH)
 
 
+AGAIN = [
+    Event.OFF_MIDDLE, Event.JAWS_OPEN, Event.CENTRED, Event.ONSET_FOUND, Event.REACHED, Event.SETTLED,
+    Event.LAST_CAPTURED, Event.MEASURED, Event.LOOK_AGAIN, Event.JAWS_OPEN, Event.CENTRED,
+]  # fmt: skip
+
+
+def test_a_fruit_is_centred_and_looked_at_again_within_one_inspection():
+    cycle, begun = Cycle(), GOOD.index(Event.ONSET_FOUND)
+    actions = [action for event in (*GOOD[:begun], *AGAIN, *GOOD[begun:]) for action in cycle.on(event) or ()]
+    assert (cycle.state, cycle.refused) == (State.IDLE, Counter())
+    counted = Counter(actions)
+    assert counted[Action.CLOSE_TO_ONSET] == 3
+    assert counted[Action.CENTRE] == 2
+    assert counted[Action.TAKE_REFERENCE] == counted[Action.PUBLISH] == counted[Action.RECORD] == 1
+    for place in (place for place, action in enumerate(actions) if action == Action.CENTRE):
+        assert actions[place - 1] == Action.OPEN_JAWS, "the arm moves with open jaws alone"
+
+
+@pytest.mark.parametrize("state", [State.OPENING_AGAIN, State.CENTRING])
+def test_between_two_closings_a_disturbance_ends_the_inspection_as_no_result(state):
+    for event in set(REASONS) - {Event.NO_ONSET, Event.REFERENCE_BAD}:
+        transition = TABLE[state, event]
+        assert transition.actions[:3] == (Action.HALT, Action.CLOSE_AS_NO_RESULT, Action.RECORD), event
+    for event in (Event.STOP, Event.CALLED_OFF, Event.LATE, Event.CAMERA_FAULT):
+        assert TABLE[state, event].state == State.RECORDING_RELEASE
+    for event in (Event.ARM_FAULT, Event.GRIPPER_FAULT):
+        assert TABLE[state, event].state == State.RECORDING_HELD
+
+
 def test_the_next_step_is_made_while_an_image_is_measured_but_never_two_ahead():
     transition = TABLE[State.CAPTURING, Event.CAPTURED]
     assert transition.actions == (Action.MEASURE, Action.CLOSE_STEP)

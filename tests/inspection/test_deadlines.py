@@ -21,12 +21,12 @@ WAITING = {State.UNKNOWN, State.STOPPED, State.IDLE, State.HELD, State.CARRIED, 
 
 
 def changed(**imaging_or_steps: object):
-    """The recipe with some fields of its steps or its imaging changed."""
+    """The recipe with some fields of its steps, imaging or press changed."""
     parts = {
         name: getattr(RECIPE, name).model_copy(
             update={k: v for k, v in imaging_or_steps.items() if k in type(getattr(RECIPE, name)).model_fields}
         )
-        for name in ("steps", "imaging")
+        for name in ("steps", "imaging", "press")
     }
     return RECIPE.model_copy(update=parts)
 
@@ -43,9 +43,23 @@ def test_every_state_that_waits_for_something_has_a_deadline_that_the_cycle_answ
 def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
     limits = deadlines(RECIPE, PACE)
     steps_s = 12 * (1 / 20 + 0.2 + 3 / 30)
-    assert 5 / 30 + 2 * 2.0 + steps_s < limits.inspection_s < 60
+    assert 5 / 30 + 2 * 2.0 + steps_s < limits.inspection_s < 90
     assert Begun(sequence=1, deadline_s=limits.inspection_s).refusal is None
     assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * 0.2)
+
+
+def test_a_second_look_has_its_time_to_let_go_and_press_again():
+    once, twice = (deadlines(changed(looks=looks), PACE).inspection_s for looks in (1, 2))
+    opening_s = PACE.stroke_mm / 20
+    assert twice - once > opening_s + 12 * (1 / 20 + 0.2 + 3 / 30)
+
+
+def test_centring_has_its_time_where_there_is_an_arm():
+    off, on = (changed(centre_from_mm=from_mm) for from_mm in (None, 0.4))
+    opening_s = PACE.stroke_mm / 20
+    assert deadlines(on, PACE).inspection_s - deadlines(off, PACE).inspection_s > opening_s
+    bench = PACE._replace(arm_move_s=0.0)
+    assert deadlines(on, bench).inspection_s == deadlines(off, bench).inspection_s
 
 
 @given(st.integers(1, 10), st.floats(0, 2), st.integers(1, 20), st.floats(0, 5), st.floats(15, 60), st.floats(0, 0.5))

@@ -123,9 +123,23 @@ class TestWorld:
 
     def test_nothing_is_felt_while_the_arm_is_elsewhere(self):
         world, _, _ = self.placed()
-        world.arm_at_nest = lambda: False
+        world.sensor_mm = lambda: None
         assert world.force_N(DIGIT_MM + 10.0) == 0
         assert world.touch() is None
+
+    def test_a_sensor_that_moves_sees_the_contact_move_the_other_way(self):
+        world, _, fruit = self.placed()
+        world.force_N(DIGIT_MM + fruit.width_mm - 1.5)
+        places = []
+        for sensor_mm in ((0.0, 0.0), (1.0, -0.5)):
+            world.sensor_mm = lambda place=sensor_mm: place
+            footprint = world.footprint()
+            assert footprint is not None
+            rows, columns = np.nonzero(footprint.true_mask)
+            places.append((columns.mean(), rows.mean()))
+        (x_px, y_px), (moved_x_px, moved_y_px) = places
+        assert (x_px - moved_x_px) * MM_PER_PX == pytest.approx(1.0, abs=0.05)
+        assert (y_px - moved_y_px) * MM_PER_PX == pytest.approx(-0.5, abs=0.05)
 
     def test_a_held_fruit_creeps_and_recovers(self):
         world, clock, fruit = self.placed()

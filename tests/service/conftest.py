@@ -126,8 +126,8 @@ class Bench:
         assert self.station.service is not None
         return self.station.service.state
 
-    def lay(self, kind: str, seed: int = 1, *, bruised: bool = False) -> None:
-        self.twin._lay({"kind": kind, "seed": seed, "bruised": bruised})
+    def lay(self, kind: str, seed: int = 1, *, bruised: bool = False, x_mm: float = 0.0, y_mm: float = 0.0) -> None:
+        self.twin._lay({"kind": kind, "seed": seed, "bruised": bruised, "x_mm": x_mm, "y_mm": y_mm})
 
     def at(self, phase: State, do: Callable[[], Any]) -> None:
         """Do something at the moment at which the cycle enters a phase, once."""

@@ -12,15 +12,11 @@ from benchmarks.sorting.cycle import (
     Unmeasured,
     as_stopped,
     inspect,
-    looks_again,
     move_mm,
     sized_by,
-    together,
 )
 from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
 from benchmarks.sorting.specimens import KINDS, Task, draw
-from station.inspection.judge import judge
-from station.inspection.press import Flag, Measured, Press
 from station.settings.recipe import find_recipe
 from station.twin.fruit import Kind
 from station.vision.scale import TYPICAL_MM_PER_PX
@@ -85,7 +81,7 @@ class TestPressing:
             task for number in range(50) if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
         )
         _, first = presses.press(Closing(task, 0, (0.0, 0.0)))
-        move = move_mm(first.steps[0])
+        move = move_mm(first.steps[0], find_recipe(BLUEBERRY.kind), (0.0, 0.0))
         assert move is not None
         _, second = presses.press(Closing(task, 1, move))
         for step in second.steps[:4]:
@@ -95,11 +91,11 @@ class TestPressing:
         assert first.steps[-1].closing_mm > second.steps[-1].closing_mm > 4
 
     def test_an_arm_moves_by_its_own_steps_within_its_bounds(self):
-        step = Step(0.0, 500, 0.9, (), None, 0.1)
-        assert move_mm(step) is None
-        assert move_mm(step._replace(offset_px=(10.0, 0.0))) is None
-        assert move_mm(step._replace(offset_px=(30.0, -20.0))) == (-0.8, 0.55)
-        assert move_mm(step._replace(offset_px=(120.0, 0.0))) is None
+        step, recipe = Step(0.0, 500, 0.9, (), None, 0.1), find_recipe(BLUEBERRY.kind)
+        assert move_mm(step, recipe, (0.0, 0.0)) is None
+        assert move_mm(step._replace(offset_px=(10.0, 0.0)), recipe, (0.0, 0.0)) is None
+        assert move_mm(step._replace(offset_px=(30.0, -20.0)), recipe, (0.0, 0.0)) == (-0.8, 0.55)
+        assert move_mm(step._replace(offset_px=(120.0, 0.0)), recipe, (0.0, 0.0)) is None
 
 
 class TestDeciding:
@@ -139,7 +135,7 @@ class TestDeciding:
     def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, told):
         practice = Practice(size=size)
         by = sized_by(practice, recipe)
-        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice)
+        press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice, ())
         assert (press.size.length_mm is not None, press.size.size_class is not None) == told
         assert by.damage.size is not None
         assert by.damage.size.judged_by == ("class" if size == "class" else "length")
@@ -147,30 +143,10 @@ class TestDeciding:
     def test_the_usual_scale_stands_in_where_a_unit_was_never_calibrated(self, recipe):
         one = replace(draw(BLUEBERRY), mm_per_px=0.029, calibrated_mm_per_px=0.029)
         areas = [
-            as_stopped(pressed(), one, recipe, Practice(calibrated=calibrated))[0].points[2].area_mm2
+            as_stopped(pressed(), one, recipe, Practice(calibrated=calibrated), ())[0].points[2].area_mm2
             for calibrated in (True, False)
         ]
         assert areas[1] == pytest.approx(areas[0] * (0.0266 / 0.029) ** 2)
-
-
-class TestTogether:
-    def press(self, area_mm2: float, *flags: Flag) -> Press:
-        return Press(15.9, 0.1, (Measured(3.0, area_mm2, round(area_mm2 * 1400), 0.9, frozenset(flags)),))
-
-    @pytest.mark.parametrize(
-        ("first", "second", "area_mm2"),
-        [((30.0,), (34.0,), 32.0), ((30.0, Flag.SATURATED), (34.0,), 34.0), ((30.0,), (34.0, Flag.SATURATED), 30.0)],
-    )
-    def test_the_mean_of_what_is_trusted(self, first, second, area_mm2):
-        [point] = together([self.press(*first), self.press(*second)]).points
-        assert (point.area_mm2, point.flags) == (area_mm2, frozenset())
-
-    def test_two_doubtful_ones_stay_doubtful(self):
-        [point] = together([self.press(30.0, Flag.SATURATED), self.press(34.0, Flag.CUT_BY_BORDER)]).points
-        assert (point.area_mm2, point.flags) == (34.0, {Flag.CUT_BY_BORDER})
-
-    def test_a_fault_is_no_reason_to_look_again(self, recipe):
-        assert not looks_again(judge(Press(None, 0.0, (), (Reason.CAMERA_FAULT,)), recipe))
 
 
 class TestCache:

@@ -20,7 +20,8 @@ class ArmState:
     moving: bool | None
     """Whether the arm moves; None where the state is stale."""
     at: PoseName | None
-    """The named pose where the arm stands; None where it is elsewhere, moves, or the state is stale."""
+    """The named pose where the arm stands, `nest` also beside it; None where it is elsewhere, moves, or the state is
+    stale."""
     fault: ArmFault | None
     """Why nothing can be moved; None where the arm is ready."""
 
@@ -50,6 +51,17 @@ class Arm(Protocol):
 
         Raises:
             ArmFault: the arm is not ready, cannot go there, or was kept from arriving.
+        """
+        ...
+
+    async def move_beside_nest(self, offset_mm: tuple[float, float, float]) -> None:
+        """Go straight to the nest moved by an offset, and return when it is reached. A cancelled move is stopped.
+
+        Args:
+            offset_mm: from the nest, along the tool's own x, y and z.
+
+        Raises:
+            ArmFault: the arm is not ready, may not go there, or was kept from arriving.
         """
         ...
 

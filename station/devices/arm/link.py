@@ -15,7 +15,7 @@ from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
 from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, from_state, from_words, why_not_done
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1
@@ -125,7 +125,7 @@ class ArmLink:
             raise
         return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
 
-    async def order(self, request: Move | Reachable | Halt) -> Outcome:
+    async def order(self, request: Beside | Move | Reachable | Halt) -> Outcome:
         """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
 
         Raises:
@@ -150,7 +150,7 @@ class ArmLink:
         finally:
             self._lock.release()
 
-    async def _ask_watched(self, process: ArmProcess, request: Move | Reachable | Halt) -> Outcome:
+    async def _ask_watched(self, process: ArmProcess, request: Beside | Move | Reachable | Halt) -> Outcome:
         asking = asyncio.create_task(process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s))
         fading = asyncio.create_task(self._until_faded(process))
         try:

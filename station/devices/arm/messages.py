@@ -5,6 +5,7 @@ from typing import ClassVar
 from station.channel.messages import Message
 
 Six = tuple[float, float, float, float, float, float]
+Position = tuple[float, float, float]
 
 
 class Watch(Message):
@@ -17,9 +18,9 @@ class Command(Message):
     """Connect to command the arm, which uploads the control program."""
 
     asked: ClassVar[str] = "to start the control program"
-    tool_centre_mm: tuple[float, float, float]
+    tool_centre_mm: Position
     payload_kg: float
-    payload_centre_mm: tuple[float, float, float]
+    payload_centre_mm: Position
     watchdog_hz: float
 
 
@@ -34,6 +35,15 @@ class Beat(Message):
 
     asked: ClassVar[str] = "for the arm's state"
     healthy_for_s: float
+
+
+class Beside(Message):
+    """Ask for the joint positions that bring the tool beside other joint positions' place, not turned."""
+
+    asked: ClassVar[str] = "for the way to a place beside"
+    joints_rad: Six
+    offset_mm: Position
+    """Along the tool's own x, y and z."""
 
 
 class Move(Message):
@@ -67,6 +77,8 @@ class Outcome(Message):
 
     done: bool
     words: str = ""
+    joints_rad: Six | None = None
+    """What was asked for, of `Beside`."""
 
 
 class Snapshot(Message):

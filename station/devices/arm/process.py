@@ -20,7 +20,8 @@ from rtde_receive import RTDEReceiveInterface
 from station.channel.server import ChannelServer
 from station.devices.arm.age import TimestampAge
 from station.devices.arm.diagnosis import PLAYING
-from station.devices.arm.messages import Beat, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.offset import beside
 from station.errors import StationError
 
 VARIABLES = [
@@ -111,6 +112,23 @@ class UrRtdeProcess:
             return control.moveJ(joints, request.speed, request.acceleration, True)  # noqa: FBT003
 
         return await self._on_arm(begin)
+
+    async def beside(self, request: Beside) -> Outcome:
+        """Ask the controller how the tool gets beside a place; not done where it cannot."""
+        joints = list(request.joints_rad)
+        found: list[float] = []
+
+        def ask() -> bool:
+            control = self._commanding()
+            x, y, z, rx, ry, rz = control.getForwardKinematics(joints, self._tool())
+            pose = list(beside((x, y, z, rx, ry, rz), request.offset_mm))
+            if not control.getInverseKinematicsHasSolution(pose, joints):
+                return False
+            found.extend(control.getInverseKinematics(pose, joints))
+            return True
+
+        outcome = await self._on_arm(ask)
+        return outcome.model_copy(update={"joints_rad": tuple(found)}) if outcome.done else outcome
 
     async def reachable(self, request: Reachable) -> Outcome:
         """Ask the controller about joint positions, and about the tool's pose that they make."""
@@ -214,6 +232,7 @@ async def serve(endpoint: str, host: str, frequency_hz: float) -> None:
             Command: process.command,
             Upload: process.upload,
             Beat: process.beat,
+            Beside: process.beside,
             Move: process.move,
             Reachable: process.reachable,
             Halt: process.halt,

@@ -1,0 +1,55 @@
+"""Second look: when an inconclusive fruit is worth another press, and how two presses on it are judged together."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from station.inspection.evidence import AT_MM
+from station.inspection.judge import Verdict
+from station.inspection.press import Measured, Press
+from station.vocabulary import Reason
+
+LOOK_AGAIN_AT = frozenset(
+    {Reason.CUT_BY_BORDER, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.AREA_NOT_RISING, Reason.NEAR_LIMIT}
+)
+"""Reasons of the measurement, for which another press may show what this one did not."""
+
+SEARCH_AGAIN_STEPS = 2
+"""So many width steps before the width at which a fruit was met, the search for it begins anew: room for one that
+rolled."""
+
+
+def looks_again(verdict: Verdict) -> bool:
+    """Whether another press may decide what is not decided yet. A fault or a size that cannot be is never one.
+
+    Args:
+        verdict: on all presses so far.
+    """
+    return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= LOOK_AGAIN_AT | {Reason.EARLY_STOP}
+
+
+def together(presses: Sequence[Press]) -> Press:
+    """Presses on one fruit as one: at each closing the mean of what is trusted, else the later one's.
+
+    What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean.
+
+    Args:
+        presses: in order, at least one.
+
+    Returns:
+        The last one, with its onset and as far as it has come, and these areas.
+    """
+    *earlier, last = presses
+    for before in earlier:
+        last = replace(last, points=tuple(_with(point, before.points) for point in last.points))
+    return last
+
+
+def _with(point: Measured, earlier: Sequence[Measured]) -> Measured:
+    """A point with what an earlier press showed at the same closing."""
+    other = next((each for each in earlier if abs(each.closing_mm - point.closing_mm) <= AT_MM), None)
+    if other is None or other.flags:
+        return point
+    if point.flags:
+        return replace(other, closing_mm=point.closing_mm)
+    mean_mm2, mean_px = (point.area_mm2 + other.area_mm2) / 2, (point.area_px + other.area_px) // 2
+    return replace(point, area_mm2=mean_mm2, area_px=mean_px)

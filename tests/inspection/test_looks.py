@@ -1,0 +1,105 @@
+"""The second look: when it is made, and what two presses on one fruit say together."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from station.inspection.fruit_size import FruitSize
+from station.inspection.judge import judge
+from station.inspection.looks import looks_again, together
+from station.inspection.press import Flag, Measured, Press
+from station.settings.recipe import load_recipe
+from station.vocabulary import Reason
+
+RECIPE = load_recipe(Path(__file__).resolve().parents[2] / "recipes" / "blueberry.yaml")
+COUNT_MM = 0.375
+CLOSINGS_MM = (0.0, 3 * COUNT_MM, 5 * COUNT_MM, 8 * COUNT_MM)
+SOUND_MM2 = (2.0, 10.0, 16.5, 26.0)
+
+
+def press(areas_mm2=SOUND_MM2, *flags: Flag, onset_mm: float = 14.0, **changes) -> Press:
+    """A blueberry's press up to its last threshold; the flags are the last point's."""
+    points = tuple(
+        Measured(closing_mm, area_mm2, round(area_mm2 * 1400), 0.9)
+        for closing_mm, area_mm2 in zip(CLOSINGS_MM, areas_mm2, strict=False)
+    )
+    points = (*points[:-1], replace(points[-1], flags=frozenset(flags)))
+    return replace(Press(onset_mm, 0.1, points, size=FruitSize(14.5)), **changes)
+
+
+def at_3_mm(measured: Press) -> Measured:
+    return measured.points[-1]
+
+
+def near() -> Press:
+    """A press whose area at 3 mm is within the limit, but not surely."""
+    limit_mm2 = judge(press(), RECIPE).areas[0].limit_mm2
+    assert limit_mm2 is not None
+    return press(tuple(0.99 * limit_mm2 / SOUND_MM2[-1] * area_mm2 for area_mm2 in SOUND_MM2))
+
+
+class TestLooksAgain:
+    @pytest.mark.parametrize("flag", [Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE, Flag.SATURATED, Flag.UNDECIDED])
+    def test_where_the_measurement_did_not_tell_enough(self, flag):
+        verdict = judge(press(SOUND_MM2, flag), RECIPE)
+        assert verdict.outcome == "NO_RESULT"
+        assert looks_again(verdict)
+
+    def test_near_the_limit(self):
+        verdict = judge(near(), RECIPE)
+        assert verdict.reasons == (Reason.NEAR_LIMIT,)
+        assert looks_again(verdict)
+
+    @pytest.mark.parametrize("outcome", ["PASS", "FAIL"])
+    def test_what_is_decided_is_not_pressed_again(self, outcome):
+        verdict = judge(press() if outcome == "PASS" else press((2.0, 30.0, 50.0, 80.0)), RECIPE)
+        assert verdict.outcome == outcome
+        assert not looks_again(verdict)
+
+    @pytest.mark.parametrize("fault", [Reason.CAMERA_FAULT, Reason.LATE, Reason.REFERENCE_BAD, Reason.CALLED_OFF])
+    def test_a_fault_is_no_reason_to_press_again_also_beside_one(self, fault):
+        doubtful = press(SOUND_MM2, Flag.CUT_BY_BORDER, interruptions=(fault,))
+        verdict = judge(doubtful, RECIPE)
+        assert Reason.CUT_BY_BORDER in verdict.reasons
+        assert not looks_again(verdict)
+
+    @pytest.mark.parametrize("wrong", [{"size": FruitSize(40.0)}, {"onset_mm": 40.0}, {"onset_mm": None, "points": ()}])
+    def test_nor_is_another_fruits_size_a_wrong_width_or_nothing(self, wrong):
+        assert not looks_again(judge(replace(press(SOUND_MM2, Flag.SATURATED), **wrong), RECIPE))
+
+
+class TestTogether:
+    @pytest.mark.parametrize(
+        ("first", "second", "area_mm2"),
+        [((30.0,), (34.0,), 32.0), ((30.0, Flag.SATURATED), (34.0,), 34.0), ((30.0,), (34.0, Flag.SATURATED), 30.0)],
+    )
+    def test_the_mean_of_what_is_trusted(self, first, second, area_mm2):
+        one, other = (press((2.0, 10.0, 16.5, area), *flags) for area, *flags in (first, second))
+        point = at_3_mm(together([one, other]))
+        assert (point.area_mm2, point.area_px, point.flags) == (area_mm2, round(area_mm2 * 1400), frozenset())
+
+    def test_two_doubtful_ones_stay_doubtful(self):
+        one, other = press((30.0,), Flag.SATURATED), press((34.0,), Flag.CUT_BY_BORDER)
+        [point] = together([one, other]).points
+        assert (point.area_mm2, point.flags) == (34.0, {Flag.CUT_BY_BORDER})
+
+    def test_closings_are_the_same_where_a_gripper_cannot_tell_them_apart(self):
+        later = press((2.0, 10.0, 16.5, 30.0))
+        rounded = replace(later, points=tuple(replace(p, closing_mm=p.closing_mm + 1e-9) for p in later.points))
+        assert at_3_mm(together([press(), rounded])).area_mm2 == 28.0
+        a_count_on = replace(later, points=tuple(replace(p, closing_mm=p.closing_mm + COUNT_MM) for p in later.points))
+        assert at_3_mm(together([press(), a_count_on])).area_mm2 == 30.0
+
+    def test_the_later_press_says_onset_faults_and_how_far_it_has_come(self):
+        later = press(SOUND_MM2[:2], onset_mm=13.6, interruptions=(Reason.CAMERA_FAULT,))
+        both = together([press(), later])
+        assert (both.onset_mm, both.interruptions, len(both.points)) == (13.6, (Reason.CAMERA_FAULT,), 2)
+
+    def test_one_press_is_itself(self):
+        assert together([press()]) == press()
+
+    def test_two_presses_near_the_limit_decide_by_their_mean(self):
+        doubtful = near()
+        assert judge(together([doubtful, press()]), RECIPE).outcome == "PASS"
+        assert judge(together([doubtful, doubtful]), RECIPE).reasons == (Reason.NEAR_LIMIT,)

@@ -1,0 +1,38 @@
+"""Centring over the twin's wire: a fruit laid off the middle is cut by the border where it lies, and passes centred."""
+
+import asyncio
+
+import pytest
+
+from station.channel.line import CommandName
+from station.inspection.states import State
+
+RIGHT_MM, DOWN_MM = 1.0, 0.8
+
+
+@pytest.mark.timeout(300)
+def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_passes(bench):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
+            async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated at home
+                while cell.phase is not State.IDLE:
+                    await asyncio.sleep(0.1)
+            cell.lay("strawberry", 1, x_mm=RIGHT_MM, y_mm=DOWN_MM)
+            sensor_mm = []
+            cell.at(State.JUDGING, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))
+            outcome = await cell.line.inspect()
+            await cell.line.ready()
+            record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+            return outcome, record.judged, sensor_mm, cell.twin.world.sensor_mm()
+
+    outcome, judged, [sensor_mm], at_last = asyncio.run(scenario())
+    assert outcome.outcome == "PASS", (judged.explanation, judged.measures)
+    measures = judged.measures
+    assert measures["centring"] == "moved"
+    assert (measures["off_right_mm"], measures["off_down_mm"]) == pytest.approx((RIGHT_MM, DOWN_MM), abs=0.4)
+    assert sensor_mm == pytest.approx((measures["moved_right_mm"], measures["moved_down_mm"]), abs=0.03)
+    assert measures["left_off_mm"] < 0.6
+    assert "looks" not in measures, "one press decided"
+    assert {"opening_again", "centring"} <= set(judged.phases_s)
+    assert at_last is None, "the arm is home again"

@@ -1,0 +1,71 @@
+"""A second look over the twin's wire: an inconclusive fruit is pressed once more, and judged by both presses."""
+
+import asyncio
+
+import pytest
+
+from station.inspection.states import State
+from station.records.database import reading, records_folder
+from station.records.report import described
+from station.vocabulary import Reason
+from station.whatif.replay import recipe_of_snapshot, replay
+from station.whatif.stored import read_stored, snapshots
+
+OFF_MM = 1.0
+
+
+@pytest.fixture
+def inspected(bench):
+    """A strawberry laid off the middle; what is done while the jaws open again; its outcome and record."""
+
+    def run(meanwhile):
+        async def scenario():
+            async with bench() as cell:
+                await cell.choose("strawberry")
+                cell.lay("strawberry", 1, x_mm=OFF_MM)
+                await cell.line.ready()
+                openings = []
+                cell.at(State.OPENING_AGAIN, lambda: (openings.append(cell.phase), meanwhile(cell)))
+                outcome = await cell.line.inspect()
+                record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+                return outcome, record, openings
+
+        return asyncio.run(scenario())
+
+    return run
+
+
+@pytest.mark.timeout(180)
+def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(inspected, tmp_path):
+    outcome, record, openings = inspected(lambda cell: cell.lay("strawberry", 1))
+    judged = record.judged
+    assert openings == [State.OPENING_AGAIN], judged.explanation
+    assert outcome.outcome == "PASS", judged.explanation
+    assert judged.measures["looks"] == 2
+    assert "border cuts the contact" in judged.measures["first_look"]
+    assert not any("cut_by_border" in point.flags for point in judged.curve)
+    assert judged.phases_s["opening_again"] > 0
+    shown = described(record)
+    assert "Pressed twice, since the first press did not decide: At " in shown
+    assert "first_look_press" not in shown
+    with reading(records_folder(tmp_path / "home")) as connection:
+        [stored] = read_stored(connection, [outcome.sequence], tmp_path, with_images=False)
+        [own] = map(recipe_of_snapshot, snapshots(connection, "strawberry").values())
+    assert own is not None
+    assert stored.first is not None
+    assert any("cut_by_border" in point.flags for point in stored.first.points)
+    again = replay(stored, own, own)
+    assert (again.after, again.faithful) == ("PASS", True)
+    once = own.model_copy(update={"press": own.press.model_copy(update={"looks": 1})})
+    assert replay(stored, own, once).after == "NO_RESULT", "the first press alone"
+
+
+@pytest.mark.timeout(180)
+def test_a_fruit_is_pressed_twice_at_most_and_a_fault_on_the_way_is_the_reason(inspected):
+    outcome, record, openings = inspected(lambda _cell: None)
+    assert (outcome.outcome, record.judged.measures["looks"]) == ("NO_RESULT", 2)
+    assert Reason.CUT_BY_BORDER in outcome.reasons
+    assert len(openings) == 1
+
+    outcome, record, _ = inspected(lambda cell: cell.twin.world.remove())
+    assert (outcome.outcome, outcome.reasons) == ("NO_RESULT", (Reason.NO_CONTACT,))
