@@ -53,6 +53,8 @@ PHASES = {
     "reference": "reference",
     "approaching": "approach",
     "closing_to_onset": "onset",
+    "opening_again": "onset",
+    "centring": "onset",
     "measuring_last": "last measurement",
     "awaiting_measure_last": "last measurement",
     "judging": "judging and recording",

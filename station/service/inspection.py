@@ -170,6 +170,7 @@ class Inspection:
             measures={
                 **self.measures,
                 **first_look_measures(self.earlier, self.first_verdict),
+                "closings": self.closings,
                 "onset_mm": onset_mm,
                 "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
                 "mm_per_px": self.mm_per_px,
