@@ -210,6 +210,20 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
+def roomy(settings_file: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
+    """The same with a limit for strawberries that a large sound one keeps without its size."""
+
+    def write(**service: Any) -> Path:
+        file, recipe = settings_file(**service), tmp_path / "recipes" / "strawberry.yaml"
+        values = json.loads(recipe.read_text())
+        values["damage"]["area"][-1]["area_mm2"] = 140
+        recipe.write_text(json.dumps(values))
+        return file
+
+    return write
+
+
+@pytest.fixture
 def line_client() -> type[LineClient]:
     """What the PLC interface does, by hand, over a channel."""
     return LineClient

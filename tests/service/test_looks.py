@@ -15,12 +15,12 @@ OFF_MM = 1.0
 
 
 @pytest.fixture
-def inspected(bench):
+def inspected(bench, roomy):
     """A strawberry laid off the middle; what is done while the jaws open again; its outcome and record."""
 
     def run(meanwhile):
         async def scenario():
-            async with bench() as cell:
+            async with bench(roomy()) as cell:
                 await cell.choose("strawberry")
                 cell.lay("strawberry", 1, x_mm=OFF_MM)
                 await cell.line.ready()
