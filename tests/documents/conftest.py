@@ -24,6 +24,7 @@ from station.records.records import Records
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe import find_recipe
 from station.settings.records import RecordsSettings
+from station.twin.damage import Damage
 from station.twin.digit.press import PressOptions, PressSequence, render_press
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX
@@ -200,7 +201,8 @@ async def _inspect(folder: Path, fruit: int) -> None:
     records = await Records.open(folder, RecordsSettings(deadline_s=30.0, free_reserve_mb=1), "boot")
     try:
         for number in range(fruit):
-            drawn = replace(draw_fruit("strawberry", 71 + number), bruised=number % 4 == 3)
+            # A little flatter than severe damage, so that one is surely over its limit.
+            drawn = draw_fruit("strawberry", 71 + number, bruised=number % 4 == 3, damage=Damage(0.45, 1.7))
             closings_mm = [TOUCHED_MM + step * recipe.steps.step_mm for step in range(MOST_STEPS)]
             shown = render_press(drawn, number, closings_mm, PressOptions(step_s=0.3, references=3))
             length_mm = round(drawn.length_mm)
