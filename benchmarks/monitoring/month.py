@@ -183,6 +183,8 @@ class Line:
             area_mm2=_AREAS_MM2[kind] * spread if judged else None, closing_mm=4.0 * spread if judged else None,
         )  # fmt: skip
         self._metrics.inspection(kind, told, PHASES, _DEADLINE_S)
+        if not judged:
+            self._metrics.looked_again(kind)
         self._metrics.frame("good", _FRAMES)
         if self._random.random() < 0.01:
             self._metrics.frame("repeated")

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 
 from pydantic import BaseModel, ConfigDict
 
+from station.inspection.evidence import AT_MM
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.reading import read_inspection
@@ -178,8 +179,10 @@ def _unlike_record(rig: Rig, sequence: int, shown: Shown) -> list[str]:
         wrong.append(f"result {sequence} is not acknowledged in the records")
     if shown.outcome == "PASS":
         judged = record.judged
-        areas = [] if judged is None else [point.area_mm2 for point in judged.curve]
-        whole = len(areas) >= rig.recipe.steps.number and None not in areas
+        curve = () if judged is None else judged.curve
+        reached_mm = max((point.closing_mm or 0.0 for point in curve), default=0.0)
+        enough = reached_mm + AT_MM >= rig.recipe.damage.area[-1].closing_mm
+        whole = enough and all(point.area_mm2 is not None for point in curve)
         if judged is None or judged.outcome != "PASS" or judged.partial or not whole:
             wrong.append(f"result {sequence} is PASS without a whole curve that was judged so")
     return wrong

@@ -261,6 +261,10 @@ def _quick_recipes(folder: Path) -> Path:
     values["steps"] |= {"number": 6, "result_closings_mm": [3], "closing_limit_mm": 6.0}
     values["imaging"] |= {"settle_s": 0.05, "frames_per_step": 2}
     values["damage"]["growth_mm2_per_mm"] = 60
+    # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
+    values["damage"].pop("size", None)
+    values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
+    values["damage"]["area"][-1]["area_mm2"] = 140
     values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
     values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
     (folder / f"{FRUIT}.yaml").write_text(json.dumps(values), encoding="utf-8")

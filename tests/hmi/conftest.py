@@ -108,6 +108,9 @@ def quick_recipes(folder: Path) -> Path:
         values["steps"] |= {"number": 4, "result_closings_mm": [3], "closing_limit_mm": 4.5}
         values["imaging"] |= {"settle_s": 0.2, "frames_per_step": 1, "reference_frames": 3}
         values["damage"]["growth_mm2_per_mm"] = 60
+        # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
+        values["damage"].pop("size", None)
+        values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
         values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
         values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
         (folder / f"{name}.yaml").write_text(json.dumps(values))

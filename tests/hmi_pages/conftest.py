@@ -97,6 +97,10 @@ def quick_recipes(folder: Path) -> Path:
                 "imaging.frames_per_step": 1,
                 "imaging.reference_frames": 3,
                 "damage.growth_mm2_per_mm": 60,
+                # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
+                "damage.size": None,
+                "damage.uncertainty.coverage": 0.6,
+                "damage.uncertainty.repeatability": [{"closing_mm": 3.0, "relative": 0.03}],
                 "early_stop.area_mm2": 150,
                 "early_stop.growth_mm2_per_mm": 90,
             }
