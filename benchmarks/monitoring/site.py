@@ -158,7 +158,7 @@ def _calibrated(home: Path, serial: str) -> None:
     calibration = Calibration(
         id=stamp(now - timedelta(days=20)), serial=serial, unit="twin", operator="demonstration", simulated=True,
         program="0", ball_mm=24.0, holder_mm=18.0, width_px=240, height_px=320, mm_per_px=0.0266,
-        scale_uncertainty=0.15, scale_measured=False, places=(), curve=(), onset_mm=42.0, zero_mm=0.0,
+        scale_uncertainty=0.02, scale_measured=True, places=(), curve=(), onset_mm=42.0, zero_mm=0.0,
         noise=Noise(pixel_levels=(1.0, 1.0, 1.0), gate=0.5, gate_factor=1.0, drift_levels=1.0),
         light_levels=(90.0, 90.0, 90.0), sharpness_levels=2.0,
         field=FieldMap(rows=1, columns=1, light_levels=((90.0, 90.0, 90.0),), noise_levels=(1.0,)), checks=(),

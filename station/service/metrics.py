@@ -85,6 +85,7 @@ class Metrics:
         self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
         self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
         self._of("late", fruit=fruit).inc(outcome.late)
+        self._of("looks", fruit=fruit).inc(0)  # a rate needs the count from before the first
         if deadline_s is not None:
             self._of("deadline", fruit=fruit).set(deadline_s)
         if outcome.area_mm2 is not None:

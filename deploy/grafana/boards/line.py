@@ -56,6 +56,12 @@ RATES = (
         (f"60 * sum by (reason) (rate(station_inspections_total{{{DIVERTED}}}[$__rate_interval]))", "{{reason}}"),
     ),
     prom(
+        "lines", "Pressed once more", "short",
+        "Fruit a minute that one press did not decide; each takes a press more.",
+        UNJUDGED,
+        (f"60 * sum by (fruit) (rate(station_second_looks_total{{{HERE}}}[$__rate_interval]))", "{{fruit}}"),
+    ),
+    prom(
         "lines", "Not judged and its band", "percentunit",
         "Without a result, over one hour, with the last seven days and what chance allows on top of them.",
         UNJUDGED,
