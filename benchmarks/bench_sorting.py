@@ -25,7 +25,7 @@ from station.twin.fruit import Kind
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, README = ROOT / "docs" / "sorting.md", ROOT / "README.md"
 CACHE = ROOT / "state" / "sorting"
-AS_PLACED = Practice(centring=False, second_look=False)
+AS_PLACED = Practice(centring=False, second_press=False)
 OF_EACH_GROUP = 100
 """Fruit on which the practices are compared: without a size nearly all are pressed twice."""
 

@@ -184,7 +184,7 @@ class Line:
         )  # fmt: skip
         self._metrics.inspection(kind, told, PHASES, _DEADLINE_S)
         if not judged:
-            self._metrics.looked_again(kind)
+            self._metrics.pressed_again(kind)
         self._metrics.frame("good", _FRAMES)
         if self._random.random() < 0.01:
             self._metrics.frame("repeated")

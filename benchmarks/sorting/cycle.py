@@ -1,4 +1,4 @@
-"""The station's decision on one fruit, closing by closing: centre, press step by step, judge, look twice.
+"""The station's decision on one fruit, closing by closing: centre, press step by step, judge, press twice.
 
 The functions say what the service's cycle does with measured steps; here the steps come from a cache.
 """
@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import early_stop, judge
-from station.inspection.looks import looks_again, together
 from station.inspection.press import Flag, Measured, Press
+from station.inspection.second_press import needs_second_press, together
 from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
@@ -33,7 +33,7 @@ class Practice:
     size: str = "length"
     """`length` by the grader, `class`, or `none`."""
     centring: bool = True
-    second_look: bool = True
+    second_press: bool = True
     calibrated: bool = True
 
 
@@ -89,7 +89,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
         forces.append(pressed.steps[0].force_n)
         shift_mm = move
         pressed = close()
-    most_looks = recipe.press.looks if practice.second_look else 1
+    most_presses = recipe.press.attempts if practice.second_press else 1
     while True:
         if presses:
             last = pressed.steps[len(presses[-1].points) - 1]
@@ -101,7 +101,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
         steps += max(0, used - 1)
         forces += [step.force_n for step in pressed.steps[:used]]
         verdict = judge(together(presses), recipe)
-        if len(presses) >= most_looks or not looks_again(verdict):
+        if len(presses) >= most_presses or not needs_second_press(verdict):
             break
     return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, max(forces))
 

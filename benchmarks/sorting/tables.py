@@ -16,8 +16,8 @@ PRACTICES = {
     "a size class in place of the length": Practice(size="class"),
     "no size": Practice(size="none"),
     "no centring": Practice(centring=False),
-    "no second look": Practice(second_look=False),
-    "no size, no centring, no second look": Practice(size="none", centring=False, second_look=False),
+    "no second press": Practice(second_press=False),
+    "no size, no centring, no second press": Practice(size="none", centring=False, second_press=False),
     "all, but a unit that was never calibrated": Practice(calibrated=False),
 }
 """What of the station is used, in the order of the table."""
@@ -77,7 +77,7 @@ def errors(inspected: Iterable[Inspected]) -> list[str]:
 
 
 def worth(by_practice: Mapping[str, Iterable[Inspected]]) -> list[str]:
-    """What size, centring, second look and calibration are each worth: both errors without it.
+    """What size, centring, second press and calibration are each worth: both errors without it.
 
     Args:
         by_practice: the same fruit, inspected by each practice.

@@ -41,7 +41,7 @@ class Event(StrEnum):
     JUDGED_ACCEPT = "judged_accept"
     JUDGED_REJECT = "judged_reject"
     """FAIL or NO_RESULT."""
-    LOOK_AGAIN = "look_again"
+    PRESS_AGAIN = "press_again"
     """The press was inconclusive, and the recipe lets the fruit be pressed once more."""
     RECORDED = "recorded"
     PLACED = "placed"
@@ -110,7 +110,7 @@ class Action(StrEnum):
     HALT = "halt"
     """Stop arm and gripper where they are and forget what was under way, but for a write: its events come no more."""
     JUDGE = "judge"
-    """Judge all presses so far together: JUDGED_ACCEPT, JUDGED_REJECT or LOOK_AGAIN."""
+    """Judge all presses so far together: JUDGED_ACCEPT, JUDGED_REJECT or PRESS_AGAIN."""
     CLOSE_AS_NO_RESULT = "close_as_no_result"
     """The outcome is NO_RESULT, with the reason of the event and what was measured so far."""
     RECORD = "record"
@@ -249,7 +249,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.MEASURING_LAST,), (E.MEASURED, E.EARLY_STOP), S.JUDGING, (A.JUDGE,)),
     Row((*MEASURING, S.AWAITING_MEASURE, S.AWAITING_MEASURE_LAST), (E.EARLY_STOP,), S.JUDGING, (A.HALT, A.JUDGE)),
     Row((S.CLOSING_TO_ONSET,), (E.OFF_MIDDLE,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
-    Row((S.JUDGING,), (E.LOOK_AGAIN,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
+    Row((S.JUDGING,), (E.PRESS_AGAIN,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
     Row((S.OPENING_AGAIN,), (E.JAWS_OPEN,), S.CENTRING, (A.CENTRE,)),
     Row((S.CENTRING,), (E.CENTRED,), S.CLOSING_TO_ONSET, (A.CLOSE_TO_ONSET,)),
     Row((S.JUDGING,), (E.JUDGED_ACCEPT,), S.RECORDING_ACCEPT, (A.RECORD,)),

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.inspection.cycle import Event
-from station.inspection.looks import SEARCH_AGAIN_STEPS
+from station.inspection.second_press import SEARCH_AGAIN_STEPS
 from station.inspection.states import State
 from station.settings.recipe_model import Recipe
 
@@ -58,6 +58,14 @@ class Late(NamedTuple):
     allowed_s: float
 
 
+_OPENING = (
+    State.OPENING_AGAIN,
+    State.RELEASING,
+    State.RESETTING,
+    State.OPENING_TO_CLEAR,
+    State.OPENING_HELD,
+    State.OPENING_UNRECORDED,
+)
 _WAITS_FOR = {
     Event.ARM_FAULT: (
         State.APPROACHING,
@@ -71,12 +79,7 @@ _WAITS_FOR = {
         State.CLOSING_TO_ONSET,
         State.MOVING,
         State.MOVING_MEASURING,
-        State.OPENING_AGAIN,
-        State.RELEASING,
-        State.RESETTING,
-        State.OPENING_TO_CLEAR,
-        State.OPENING_HELD,
-        State.OPENING_UNRECORDED,
+        *_OPENING,
         State.PLACING_ACCEPT,
         State.PLACING_REJECT,
     ),
@@ -116,7 +119,7 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """
     expected_s = _expected(recipe, pace)
     step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
-    look_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
+    press_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
     # To where the fruit was met, and as much again in finer steps.
     again_s = (
         expected_s[State.OPENING_AGAIN]
@@ -127,8 +130,8 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
         expected_s[State.REFERENCE]
         + expected_s[State.APPROACHING]
         + expected_s[State.CLOSING_TO_ONSET]
-        + look_s
-        + (recipe.press.looks - 1) * (again_s + look_s)
+        + press_s
+        + (recipe.press.attempts - 1) * (again_s + press_s)
         + (0.0 if recipe.press.centre_from_mm is None or not pace.arm_move_s else again_s)
         + pace.record_s
     )
@@ -185,17 +188,6 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
         State.PLACING_REJECT: placing_s,
         State.RECOVERING: _RECOVERY_S,
     }
-    expected_s |= dict.fromkeys(_opening_states(), opening_s)
+    expected_s |= dict.fromkeys(_OPENING, opening_s)
     expected_s |= dict.fromkeys((State.RETREATING, State.HOMING, State.HOMING_UNRECORDED), 2 * pace.arm_move_s)
     return expected_s | dict.fromkeys(_WAITS_FOR[Event.RECORDS_FAULT], pace.record_s)
-
-
-def _opening_states() -> tuple[State, ...]:
-    return (
-        State.OPENING_AGAIN,
-        State.RELEASING,
-        State.RESETTING,
-        State.OPENING_TO_CLEAR,
-        State.OPENING_HELD,
-        State.OPENING_UNRECORDED,
-    )

@@ -27,7 +27,8 @@ An area at its growth limit changes by 1.2 mm² over this, a quarter of what rep
 _WINDOW_POINTS = 4
 """Of which the median of pairwise slopes bears one that is wrong."""
 _WINDOW_MM = 2.0
-_LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
+LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
+"""Flags of an area that the contact surely reaches."""
 _LEAST_NOISE = 0.02
 """Share of the largest area threshold below which a falling area is noise."""
 
@@ -102,7 +103,7 @@ class Evidence:
 
     def bounds(self, point: Measured) -> bool:
         """Whether the area is surely no smaller: a contact that the border cuts, or whose edge was lost, is larger."""
-        return self.doubts(point) <= _LOWER_BOUNDS and point not in self.falling
+        return self.doubts(point) <= LOWER_BOUNDS and point not in self.falling
 
     def doubts(self, point: Measured) -> frozenset[Flag]:
         """The point's flags, with those that follow from its values."""

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from station.channel.line import Outcome
+from station.records.first_press import first_press_findings, is_first_press
 from station.records.judgement import budget_rows, is_judgement, judgement_sentence
-from station.records.looks import is_look, why_twice
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.reading import Summary
 from station.records.wording import printable, sentence, size_sentence, sparkline
@@ -84,7 +84,7 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
             yield f"  {told}"
         for text in judged.explanation:
             yield f"  {text}"
-        if why := why_twice(judged.measures):
+        if why := first_press_findings(judged.measures):
             yield f"  Pressed twice, since the first press did not decide: {why}"
         for reason in judged.reasons:
             yield f"  {reason}: {sentence(reason)}"
@@ -132,7 +132,9 @@ def _judged(judged: InspectionRecord) -> Iterator[str]:
     if budget:
         yield _field("uncertainty", "of the judged area, each component's standard uncertainty")
         yield "\n".join(f"  {line}" for line in _columns(budget).splitlines())
-    others = {name: value for name, value in judged.measures.items() if not (is_judgement(name) or is_look(name))}
+    others = {
+        name: value for name, value in judged.measures.items() if not (is_judgement(name) or is_first_press(name))
+    }
     for title, values in (("measures", others), ("phases, s", judged.phases_s)):
         if values:
             yield _field(title, _pairs(values))

@@ -11,7 +11,7 @@ from station.devices.camera.interface import Camera, Frame, FrameFault, Image
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
 from station.errors import StationError
-from station.inspection.looks import SEARCH_AGAIN_STEPS
+from station.inspection.second_press import SEARCH_AGAIN_STEPS
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 from station.vision.step import mean_image

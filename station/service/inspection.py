@@ -7,10 +7,10 @@ from station.channel.line import Outcome
 from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Verdict
-from station.inspection.looks import together
 from station.inspection.press import Flag, Measured, Press
+from station.inspection.second_press import together
+from station.records.first_press import first_press_measures
 from station.records.judgement import judgement_measures
-from station.records.looks import first_look_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.eye import Seen
 from station.service.grip import GripStep
@@ -77,7 +77,7 @@ class Inspection:
         return self.steps[0].move.width_mm - len(self.steps) * self.active.recipe.steps.step_mm
 
     @property
-    def looks(self) -> int:
+    def presses_made(self) -> int:
         """How many presses were begun, the present one counted."""
         return 1 + len(self.earlier)
 
@@ -98,7 +98,7 @@ class Inspection:
         if why and why not in self.explanation:
             self.explanation.append(why)
 
-    def look_again(self) -> None:
+    def press_again(self) -> None:
         """Begin another press on the fruit. Of the one before stays what was measured, not its images."""
         self.first_verdict = self.verdict
         self.earlier.append(self._latest())
@@ -169,7 +169,7 @@ class Inspection:
             phases_s=dict(self.phases_s),
             measures={
                 **self.measures,
-                **first_look_measures(self.earlier, self.first_verdict),
+                **first_press_measures(self.earlier, self.first_verdict),
                 "closings": self.closings,
                 "onset_mm": onset_mm,
                 "onset_uncertainty_mm": self.press().onset_uncertainty_mm,

@@ -14,7 +14,7 @@ from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
-from station.inspection.looks import looks_again
+from station.inspection.second_press import needs_second_press
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
 from station.service.calibrated import Calibrated
@@ -256,11 +256,11 @@ class Inspector:
             )
         recipe = now.active.recipe
         now.verdict = judge(now.press(), recipe)
-        if now.looks < recipe.press.looks and looks_again(now.verdict):
+        if now.presses_made < recipe.press.attempts and needs_second_press(now.verdict):
             self._sets_out(now, self._off_middle(now))
-            now.look_again()
-            self._metrics.looked_again(recipe.name)
-            return Event.LOOK_AGAIN
+            now.press_again()
+            self._metrics.pressed_again(recipe.name)
+            return Event.PRESS_AGAIN
         now.outcome_name = now.verdict.outcome
         return Event.JUDGED_ACCEPT if now.outcome_name == "PASS" else Event.JUDGED_REJECT
 

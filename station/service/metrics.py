@@ -85,7 +85,7 @@ class Metrics:
         self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
         self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
         self._of("late", fruit=fruit).inc(outcome.late)
-        self._of("looks", fruit=fruit).inc(0)  # a rate needs the count from before the first
+        self._of("second_presses", fruit=fruit).inc(0)  # a rate needs the count from before the first
         if deadline_s is not None:
             self._of("deadline", fruit=fruit).set(deadline_s)
         if outcome.area_mm2 is not None:
@@ -95,9 +95,9 @@ class Metrics:
         for phase, seconds in (phases_s or {}).items():
             self._of("phase", phase=phase).observe(seconds)
 
-    def looked_again(self, fruit: str) -> None:
+    def pressed_again(self, fruit: str) -> None:
         """Count a fruit that is pressed once more, by the recipe's name."""
-        self._of("looks", fruit=fruit).inc()
+        self._of("second_presses", fruit=fruit).inc()
 
     def frame(self, state: str = "good", number: int = 1) -> None:
         """Count frames: `good`, `dropped`, or the name of a `FrameFault`."""

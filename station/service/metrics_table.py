@@ -74,8 +74,8 @@ TABLE: dict[str, Row] = {
         ("fruit", "outcome", "reason"),
         "Inspections whose outcome the PLC was given, by the first reason; none where passed",
     ),
-    "looks": Row(
-        "station_second_looks", "counter", ("fruit",), "Fruit that one press did not decide, pressed once more"
+    "second_presses": Row(
+        "station_second_presses", "counter", ("fruit",), "Fruit that one press did not decide, pressed once more"
     ),
     "late": Row("station_inspections_late", "counter", ("fruit",), "Inspections that ended after their deadline"),
     "deadline": Row(

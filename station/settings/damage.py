@@ -240,7 +240,7 @@ class DamageThresholds(Settings):
         gt=0.0,
         le=500.0,
     )
-    # The three below are left out of a recipe's values where they are as in recipes written before them: such a
+    # The two below are left out of a recipe's values where they are as in recipes written before them: such a
     # recipe keeps its content hash, and with it its approval.
     size: Annotated[SizeOfFruit | None, Field(exclude_if=lambda size: size is None)] = setting(
         None,

@@ -175,9 +175,9 @@ class PressPlan(Settings):
         ge=0.2,
         le=5.0,
     )
-    looks: int = setting(
+    attempts: int = setting(
         1,
-        title="Looks",
+        title="Attempts",
         description="With 2, a fruit of which one press did not tell enough (near a limit, cut by the border, too "
         "little confidence) is let go and pressed once more, and both presses are judged together.",
         ge=1,

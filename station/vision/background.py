@@ -22,8 +22,8 @@ _HIGHEST_COSINE = 4
 _ITERATIONS = 3
 _LEAST_KNOWN = 0.05
 _TUKEY_WIDTH = 3.0
-_LEAST_SPREAD_LEVELS = 0.01
-"""No division by the spread of an image without noise."""
+_LEAST_SPREAD_LEVELS = 0.5
+"""What the rounding of pixels to whole levels can hide; real sensors' noise is more."""
 _STRIP_PX = 5
 """At half the working size."""
 _MEDIAN_SIDE = 20

@@ -81,7 +81,7 @@ class Constants:
     # Texture
     coherence_window: float = constant(0.13, "of the radius", "window of the coherence", "fit")
     skin_left_out: float = constant(0.25, "of the region", "the weakest places say nothing of the texture", "fit")
-    smooth_small: float = constant(0.65, "", "coherence from which a small body is smooth", "fit")
+    smooth_small: float = constant(0.6, "", "coherence from which a small body is smooth", "fit")
     smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")

@@ -12,8 +12,8 @@ from typing import Literal
 from pydantic import ValidationError
 
 from station.inspection.judge import Verdict, early_stop, judge
-from station.inspection.looks import looks_again, together
 from station.inspection.press import Press
+from station.inspection.second_press import needs_second_press, together
 from station.settings.recipe_form import upgrade
 from station.settings.recipe_model import Recipe
 from station.vocabulary import OutcomeName
@@ -134,12 +134,12 @@ def _judged(
         draft: the recipe to try.
         faithful: as `Replayed` has it.
     """
-    for looks in range(1, len(presses) + 1):
-        then, now = (together(each) for each in zip(*presses[:looks], strict=True))
+    for pressed in range(1, len(presses) + 1):
+        then, now = (together(each) for each in zip(*presses[:pressed], strict=True))
         verdict = _verdict(then, now, own, draft)
         if isinstance(verdict, str):
             return _undecidable(stored, verdict, faithful=faithful)
-        if looks >= draft.press.looks or not looks_again(verdict):
+        if pressed >= draft.press.attempts or not needs_second_press(verdict):
             return _decided(stored, verdict, faithful=faithful)
     return _undecidable(stored, "the draft would have pressed the fruit once more", faithful=faithful)
 

@@ -10,10 +10,10 @@ from typing import Any
 from sqlalchemy import Connection
 
 from station.inspection.fruit_size import FruitSize
-from station.inspection.looks import together
 from station.inspection.press import Flag, Measured, Press
+from station.inspection.second_press import together
+from station.records.first_press import first_press
 from station.records.images import image_path
-from station.records.looks import first_look
 from station.vocabulary import OutcomeName, Reason
 
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
@@ -144,7 +144,7 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
         measured.get("scale_uncertainty", 0.0),
     )
     gate_factor = measured.get("gate_factor") or 1.0
-    first = first_look(measured)
+    first = first_press(measured)
     if first is not None:  # of the same fruit, by the same gripper and sensor
         first = replace(
             press,

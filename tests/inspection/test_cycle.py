@@ -153,7 +153,7 @@ def test_one_fruit_from_start_to_ready_again():
 
 AGAIN = [
     Event.OFF_MIDDLE, Event.JAWS_OPEN, Event.CENTRED, Event.ONSET_FOUND, Event.REACHED, Event.SETTLED,
-    Event.LAST_CAPTURED, Event.MEASURED, Event.LOOK_AGAIN, Event.JAWS_OPEN, Event.CENTRED,
+    Event.LAST_CAPTURED, Event.MEASURED, Event.PRESS_AGAIN, Event.JAWS_OPEN, Event.CENTRED,
 ]  # fmt: skip
 
 

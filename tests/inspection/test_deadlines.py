@@ -49,7 +49,7 @@ def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
 
 
 def test_a_second_look_has_its_time_to_let_go_and_press_again():
-    once, twice = (deadlines(changed(looks=looks), PACE).inspection_s for looks in (1, 2))
+    once, twice = (deadlines(changed(attempts=attempts), PACE).inspection_s for attempts in (1, 2))
     opening_s = PACE.stroke_mm / 20
     assert twice - once > opening_s + 12 * (1 / 20 + 0.2 + 3 / 30)
 

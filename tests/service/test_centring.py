@@ -29,7 +29,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
     outcome, judged, [sensor_mm], at_last = asyncio.run(scenario())
     assert outcome.outcome == "PASS", (judged.explanation, judged.measures)
     measures = judged.measures
-    assert (measures["centring"], measures["closings"]) == ("moved", 1 + measures.get("looks", 1))
+    assert (measures["centring"], measures["closings"]) == ("moved", 1 + measures.get("presses", 1))
     assert not any("cut_by_border" in point.flags for point in judged.curve)
     assert (measures["off_right_mm"], measures["off_down_mm"]) == pytest.approx((RIGHT_MM, DOWN_MM), abs=0.4)
     assert sensor_mm == pytest.approx((measures["moved_right_mm"], measures["moved_down_mm"]), abs=0.03)

@@ -37,7 +37,7 @@ def pressed(areas_mm2=SOUND_MM2, offset_px=(0.0, 0.0), flags=()) -> Pressed:
     return Pressed(15.9, 0.1, tuple(steps))
 
 
-class Looks:
+class Presses:
     """Closings handed out in turn, and which were asked for."""
 
     def __init__(self, *answers: Pressed | None) -> None:
@@ -100,33 +100,35 @@ class TestPressing:
 
 class TestDeciding:
     def test_one_closing_decides_a_sound_fruit_in_the_middle(self, recipe):
-        looks = Looks(pressed())
-        one = inspect(BLUEBERRY, recipe, Practice(), looks)
+        presses = Presses(pressed())
+        one = inspect(BLUEBERRY, recipe, Practice(), presses)
         assert (one.outcome, one.closings) == ("PASS", 1)
-        assert looks.asked == [Closing(BLUEBERRY, 0, (0.0, 0.0))]
+        assert presses.asked == [Closing(BLUEBERRY, 0, (0.0, 0.0))]
         assert one.most_force_n == (one.steps) / 2
 
     def test_a_contact_off_the_middle_is_centred_before_it_is_judged(self, recipe):
-        looks = Looks(pressed((9.0,) * 5, offset_px=(40.0, 0.0)), pressed())
-        one = inspect(BLUEBERRY, recipe, Practice(), looks)
+        presses = Presses(pressed((9.0,) * 5, offset_px=(40.0, 0.0)), pressed())
+        one = inspect(BLUEBERRY, recipe, Practice(), presses)
         assert (one.outcome, one.closings) == ("PASS", 2)
-        assert looks.asked[1] == Closing(BLUEBERRY, 1, (-1.05, 0.0))
-        assert inspect(BLUEBERRY, recipe, Practice(centring=False), Looks(pressed(offset_px=(40.0, 0.0)))).closings == 1
+        assert presses.asked[1] == Closing(BLUEBERRY, 1, (-1.05, 0.0))
+        assert (
+            inspect(BLUEBERRY, recipe, Practice(centring=False), Presses(pressed(offset_px=(40.0, 0.0)))).closings == 1
+        )
 
     def test_an_inconclusive_fruit_is_pressed_once_more(self, recipe):
         doubtful = pressed(flags=("low_confidence",))
-        assert inspect(BLUEBERRY, recipe, Practice(), Looks(doubtful, pressed())).outcome == "PASS"
-        assert inspect(BLUEBERRY, recipe, Practice(second_look=False), Looks(doubtful)).outcome == "NO_RESULT"
-        twice = inspect(BLUEBERRY, recipe, Practice(), Looks(doubtful, doubtful))
+        assert inspect(BLUEBERRY, recipe, Practice(), Presses(doubtful, pressed())).outcome == "PASS"
+        assert inspect(BLUEBERRY, recipe, Practice(second_press=False), Presses(doubtful)).outcome == "NO_RESULT"
+        twice = inspect(BLUEBERRY, recipe, Practice(), Presses(doubtful, doubtful))
         assert (twice.outcome, twice.reasons, twice.closings) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,), 2)
 
     def test_a_damaged_fruit_is_not(self, recipe):
-        looks = Looks(pressed((9.0, 40.0, 60.0, 80.0, 100.0)))
-        assert inspect(BLUEBERRY, recipe, Practice(), looks).outcome == "FAIL"
+        presses = Presses(pressed((9.0, 40.0, 60.0, 80.0, 100.0)))
+        assert inspect(BLUEBERRY, recipe, Practice(), presses).outcome == "FAIL"
 
     def test_what_is_not_measured_is_asked_for(self, recipe):
         with pytest.raises(Unmeasured) as missing:
-            inspect(BLUEBERRY, recipe, Practice(), Looks(pressed(offset_px=(40.0, 0.0)), None))
+            inspect(BLUEBERRY, recipe, Practice(), Presses(pressed(offset_px=(40.0, 0.0)), None))
         assert missing.value.closing == Closing(BLUEBERRY, 1, (-1.05, 0.0))
 
     @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def halved(change):
 )
 def test_what_light_does_is_background(change):
     found = fitted(change)
-    assert found.share > 0.6
+    assert found.share > 0.7
     assert np.sqrt(np.mean(np.square(left(change, found)))) < 0.5 * np.sqrt(np.mean(np.square(change)))
 
 

@@ -59,7 +59,7 @@ RATES = (
         "lines", "Pressed once more", "short",
         "Fruit a minute that one press did not decide; each takes a press more.",
         UNJUDGED,
-        (f"60 * sum by (fruit) (rate(station_second_looks_total{{{HERE}}}[$__rate_interval]))", "{{fruit}}"),
+        (f"60 * sum by (fruit) (rate(station_second_presses_total{{{HERE}}}[$__rate_interval]))", "{{fruit}}"),
     ),
     prom(
         "lines", "Not judged and its band", "percentunit",

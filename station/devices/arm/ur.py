@@ -116,7 +116,11 @@ class UrArm:
         """
         most_mm, where = self._settings.centring.most_mm, "beside the nest"
         if math.hypot(*offset_mm) > most_mm:
-            raise ArmFault(ArmCause.UNREACHABLE, f"{offset_mm} mm from the nest are more than the {most_mm:g} allowed")
+            raise ArmFault(
+                ArmCause.UNREACHABLE,
+                f"{offset_mm} mm from the nest are more than the {most_mm:g} allowed by arm.centring.most_mm; raise it "
+                "where the fingers have more room all around",
+            )
         async with self._one_way(where):
             nest = self._settings.poses.joints_rad("nest")
             found = await self._link.order(Beside(joints_rad=nest, offset_mm=offset_mm))

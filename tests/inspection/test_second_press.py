@@ -1,4 +1,4 @@
-"""The second look: when it is made, and what two presses on one fruit say together."""
+"""The second press: when it is made, and what two presses on one fruit say together."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
-from station.inspection.looks import looks_again, together
 from station.inspection.press import Flag, Measured, Press
+from station.inspection.second_press import needs_second_press, together
 from station.settings.recipe import load_recipe
 from station.vocabulary import Reason
 
@@ -44,29 +44,29 @@ class TestLooksAgain:
     def test_where_the_measurement_did_not_tell_enough(self, flag):
         verdict = judge(press(SOUND_MM2, flag), RECIPE)
         assert verdict.outcome == "NO_RESULT"
-        assert looks_again(verdict)
+        assert needs_second_press(verdict)
 
     def test_near_the_limit(self):
         verdict = judge(near(), RECIPE)
         assert verdict.reasons == (Reason.NEAR_LIMIT,)
-        assert looks_again(verdict)
+        assert needs_second_press(verdict)
 
     @pytest.mark.parametrize("outcome", ["PASS", "FAIL"])
     def test_what_is_decided_is_not_pressed_again(self, outcome):
         verdict = judge(press() if outcome == "PASS" else press((2.0, 30.0, 50.0, 80.0)), RECIPE)
         assert verdict.outcome == outcome
-        assert not looks_again(verdict)
+        assert not needs_second_press(verdict)
 
     @pytest.mark.parametrize("fault", [Reason.CAMERA_FAULT, Reason.LATE, Reason.REFERENCE_BAD, Reason.CALLED_OFF])
     def test_a_fault_is_no_reason_to_press_again_also_beside_one(self, fault):
         doubtful = press(SOUND_MM2, Flag.CUT_BY_BORDER, interruptions=(fault,))
         verdict = judge(doubtful, RECIPE)
         assert Reason.CUT_BY_BORDER in verdict.reasons
-        assert not looks_again(verdict)
+        assert not needs_second_press(verdict)
 
     @pytest.mark.parametrize("wrong", [{"size": FruitSize(40.0)}, {"onset_mm": 40.0}, {"onset_mm": None, "points": ()}])
     def test_nor_is_another_fruits_size_a_wrong_width_or_nothing(self, wrong):
-        assert not looks_again(judge(replace(press(SOUND_MM2, Flag.SATURATED), **wrong), RECIPE))
+        assert not needs_second_press(judge(replace(press(SOUND_MM2, Flag.SATURATED), **wrong), RECIPE))
 
 
 class TestTogether:
@@ -78,6 +78,14 @@ class TestTogether:
         one, other = (press((2.0, 10.0, 16.5, area), *flags) for area, *flags in (first, second))
         point = at_3_mm(together([one, other]))
         assert (point.area_mm2, point.area_px, point.flags) == (area_mm2, round(area_mm2 * 1400), frozenset())
+
+    @pytest.mark.parametrize("bound", [Flag.CUT_BY_BORDER, Flag.LOWER_BOUND])
+    @pytest.mark.parametrize("first", [True, False])
+    def test_a_fruit_is_never_judged_by_less_than_a_lower_bound(self, bound, first):
+        for area_mm2, judged_mm2 in ((31.0, 34.0), (39.0, 39.0)):
+            cut, whole = press((2.0, 10.0, 16.5, area_mm2), bound), press((2.0, 10.0, 16.5, 34.0))
+            point = at_3_mm(together([cut, whole] if first else [whole, cut]))
+            assert (point.area_mm2, point.flags) == (judged_mm2, frozenset())
 
     def test_two_doubtful_ones_stay_doubtful(self):
         one, other = press((30.0,), Flag.SATURATED), press((34.0,), Flag.CUT_BY_BORDER)

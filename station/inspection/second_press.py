@@ -1,14 +1,14 @@
-"""Second look: when an inconclusive fruit is worth another press, and how two presses on it are judged together."""
+"""Second press: when an inconclusive fruit is worth another press, and how two presses on it are judged together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from station.inspection.evidence import AT_MM
+from station.inspection.evidence import AT_MM, LOWER_BOUNDS
 from station.inspection.judge import Verdict
 from station.inspection.press import Measured, Press
 from station.vocabulary import Reason
 
-LOOK_AGAIN_AT = frozenset(
+PRESS_AGAIN_AT = frozenset(
     {Reason.CUT_BY_BORDER, Reason.LOW_CONFIDENCE, Reason.SATURATED, Reason.AREA_NOT_RISING, Reason.NEAR_LIMIT}
 )
 """Reasons of the measurement, for which another press may show what this one did not."""
@@ -18,19 +18,20 @@ SEARCH_AGAIN_STEPS = 2
 rolled."""
 
 
-def looks_again(verdict: Verdict) -> bool:
+def needs_second_press(verdict: Verdict) -> bool:
     """Whether another press may decide what is not decided yet. A fault or a size that cannot be is never one.
 
     Args:
         verdict: on all presses so far.
     """
-    return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= LOOK_AGAIN_AT | {Reason.EARLY_STOP}
+    return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= PRESS_AGAIN_AT | {Reason.EARLY_STOP}
 
 
 def together(presses: Sequence[Press]) -> Press:
     """Presses on one fruit as one: at each closing the mean of what is trusted, else the later one's.
 
-    What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean.
+    What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean. An area that is
+    a lower bound in one press is one in the other: the fruit is never judged by less.
 
     Args:
         presses: in order, at least one.
@@ -47,9 +48,13 @@ def together(presses: Sequence[Press]) -> Press:
 def _with(point: Measured, earlier: Sequence[Measured]) -> Measured:
     """A point with what an earlier press showed at the same closing."""
     other = next((each for each in earlier if abs(each.closing_mm - point.closing_mm) <= AT_MM), None)
-    if other is None or other.flags:
+    if other is None:
         return point
-    if point.flags:
-        return replace(other, closing_mm=point.closing_mm)
+    if point.flags or other.flags:
+        trusted, doubtful = (replace(other, closing_mm=point.closing_mm), point) if point.flags else (point, other)
+        if trusted.flags:
+            return point
+        is_bound = doubtful.flags <= LOWER_BOUNDS and doubtful.area_mm2 > trusted.area_mm2
+        return replace(trusted, area_mm2=doubtful.area_mm2, area_px=doubtful.area_px) if is_bound else trusted
     mean_mm2, mean_px = (point.area_mm2 + other.area_mm2) / 2, (point.area_px + other.area_px) // 2
     return replace(point, area_mm2=mean_mm2, area_px=mean_px)

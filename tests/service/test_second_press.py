@@ -1,4 +1,4 @@
-"""A second look over the twin's wire: an inconclusive fruit is pressed once more, and judged by both presses."""
+"""A second press over the twin's wire: an inconclusive fruit is pressed once more, and judged by both presses."""
 
 import asyncio
 
@@ -41,13 +41,13 @@ def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(i
     judged = record.judged
     assert openings == [State.OPENING_AGAIN], judged.explanation
     assert outcome.outcome == "PASS", judged.explanation
-    assert judged.measures["looks"] == 2
-    assert "border cuts the contact" in judged.measures["first_look"]
+    assert judged.measures["presses"] == 2
+    assert "border cuts the contact" in judged.measures["first_press_findings"]
     assert not any("cut_by_border" in point.flags for point in judged.curve)
     assert judged.phases_s["opening_again"] > 0
     shown = described(record)
     assert "Pressed twice, since the first press did not decide: At " in shown
-    assert "first_look_press" not in shown
+    assert "first_press" not in shown
     with reading(records_folder(tmp_path / "home")) as connection:
         [stored] = read_stored(connection, [outcome.sequence], tmp_path, with_images=False)
         [own] = map(recipe_of_snapshot, snapshots(connection, "strawberry").values())
@@ -56,14 +56,14 @@ def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(i
     assert any("cut_by_border" in point.flags for point in stored.first.points)
     again = replay(stored, own, own)
     assert (again.after, again.faithful) == ("PASS", True)
-    once = own.model_copy(update={"press": own.press.model_copy(update={"looks": 1})})
+    once = own.model_copy(update={"press": own.press.model_copy(update={"attempts": 1})})
     assert replay(stored, own, once).after == "NO_RESULT", "the first press alone"
 
 
 @pytest.mark.timeout(180)
 def test_a_fruit_is_pressed_twice_at_most_and_a_fault_on_the_way_is_the_reason(inspected):
     outcome, record, openings = inspected(lambda _cell: None)
-    assert (outcome.outcome, record.judged.measures["looks"]) == ("NO_RESULT", 2)
+    assert (outcome.outcome, record.judged.measures["presses"]) == ("NO_RESULT", 2)
     assert Reason.CUT_BY_BORDER in outcome.reasons
     assert len(openings) == 1
 

@@ -1,4 +1,4 @@
-"""The first look in an inspection's record, where the fruit was pressed twice: the curve is that of the last press."""
+"""The first press in an inspection's record, where the fruit was pressed twice: the curve is that of the last press."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,11 +7,11 @@ from typing import Any
 from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
 
-_LOOKS, _WHY, _PRESS = "looks", "first_look", "first_look_press"
+_PRESSES, _FINDINGS, _PRESS = "presses", "first_press_findings", "first_press"
 _FLAGS = {flag.value for flag in Flag}
 
 
-def first_look_measures(earlier: Sequence[Press], verdict: Verdict | None) -> dict[str, int | str]:
+def first_press_measures(earlier: Sequence[Press], verdict: Verdict | None) -> dict[str, int | str]:
     """What is kept of a press that was inconclusive; nothing where there was none.
 
     Args:
@@ -27,10 +27,10 @@ def first_look_measures(earlier: Sequence[Press], verdict: Verdict | None) -> di
     ]
     stored = json.dumps([first.onset_mm, first.onset_uncertainty_mm, points], separators=(",", ":"))
     why = " ".join(finding.sentence for finding in verdict.findings)
-    return {_LOOKS: 1 + len(earlier), _WHY: why, _PRESS: stored}
+    return {_PRESSES: 1 + len(earlier), _FINDINGS: why, _PRESS: stored}
 
 
-def first_look(measures: Mapping[str, Any]) -> Press | None:
+def first_press(measures: Mapping[str, Any]) -> Press | None:
     """The first press as it was measured, without what is the same for both; None where the fruit was pressed once.
 
     Args:
@@ -46,19 +46,19 @@ def first_look(measures: Mapping[str, Any]) -> Press | None:
     return Press(onset_mm, uncertainty_mm, measured)
 
 
-def why_twice(measures: Mapping[str, Any]) -> str:
+def first_press_findings(measures: Mapping[str, Any]) -> str:
     """Why the first press did not decide, in sentences; empty where the fruit was pressed once.
 
     Args:
         measures: an inspection's.
     """
-    return str(measures.get(_WHY) or "")
+    return str(measures.get(_FINDINGS) or "")
 
 
-def is_look(measure: str) -> bool:
-    """Whether a measure is the first look's, and has a line of its own.
+def is_first_press(measure: str) -> bool:
+    """Whether a measure is the first press's, and has a line of its own.
 
     Args:
         measure: its name.
     """
-    return measure in {_WHY, _PRESS}
+    return measure in {_FINDINGS, _PRESS}
