@@ -42,7 +42,7 @@ def test_an_outline_is_drawn_at_the_size_of_the_input(outlined, textured):
     assert outline.textured is textured
     assert drawn.shape == (640, 480)
     assert set(np.unique(drawn)) == {0, 255}
-    assert np.count_nonzero(drawn) == pytest.approx(16 * np.count_nonzero(AWAY < 18), rel=0.1)
+    assert np.count_nonzero(drawn) == pytest.approx(16 * np.count_nonzero(AWAY < 18), rel=0.05)
 
 
 @pytest.mark.parametrize(("kind", "closing_mm", "rel"), [("raspberry", 0.6, 0.3), ("strawberry", 0.6, 0.35)])
