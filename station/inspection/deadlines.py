@@ -176,7 +176,7 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
         State.CENTRING: min(pace.arm_move_s, _CENTRING_S),
         State.CLOSING_TO_ONSET: searched * (moving_s + imaging.settle_s + capturing_s + pace.measure_s),
         State.MOVING: moving_s,
-        State.MOVING_MEASURING: moving_s,
+        State.MOVING_MEASURING: moving_s + pace.measure_s,  # a step that may decide is measured before the next
         State.SETTLING: imaging.settle_s,
         State.SETTLING_MEASURING: imaging.settle_s,
         State.CAPTURING: capturing_s,

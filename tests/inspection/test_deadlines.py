@@ -41,14 +41,20 @@ def test_every_state_that_waits_for_something_has_a_deadline_that_the_cycle_answ
 
 
 def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
-    limits = deadlines(RECIPE, PACE)
+    limits, once = deadlines(RECIPE, PACE), deadlines(changed(attempts=1, centre_from_mm=None), PACE)
     steps_s = 12 * (1 / 20 + 0.2 + 3 / 30)
-    assert 5 / 30 + 2 * 2.0 + steps_s < limits.inspection_s < 90
+    assert 5 / 30 + 2 * 2.0 + steps_s < once.inspection_s < 60
+    assert once.inspection_s < limits.inspection_s < 2 * once.inspection_s
     assert Begun(sequence=1, deadline_s=limits.inspection_s).refusal is None
     assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * 0.2)
 
 
-def test_a_second_look_has_its_time_to_let_go_and_press_again():
+def test_a_step_that_is_measured_before_the_next_has_the_measurements_time_too():
+    limits, slow = (deadlines(RECIPE, PACE._replace(measure_s=measure_s)) for measure_s in (0.1, 1.1))
+    assert slow.phases_s[State.MOVING_MEASURING] - limits.phases_s[State.MOVING_MEASURING] == pytest.approx(3.0)
+
+
+def test_a_second_press_has_its_time_to_let_go_and_press_again():
     once, twice = (deadlines(changed(attempts=attempts), PACE).inspection_s for attempts in (1, 2))
     opening_s = PACE.stroke_mm / 20
     assert twice - once > opening_s + 12 * (1 / 20 + 0.2 + 3 / 30)
