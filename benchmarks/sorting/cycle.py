@@ -14,7 +14,7 @@ from station.inspection.second_press import needs_second_press, together
 from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
-from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY
+from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_STANDARD_UNCERTAINTY
 from station.vocabulary import OutcomeName, Reason
 
 from .presses import Closing, Pressed, Step
@@ -23,7 +23,8 @@ from .specimens import CALIBRATION_SD, Specimen, Task, draw
 _ARM_MM = 0.05
 """The UR10e's repeatability by its data sheet."""
 
-Look = Callable[[Closing], Pressed | None]
+Source = Callable[[Closing], Pressed | None]
+"""Gives a closing that is measured, or None."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +60,14 @@ class Unmeasured(Exception):  # noqa: N818 (no error: a request)
         self.closing = closing
 
 
-def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspected:
+def inspect(task: Task, recipe: Recipe, practice: Practice, source: Source) -> Inspected:
     """Decide on one fruit as the station does.
 
     Args:
         task: the fruit.
         recipe: its recipe.
         practice: what of the station is used.
-        look: gives measured closings.
+        source: gives measured closings.
 
     Raises:
         Unmeasured: a closing is not measured yet.
@@ -78,7 +79,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, look: Look) -> Inspe
     def close() -> Pressed:
         nonlocal closings
         closing = Closing(task, closings, shift_mm)
-        pressed = look(closing)
+        pressed = source(closing)
         if pressed is None:
             raise Unmeasured(closing)
         closings += 1
@@ -148,8 +149,7 @@ def as_stopped(
         (),
         size=_size(specimen, recipe, practice),
         resolution_mm=GripperCalibration().mm_per_count,
-        # The usual scale's uncertainty is two standard deviations.
-        scale_uncertainty=CALIBRATION_SD if practice.calibrated else TYPICAL_UNCERTAINTY / 2,
+        scale_uncertainty=CALIBRATION_SD if practice.calibrated else TYPICAL_STANDARD_UNCERTAINTY,
     )
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))

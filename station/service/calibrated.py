@@ -2,18 +2,15 @@
 
 import time
 from collections.abc import Callable
-from math import sqrt
 from pathlib import Path
 from typing import NamedTuple
 
 from station.calibration.model import Calibration, Verification
 from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
 from station.settings.configuration import Configuration
-from station.vision.scale import TYPICAL_UNCERTAINTY
+from station.vision.scale import TYPICAL_STANDARD_UNCERTAINTY
 
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
-_UNMEASURED = TYPICAL_UNCERTAINTY / sqrt(3)
-"""Standard uncertainty of the usual scale: a unit's own lies anywhere in the published range alike (GUM 4.3.7)."""
 
 
 class InUse(NamedTuple):
@@ -67,11 +64,11 @@ class Calibrated:
         if calibration is None:
             allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
             words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration{allowed}"
-            return InUse(self._usual_mm_per_px, words, _UNMEASURED)
+            return InUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
         measured = calibration.scale_measured
         scale = calibration.mm_per_px if measured else self._usual_mm_per_px
         words = f"{calibration.in_words()}, in use {scale:g} mm/px"
-        return InUse(scale, words, calibration.scale_uncertainty / 2 if measured else _UNMEASURED)
+        return InUse(scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY)
 
     @property
     def gate_factor(self) -> float:

@@ -1,12 +1,16 @@
 """From pixels to square millimetres, with what is not known about the scale."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 TYPICAL_MM_PER_PX = 0.0266
 """At 640 pixels along the longer side: the middle of what is published for single DIGIT units, 0.0255 to 0.0291."""
 
 TYPICAL_UNCERTAINTY = 0.15
 """Relative, of a length: covers the published units and the field's distortion; an area is good to about 30 %."""
+
+TYPICAL_STANDARD_UNCERTAINTY = TYPICAL_UNCERTAINTY / sqrt(3)
+"""Its standard uncertainty: a unit's own lies anywhere in the published range alike (GUM 4.3.7)."""
 
 _LONG_SIDE_PX = 640
 

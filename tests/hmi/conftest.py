@@ -19,8 +19,9 @@ from urllib.parse import urlencode
 
 import psutil
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
 from playwright.sync_api import Error as BrowserError
+from playwright.sync_api import TimeoutError as BrowserTimeout
 
 from hmi.app import make_app, make_context
 from station.channel.client import ChannelClient
@@ -73,6 +74,8 @@ BROWSER_ARGUMENTS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    # A connection made while the first window is still being opened once waited 30 s for it in vain.
+    "--no-startup-window",
 )
 
 
@@ -273,6 +276,13 @@ def ready(cell: Cell) -> Cell:
     return cell
 
 
+def connected(playwright: Playwright, address: str) -> Browser:
+    """Connect to a Chromium; a connection that hung is made anew once."""
+    with contextlib.suppress(BrowserTimeout):
+        return playwright.chromium.connect_over_cdp(address)
+    return playwright.chromium.connect_over_cdp(address)
+
+
 @pytest.fixture(scope="module")
 def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One headless Chromium for the tests of a file: no other file's tests may meet Playwright's running loop."""
@@ -287,7 +297,7 @@ def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Br
     with begun(command, log, cell.environment) as chromium:
         eventually(lambda: said(log, "DevTools listening", chromium))
         with sync_playwright() as playwright:
-            browser = playwright.chromium.connect_over_cdp(f"http://127.0.0.1:{port}")
+            browser = connected(playwright, f"http://127.0.0.1:{port}")
             yield browser
             browser.close()
 
