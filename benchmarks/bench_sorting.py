@@ -14,7 +14,7 @@ from pathlib import Path
 
 from sorting import tables
 from sorting.cycle import Inspected, Practice, Unmeasured, inspect
-from sorting.presses import Closing, PressCache
+from sorting.presses import PRESSED_ON, Closing, PressCache
 from sorting.specimens import KINDS, SEEDS, SOUND, Task
 
 from station.settings.recipe import find_recipe
@@ -77,7 +77,7 @@ def main() -> None:
     all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
     some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
     compared = decided(some, recipes, tables.PRACTICES.values(), cache)
-    sound = [task for task in tasks if task.group == SOUND]
+    sound = [task for task in tasks if task.group == SOUND and task.number < PRESSED_ON]
     pressed_on = {kind: without_stop(recipe) for kind, recipe in recipes.items()}
     before, after = (decided(sound, by, [AS_PLACED], cache)[AS_PLACED] for by in (pressed_on, recipes))
     sections = {

@@ -18,10 +18,14 @@ from station.studies.workers import on_this_machine
 from station.twin.gel import SENSOR_SHAPE, Gel
 from station.twin.squeeze import Squeeze
 
-from .specimens import Task, draw
+from .specimens import SOUND, Task, draw
 
-_DEEPEST_MM = (6.1, 5.0)
-"""First closings go on to where the early stops of sound fruit lie, later ones two steps beyond the last threshold."""
+_DEEPEST_MM = 5.0
+"""Two steps beyond the last threshold, where every fruit is decided."""
+_EARLY_STOP_MM = 6.1
+"""Where the early stops of sound fruit lie."""
+PRESSED_ON = 100
+"""The first closing of so many sound fruit goes on to the early stop, to compare the forces."""
 _KEEP_EVERY_S = 20.0
 _DECIDED_BY = (
     "vision",
@@ -82,7 +86,8 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
         return closing, Pressed(None, 0.0, ())
     squeeze = Squeeze(one.fruit, Gel(mm_per_px=one.mm_per_px))
     middle_x, middle_y = ((side - 1) / 2 for side in SENSOR_SHAPE[::-1])
-    deepest_mm, steps = _DEEPEST_MM[min(closing.number, 1)], []
+    pressed_on = closing.number == 0 and closing.task.group == SOUND and closing.task.number < PRESSED_ON
+    deepest_mm, steps = _EARLY_STOP_MM if pressed_on else _DEEPEST_MM, []
     for closing_mm, contact in grip.steps(onset):
         if closing_mm > deepest_mm:
             break
