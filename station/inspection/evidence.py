@@ -29,6 +29,8 @@ _WINDOW_POINTS = 4
 _WINDOW_MM = 2.0
 LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 """Flags of an area that the contact surely reaches."""
+_EXCUSABLE = {Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND}
+"""Doubts about a step that a later, trusted one settles."""
 _LEAST_NOISE = 0.02
 """Share of the largest area threshold below which a falling area is noise."""
 
@@ -86,20 +88,19 @@ class Evidence:
 
     @cached_property
     def excused(self) -> list[Measured]:
-        """Needed points of too little confidence that a PASS does without.
+        """Needed points that a PASS does without, since their confidence is too small or their edge was lost.
 
-        The area rises with the closing: where the last needed point is trusted and within every limit, so is what lies
-        before it, whatever an image there shows. What such a point may spoil, the onset, is asked of the others too.
+        The area rises with the closing: where the last needed point is trusted and within its limit, what lies before
+        it is smaller, whatever an image there shows. An earlier limit is then kept by what was measured there, trusted
+        or not. What such a point may spoil, the onset, is asked of the others too.
         """
         if not self.needed:
             return []
-        last, thresholds = self.needed[-1], self._recipe.damage.area
-        reached = last.closing_mm >= thresholds[-1].closing_mm
-        most_mm2 = last.area_mm2 + self._uncertainty_mm2(last)
-        kept = most_mm2 <= min(threshold.area_mm2 for threshold in thresholds)
-        if not reached or not kept or self.doubts(last) or last in self.falling:
+        last, threshold = self.needed[-1], self._recipe.damage.area[-1]
+        kept = last.area_mm2 + self._uncertainty_mm2(last) <= threshold.area_mm2
+        if last.closing_mm < threshold.closing_mm or not kept or self.doubts(last) or last in self.falling:
             return []
-        return [point for point in self.needed if self.doubts(point) == {Flag.LOW_CONFIDENCE}]
+        return [point for point in self.needed if self.doubts(point) and self.doubts(point) <= _EXCUSABLE]
 
     def bounds(self, point: Measured) -> bool:
         """Whether the area is surely no smaller: a contact that the border cuts, or whose edge was lost, is larger."""

@@ -131,7 +131,6 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, reason):
         (Flag.NO_CONTACT, Reason.CONTACT_LOST),
         (Flag.UNDECIDED, Reason.LOW_CONFIDENCE),
         (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER),
-        (Flag.LOWER_BOUND, Reason.LOW_CONFIDENCE),
         (Flag.SATURATED, Reason.SATURATED),
         (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD),
     ],
@@ -192,10 +191,19 @@ def test_a_contact_whose_edge_was_lost_proves_a_fail_and_never_carries_a_pass():
     verdict = judge(over, STRAWBERRY)
     assert verdict.outcome == "FAIL"
     assert Reason.AREA_OVER_LIMIT in verdict.reasons
-    for closing in (2.0, 3.0, 4.0):
-        spoiled = judge(spoilt(pressed(20), closing, Flag.LOWER_BOUND), STRAWBERRY)
-        assert (spoiled.outcome, spoiled.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
-        assert "the contact is at least as large as its area" in spoiled.findings[0].sentence
+    spoiled = judge(spoilt(pressed(20), 4.0, Flag.LOWER_BOUND), STRAWBERRY)
+    assert (spoiled.outcome, spoiled.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
+    assert "the contact is at least as large as its area" in spoiled.findings[0].sentence
+
+
+@pytest.mark.parametrize("flag", [Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND])
+def test_a_doubtful_step_at_an_earlier_limit_is_settled_by_a_trusted_one_within_the_last_limit(flag):
+    two_limits = recipe_with("strawberry", {4: 90, 8: 189}, 41, (190, 55))
+    press = pressed(20)
+    assert judge(spoilt(press, 4.0, flag), two_limits).outcome == "PASS"
+    over = spoilt(press, 4.0, flag, area_mm2=100.0)
+    assert judge(over, two_limits).outcome != "PASS", "what was measured there still keeps the earlier limit"
+    assert judge(spoilt(spoilt(press, 4.0, flag), 8.0, flag), two_limits).outcome == "NO_RESULT"
 
 
 def test_an_edge_that_was_lost_and_found_again_proves_no_growth():
