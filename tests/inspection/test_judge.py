@@ -198,7 +198,7 @@ def test_a_contact_whose_edge_was_lost_proves_a_fail_and_never_carries_a_pass():
 
 @pytest.mark.parametrize("flag", [Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND])
 def test_a_doubtful_step_at_an_earlier_limit_is_settled_by_a_trusted_one_within_the_last_limit(flag):
-    two_limits = recipe_with("strawberry", {4: 90, 8: 189}, 41, (190, 55))
+    two_limits = recipe_with("strawberry", {4: 98, 8: 189}, 41, (190, 55))
     press = pressed(20)
     assert judge(spoilt(press, 4.0, flag), two_limits).outcome == "PASS"
     over = spoilt(press, 4.0, flag, area_mm2=100.0)

@@ -253,7 +253,7 @@ class TestShipped:
     def test_the_four_are_there_with_their_own_numbers(self):
         recipes = load_recipes()
         assert sorted(recipes) == ["blueberry", "raspberry", "rubber_ball", "strawberry"]
-        assert recipes["strawberry"].steps.result_closings_mm == (3, 4, 8, 12)
+        assert recipes["strawberry"].steps.result_closings_mm == (1.9, 3, 4, 8, 12)
         assert recipes["blueberry"].steps.result_closings_mm == (3, 8, 12, 16)
         assert recipes["raspberry"].steps.result_closings_mm == (3, 8, 12, 16)
         ball = recipes["rubber_ball"].steps

@@ -30,7 +30,7 @@ def test_the_shipped_recipes_are_good_from_anywhere(station):
     assert lines[3].startswith("OK ")
     assert lines[3].endswith(
         "strawberry.yaml: strawberry, PLC number 1, 22 to 53 mm wide, 12 steps of 1 mm, "
-        "results at 3, 4, 8, 12 mm, robust"
+        "results at 1.9, 3, 4, 8, 12 mm, robust"
     )
 
 

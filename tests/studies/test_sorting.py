@@ -50,7 +50,9 @@ class Presses:
 
 @pytest.fixture
 def recipe():
-    return find_recipe("blueberry")
+    """The shipped recipe, but centred from 0.4 mm on."""
+    shipped = find_recipe("blueberry")
+    return shipped.model_copy(update={"press": shipped.press.model_copy(update={"centre_from_mm": 0.4})})
 
 
 class TestSpecimens:
@@ -75,13 +77,13 @@ class TestSpecimens:
 
 
 class TestPressing:
-    def test_the_arm_brings_the_contact_to_the_middle(self):
+    def test_the_arm_brings_the_contact_to_the_middle(self, recipe):
         """A closing off the middle, its move, and the next closing: nearer than a move is made for."""
         task = next(
             task for number in range(50) if abs(draw(task := BLUEBERRY._replace(number=number)).pose.x_px - 240) > 40
         )
         _, first = presses.press(Closing(task, 0, (0.0, 0.0)))
-        move = move_mm(first.steps[0], find_recipe(BLUEBERRY.kind), (0.0, 0.0))
+        move = move_mm(first.steps[0], recipe, (0.0, 0.0))
         assert move is not None
         _, second = presses.press(Closing(task, 1, move))
         for step in second.steps[:4]:
@@ -90,8 +92,8 @@ class TestPressing:
         # Later closings are not taken as far as the early stops of the first.
         assert first.steps[-1].closing_mm > second.steps[-1].closing_mm > 4
 
-    def test_an_arm_moves_by_its_own_steps_within_its_bounds(self):
-        step, recipe = Step(0.0, 500, 0.9, (), None, 0.1), find_recipe(BLUEBERRY.kind)
+    def test_an_arm_moves_by_its_own_steps_within_its_bounds(self, recipe):
+        step = Step(0.0, 500, 0.9, (), None, 0.1)
         assert move_mm(step, recipe, (0.0, 0.0)) is None
         assert move_mm(step._replace(offset_px=(10.0, 0.0)), recipe, (0.0, 0.0)) is None
         assert move_mm(step._replace(offset_px=(30.0, -20.0)), recipe, (0.0, 0.0)) == (-0.8, 0.55)
