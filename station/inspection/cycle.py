@@ -81,8 +81,10 @@ class Action(StrEnum):
     was not: UNFINISHED_CLOSED. Idempotent."""
     OPEN_JAWS = "open_jaws"
     """JAWS_OPEN. Idempotent."""
+    FREE_FRUIT = "free_fruit"
+    """Open only so far that the sensor can move beside the fruit: JAWS_OPEN. Idempotent."""
     GO_HOME = "go_home"
-    """HOME. Idempotent; on a bench without an arm at once."""
+    """Bring the arm to where it waits: HOME. Idempotent; on a bench without an arm at once."""
     CHECK_DEVICES = "check_devices"
     """Look at the known health, without waiting: READY, STOP where one was asked for, or what is wrong."""
     RECORD_TRIGGER = "record_trigger"
@@ -248,8 +250,8 @@ ROWS: tuple[Row, ...] = (
     Row((S.AWAITING_MEASURE_LAST,), (E.MEASURED,), S.MEASURING_LAST, (A.MEASURE,)),
     Row((S.MEASURING_LAST,), (E.MEASURED, E.EARLY_STOP), S.JUDGING, (A.JUDGE,)),
     Row((*MEASURING, S.AWAITING_MEASURE, S.AWAITING_MEASURE_LAST), (E.EARLY_STOP,), S.JUDGING, (A.HALT, A.JUDGE)),
-    Row((S.CLOSING_TO_ONSET,), (E.OFF_MIDDLE,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
-    Row((S.JUDGING,), (E.PRESS_AGAIN,), S.OPENING_AGAIN, (A.OPEN_JAWS,)),
+    Row((S.CLOSING_TO_ONSET,), (E.OFF_MIDDLE,), S.OPENING_AGAIN, (A.FREE_FRUIT,)),
+    Row((S.JUDGING,), (E.PRESS_AGAIN,), S.OPENING_AGAIN, (A.FREE_FRUIT,)),
     Row((S.OPENING_AGAIN,), (E.JAWS_OPEN,), S.CENTRING, (A.CENTRE,)),
     Row((S.CENTRING,), (E.CENTRED,), S.CLOSING_TO_ONSET, (A.CLOSE_TO_ONSET,)),
     Row((S.JUDGING,), (E.JUDGED_ACCEPT,), S.RECORDING_ACCEPT, (A.RECORD,)),

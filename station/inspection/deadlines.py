@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.inspection.cycle import Event
-from station.inspection.second_press import SEARCH_AGAIN_STEPS
+from station.inspection.second_press import FREED_BY_MM
 from station.inspection.states import State
 from station.settings.recipe_model import Recipe
 
@@ -120,11 +120,11 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     expected_s = _expected(recipe, pace)
     step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
     press_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
-    # To where the fruit was met, and as much again in finer steps.
+    # To where the fruit was met, and as much again count by count.
     again_s = (
         expected_s[State.OPENING_AGAIN]
         + expected_s[State.CENTRING]
-        + 2 * SEARCH_AGAIN_STEPS * (step_s + pace.measure_s)
+        + 2 * FREED_BY_MM / recipe.steps.step_mm * (step_s + pace.measure_s)
     )
     inspection_s = GRACE_S + INSPECTION_MARGIN * (
         expected_s[State.REFERENCE]
@@ -172,7 +172,7 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
     placing_s = 3 * pace.arm_move_s + opening_s
     expected_s = {
         State.REFERENCE: imaging.reference_frames / pace.frames_per_s,
-        State.APPROACHING: 2 * pace.arm_move_s,
+        State.APPROACHING: max(2 * pace.arm_move_s, opening_s),  # the jaws close meanwhile to the fruit's width
         State.CENTRING: min(pace.arm_move_s, _CENTRING_S),
         State.CLOSING_TO_ONSET: searched * (moving_s + imaging.settle_s + capturing_s + pace.measure_s),
         State.MOVING: moving_s,

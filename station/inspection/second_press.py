@@ -13,9 +13,9 @@ PRESS_AGAIN_AT = frozenset(
 )
 """Reasons of the measurement, for which another press may show what this one did not."""
 
-SEARCH_AGAIN_STEPS = 2
-"""So many width steps before the width at which a fruit was met, the search for it begins anew: room for one that
-rolled."""
+FREED_BY_MM = 2.0
+"""So much wider than where a fruit was met the jaws open before the sensor moves beside it and closes again: room for
+one that rolled."""
 
 
 def needs_second_press(verdict: Verdict) -> bool:

@@ -3,15 +3,17 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Awaitable, Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Collection, Coroutine
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
 
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, FrameFault, Image
 from station.devices.gripper.errors import GripperStoppedError
-from station.devices.gripper.interface import Gripper, MoveResult, ObjectState
+from station.devices.gripper.interface import Gripper, GripperReading, MoveResult, ObjectState
 from station.errors import StationError
-from station.inspection.second_press import SEARCH_AGAIN_STEPS
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 from station.vision.step import mean_image
@@ -19,6 +21,9 @@ from station.vision.step import mean_image
 FRAME_DEADLINE_S = 1.0
 FINEST_STEP_MM = 0.4
 """A count of the gripper."""
+MOST_UNSEEN_MM = 3.0
+"""So far the fingers may have gone since the frame that was measured last; a frame's way into the measurement and the
+time between two frames make about 2 mm at the gripper's slowest 20 mm/s."""
 _MOST_FAULTY_FRAMES = 10
 
 
@@ -73,8 +78,31 @@ class Cell:
     arm: Arm | None
 
 
+class Met(NamedTuple):
+    """Where closing without a stop has met something."""
+
+    width_mm: float
+    """At the first frame with a contact."""
+    clear_mm: float | None
+    """At the last frame without one; None where there was none."""
+
+
 Touches = Callable[[GripStep], Awaitable[bool]]
 """Says whether the gel is touched in a step's frames."""
+
+
+async def at_once(*works: Coroutine[None, None, object]) -> None:
+    """Do several things at the same time; where one fails the others are cancelled, and its error is raised.
+
+    Args:
+        works: not begun yet.
+    """
+    try:
+        async with asyncio.TaskGroup() as group:
+            for work in works:
+                group.create_task(work)
+    except ExceptionGroup as failed:
+        raise failed.exceptions[0] from None
 
 
 class Grip:
@@ -141,15 +169,14 @@ class Grip:
         grip = self._recipe.gripper
         return await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n)
 
-    async def approach(self, touches: Touches, met_mm: float | None = None) -> tuple[GripStep | None, GripStep]:
-        """Close step by step until the gel is touched, then once more, as finely as the gripper can.
+    async def approach(self, touches: Touches) -> tuple[GripStep | None, GripStep]:
+        """Close until the gel is touched, then once more from where it was not, as finely as the gripper can.
 
         The onset's width is what every closing is counted from, so it is found to a count of the gripper. On the way
         one frame without a pause is enough; where it shows a contact, a full step at the same width has to confirm it.
 
         Args:
             touches: judges a step's frames.
-            met_mm: where the same fruit was met before, so that the way there needs no images; None for a new fruit.
 
         Returns:
             The last step before the contact, with one frame, and the first with it.
@@ -158,49 +185,127 @@ class Grip:
             NothingTouchedError: nothing was touched down to the recipe's smallest width.
             UnseenContactError: the gripper was stopped by something and the gel shows nothing.
         """
-        expected, step_mm = self._recipe.expected_width, self._recipe.steps.step_mm
-        widest_mm = self._cell.gripper.max_width_mm
-        from_mm = expected.largest_mm if met_mm is None else met_mm + SEARCH_AGAIN_STEPS * step_mm
-        seen_mm, _ = await self._search(min(from_mm, widest_mm), step_mm, touches, one_ahead=True)
-        from_mm, before = seen_mm, None
-        while before is None and from_mm < widest_mm:  # back to where nothing touches, however faintly it began
-            from_mm = min(from_mm + step_mm, widest_mm)
-            seen_mm, before = await self._search(from_mm, FINEST_STEP_MM, touches, one_ahead=False)
+        return await self.onset(await self.sweep(touches), touches)
+
+    async def sweep(self, touches: Touches) -> Met:
+        """Close from the present width without a stop until the newest frame shows a contact.
+
+        The fingers wait for a measurement that is late, so that they are never more than `MOST_UNSEEN_MM` and the way
+        of one reaction further than what was measured.
+
+        Args:
+            touches: judges a step's frames.
+
+        Raises:
+            NothingTouchedError, UnseenContactError: as `approach`.
+        """
+        recipe = self._recipe
+        lowest_mm = recipe.expected_width.smallest_mm - recipe.steps.step_mm
+        unseen_s = MOST_UNSEEN_MM / recipe.gripper.speed_mm_s
+        readings = [await self._cell.gripper.read()]
+        clear_mm: float | None = None
+        newer_than_s = time.monotonic()
+        moving: asyncio.Future[MoveResult] | None = None
+        try:
+            while True:
+                ended = moving if moving is not None and moving.done() else None
+                if ended is not None:
+                    newer_than_s = ended.result().reading.at_s
+                seeing = asyncio.ensure_future(self._seen(newer_than_s, readings, touches))
+                try:
+                    await asyncio.wait({seeing}, timeout=max(0.0, newer_than_s + unseen_s - time.monotonic()))
+                    if not seeing.done() and moving is not None and not moving.done():
+                        await self._halt(moving)
+                        moving = None
+                    step, touched = await seeing
+                finally:
+                    seeing.cancel()
+                if touched:
+                    if moving is not None:
+                        await self._halt(moving)
+                        moving = None
+                    return Met(step.move.width_mm, clear_mm)
+                if ended is not None:
+                    raise self._nothing_touched(ended.result())
+                clear_mm, newer_than_s = step.move.width_mm, step.last_frame.captured_s
+                moving = moving or asyncio.ensure_future(self.close_to(lowest_mm))
+        finally:
+            if moving is not None:
+                moving.cancel()
+                await asyncio.gather(moving, return_exceptions=True)
+
+    async def onset(self, met: Met, touches: Touches) -> tuple[GripStep | None, GripStep]:
+        """Find the onset count by count, from a width at which nothing touches.
+
+        Args:
+            met: where the sweep has met the fruit.
+            touches: judges a step's frames.
+
+        Returns:
+            The last step before the contact, with one frame, and the first with it.
+
+        Raises:
+            NothingTouchedError, UnseenContactError: as `approach`.
+        """
+        widest_mm, step_mm = self._cell.gripper.max_width_mm, self._recipe.steps.step_mm
+        # A light contact begins unseen: half a count of room for it.
+        from_mm = (met.width_mm if met.clear_mm is None else met.clear_mm) + FINEST_STEP_MM / 2
+        before = None
+        while True:  # back to where nothing touches, however faintly it began
+            from_mm = min(from_mm, widest_mm)
+            await self._cell.gripper.open(from_mm)
+            seen_mm, before = await self._search(from_mm, touches)
+            if before is not None or from_mm >= widest_mm:
+                break
+            from_mm += step_mm
         while not await touches(start := await self.step(0, seen_mm)):
-            seen_mm, nearer = await self._search(seen_mm - FINEST_STEP_MM, FINEST_STEP_MM, touches, one_ahead=False)
+            seen_mm, nearer = await self._search(seen_mm - FINEST_STEP_MM, touches)
             before = nearer or before
         return before, start
 
-    async def _search(
-        self, from_mm: float, stride_mm: float, touches: Touches, *, one_ahead: bool
-    ) -> tuple[float, GripStep | None]:
-        """Close stride by stride with one frame each, where wanted with the next stride made while a frame is judged.
+    async def _seen(
+        self, newer_than_s: float, readings: list[GripperReading], touches: Touches
+    ) -> tuple[GripStep, bool]:
+        """The next frame with the width at its capture, from readings before and after it, and whether it is touched."""
+        frame = await self._sound_frame(newer_than_s)
+        readings.append(await self._cell.gripper.read())
+        times_s, widths_mm = [each.at_s for each in readings], [each.width_mm for each in readings]
+        width_mm = float(np.interp(frame.captured_s, times_s, widths_mm))
+        at_capture = replace(readings[-1], width_mm=width_mm, at_s=frame.captured_s)
+        step = GripStep(-1, MoveResult(width_mm, at_capture.echoed_count, at_capture), (frame,))
+        return step, await touches(step)
+
+    async def _halt(self, moving: asyncio.Future[MoveResult]) -> None:
+        """Stop the fingers where they are."""
+        await self._cell.gripper.stop()
+        with contextlib.suppress(GripperStoppedError):
+            await moving
+
+    async def _search(self, from_mm: float, touches: Touches) -> tuple[float, GripStep | None]:
+        """Close count by count with one frame each.
 
         Returns:
             The width at which the gel was touched first, and the step before it.
         """
-        expected = self._recipe.expected_width
         width_mm, before = from_mm, None
-        step = await self._glance(width_mm)
-        while width_mm >= expected.smallest_mm - self._recipe.steps.step_mm:
-            judging = asyncio.ensure_future(touches(step))
-            ahead = None
-            try:
-                if one_ahead:
-                    ahead = await self._glance_ahead(width_mm - stride_mm, judging)
-            finally:
-                touched = await judging
-            held = step.move.reading.object_state is ObjectState.CONTACT_CLOSING
-            if touched:
+        while width_mm >= self._recipe.expected_width.smallest_mm - self._recipe.steps.step_mm:
+            step = await self._glance(width_mm)
+            if await touches(step):
                 return width_mm, before
-            if held:
-                raise UnseenContactError(
-                    f"the gripper holds something at {step.move.width_mm:.1f} mm which the gel does not show: look "
-                    "for what stands between the fingers beside the gel, then `station devices check`"
-                )
-            width_mm, before = width_mm - stride_mm, step
-            step = ahead or await self._glance(width_mm)
-        raise NothingTouchedError(
+            if step.move.reading.object_state is ObjectState.CONTACT_CLOSING:
+                raise self._nothing_touched(step.move)
+            width_mm, before = width_mm - FINEST_STEP_MM, step
+        raise self._nothing_touched()
+
+    def _nothing_touched(self, move: MoveResult | None = None) -> GripError:
+        """The error for fingers that have closed without a contact, held by something or not."""
+        if move is not None and move.reading.object_state is ObjectState.CONTACT_CLOSING:
+            return UnseenContactError(
+                f"the gripper holds something at {move.width_mm:.1f} mm which the gel does not show: look "
+                "for what stands between the fingers beside the gel, then `station devices check`"
+            )
+        expected = self._recipe.expected_width
+        return NothingTouchedError(
             f"nothing was touched from {expected.largest_mm:g} down to {expected.smallest_mm:g} mm: is a "
             f"{self._recipe.name} in the nest, and is the arm there?"
         )
@@ -208,24 +313,6 @@ class Grip:
     async def _glance(self, width_mm: float) -> GripStep:
         move = await self.close_to(width_mm)
         return GripStep(-1, move, await self.sound_frames(1))
-
-    async def _glance_ahead(self, width_mm: float, judging: asyncio.Future[bool]) -> GripStep | None:
-        """Glance at the next width, unless the one before is found to touch; then the fingers stop on their way."""
-        moving = asyncio.ensure_future(self.close_to(width_mm))
-        try:
-            await asyncio.wait({moving, judging}, return_when=asyncio.FIRST_COMPLETED)
-            if not moving.done() and judging.result():
-                await self._cell.gripper.stop()
-                with contextlib.suppress(GripperStoppedError):
-                    await moving
-                return None
-            move = await moving
-            if judging.done() and judging.result():
-                return None
-            return GripStep(-1, move, await self.sound_frames(1))
-        finally:
-            moving.cancel()
-            await asyncio.gather(moving, return_exceptions=True)
 
     async def let_go(self) -> str | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.

@@ -103,11 +103,15 @@ class Inspection:
         self.first_verdict = self.verdict
         self.earlier.append(self._latest())
         self.verdict = None
-        self.let_go()
+        self.let_go(self.onset_mm)
 
-    def let_go(self) -> None:
-        """Begin another closing: what this one has shown is done with."""
-        self.met_mm, self.before_onset_mm = self.onset_mm, None
+    def let_go(self, met_mm: float | None) -> None:
+        """Begin another closing: what this one has shown is done with.
+
+        Args:
+            met_mm: the width at which this closing met the fruit.
+        """
+        self.met_mm, self.before_onset_mm = met_mm, None
         self.steps.clear()
         self.seen.clear()
 

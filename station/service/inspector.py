@@ -14,17 +14,17 @@ from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
-from station.inspection.second_press import needs_second_press
+from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.records.model import Image
 from station.service.alarm_desk import AlarmDesk
 from station.service.calibrated import Calibrated
 from station.service.crew import CAMERA, GRIPPER, Crew
 from station.service.eye import Eye, Seen
-from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError
+from station.service.grip import FRAME_DEADLINE_S, Grip, at_once, GripStep, NothingTouchedError, UnseenContactError
 from station.service.inspection import Inspection
 from station.service.metrics import Metrics
 from station.service.reference import ALARMS, BadReferenceError
-from station.settings.arm import Centring
+from station.settings.arm import ArmSettings
 from station.settings.service import ServiceSettings
 from station.vocabulary import Reason
 
@@ -40,7 +40,7 @@ class Inspector:
         crew: the devices.
         eye: the measurement.
         settings: placing, and how old a reference may be.
-        centring: how the arm may follow a contact.
+        arm: where it waits, and how it may follow a contact.
         alarms: told of a reference that cannot serve.
         metrics: counts the frames.
         calibrated: how noisy the sensor is.
@@ -51,13 +51,13 @@ class Inspector:
         crew: Crew,
         eye: Eye,
         settings: ServiceSettings,
-        centring: Centring,
+        arm: ArmSettings,
         alarms: AlarmDesk,
         metrics: Metrics,
         calibrated: Calibrated,
     ) -> None:
         self._crew, self._eye, self._settings, self._calibrated = crew, eye, settings, calibrated
-        self._alarms, self._metrics, self._centring = alarms, metrics, centring
+        self._alarms, self._metrics, self._arm = alarms, metrics, arm
         self._reached: MoveResult | None = None
         self._glanced: Seen | None = None
         self._examining: asyncio.Future[bool] | None = None
@@ -69,13 +69,21 @@ class Inspector:
         await self._crew.cell.gripper.open()
         return Event.JAWS_OPEN
 
+    async def free_fruit(self, now: Inspection) -> Event:
+        """Open only so far that the sensor can move beside the fruit, which may have rolled."""
+        gripper = self._crew.cell.gripper
+        if now.met_mm is None:
+            raise RuntimeError("a fruit is freed that was not met")
+        await gripper.open(min(now.met_mm + FREED_BY_MM, gripper.max_width_mm))
+        return Event.JAWS_OPEN
+
     async def go_home(self) -> Event:
-        """Bring the arm home; from the nest, or from where it is not known, over the place above it."""
+        """Bring the arm to where it waits; from the nest, or from where it is not known, over the place above it."""
         arm = self._crew.cell.arm
         if arm is not None:
             if (await arm.state()).at not in {"home", "above_nest", "accept", "reject"}:
                 await arm.move_to("above_nest")
-            await arm.move_to("home")
+            await arm.move_to(self._arm.waits_at)
         return Event.HOME
 
     async def take_reference(self, now: Inspection) -> Event:
@@ -98,8 +106,13 @@ class Inspector:
         return Event.REFERENCE_TAKEN
 
     async def approach(self, now: Inspection) -> Event:
-        """Bring the open jaws to the fruit, while the reference is examined."""
-        await self._grip(now).go("above_nest", "nest")
+        """Bring the jaws to the fruit, a little wider than it may be, while the reference is examined."""
+        recipe, gripper = now.active.recipe, self._crew.cell.gripper
+        widest_mm = max(recipe.expected_width.largest_mm, recipe.steps.start_width_mm or 0.0)
+        await at_once(
+            self._grip(now).go("above_nest", "nest"),
+            gripper.open(min(widest_mm + self._arm.jaw_clearance_mm, gripper.max_width_mm)),
+        )
         good = self._examining is not None and await self._examining
         return Event.ARRIVED if good else Event.REFERENCE_BAD
 
@@ -136,7 +149,12 @@ class Inspector:
             if plan.start_width_mm is not None:
                 start = await grip.step(0, plan.start_width_mm)
             else:
-                before, start = await grip.approach(self._touches, now.met_mm)
+                met = await grip.sweep(self._touches)
+                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip)):
+                    now.closings = 1
+                    now.let_go(met.width_mm)
+                    return Event.OFF_MIDDLE
+                before, start = await grip.onset(met, self._touches)
                 now.before_onset_mm = None if before is None else before.move.width_mm
         except (NothingTouchedError, UnseenContactError) as error:
             now.interrupt(Reason.NO_CONTACT, str(error))
@@ -145,18 +163,23 @@ class Inspector:
         known = self._glanced is not None and self._glanced.step is start
         now.seen.append(self._glanced if known and self._glanced else await self._eye.measure(start))
         now.closings += 1
-        off = self._off_middle(now)
-        if now.closings == 1 and self._sets_out(now, off):
-            now.let_go()
+        off = self._off_middle(now, now.seen[-1])
+        if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
+            now.let_go(start.move.width_mm)
             return Event.OFF_MIDDLE
         if now.moved != NOT_MOVED and off is not None:
             now.measures["left_off_mm"] = round(off.length_mm, 2)
         await self._eye.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    def _off_middle(self, now: Inspection) -> Way | None:
-        """How far the last measured contact is off the field's middle; None where there is none."""
-        seen = now.seen[-1]
+    async def _first_contact(self, now: Inspection, grip: Grip) -> Way | None:
+        """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
+        step = GripStep(-1, MoveResult(0.0, 0, await self._crew.cell.gripper.read()), await grip.sound_frames(1))
+        return self._off_middle(now, await self._eye.measure(step))
+
+    @staticmethod
+    def _off_middle(now: Inspection, seen: Seen) -> Way | None:
+        """How far a measured contact is off the field's middle; None where there is none."""
         centroid_px = seen.contact.centroid_px
         return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
 
@@ -171,7 +194,7 @@ class Inspector:
             told = "near enough"
         elif self._crew.cell.arm is None:
             told = "no arm"
-        elif too_far(off, now.moved, self._centring.most_mm):
+        elif too_far(off, now.moved, self._arm.centring.most_mm):
             told = "too far"
         else:
             now.target = now.moved.then(off)
@@ -186,7 +209,7 @@ class Inspector:
         if arm is not None and target is not None:
             now.target = None
             try:
-                await arm.move_beside_nest(self._centring.in_tool_mm(*target))
+                await arm.move_beside_nest(self._arm.centring.in_tool_mm(*target))
             except ArmFault as fault:
                 if fault.cause is not ArmCause.UNREACHABLE:
                     raise
@@ -257,7 +280,7 @@ class Inspector:
         recipe = now.active.recipe
         now.verdict = judge(now.press(), recipe)
         if now.presses_made < recipe.press.attempts and needs_second_press(now.verdict):
-            self._sets_out(now, self._off_middle(now))
+            self._sets_out(now, self._off_middle(now, now.seen[-1]))
             now.press_again()
             self._metrics.pressed_again(recipe.name)
             return Event.PRESS_AGAIN

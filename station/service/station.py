@@ -109,7 +109,7 @@ class Station:
                 metrics.heard(name)
 
         crew = Crew(configuration, device_changed, progress)
-        inspector = Inspector(crew, eye, settings, configuration.arm.centring, alarms, metrics, calibrated)
+        inspector = Inspector(crew, eye, settings, configuration.arm, alarms, metrics, calibrated)
         self.service = service = Service(
             configuration, records, crew, inspector, alarms, metrics, liveness, versions, calibrated
         )

@@ -118,6 +118,21 @@ class ArmSettings(Settings):
         le=500.0,
     )
     poses: ArmPoses = setting(ArmPoses(), title="Poses", description="The named places that the arm goes to.")
+    waits_at: Literal["home", "above_nest"] = setting(
+        "above_nest",
+        title="Waits at",
+        description="Where the arm waits between two fruit. Above the nest it is there at once; at home it leaves the "
+        "room above the nest to the line, and each fruit takes some 1.5 s longer.",
+    )
+    jaw_clearance_mm: float = setting(
+        3.0,
+        title="Jaws' clearance",
+        description="When the arm brings the jaws to a fruit they stand so much wider than the widest fruit that the "
+        "recipe expects: room for one beside the nest's middle.",
+        unit="mm",
+        ge=0.0,
+        le=30.0,
+    )
     centring: Centring = setting(
         Centring(), title="Centring", description="How the arm follows a contact that is off the field's middle."
     )

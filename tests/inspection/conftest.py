@@ -10,7 +10,7 @@ from station.inspection.states import State
 
 JAWS_CLOSE = {Action.CLOSE_TO_ONSET, Action.CLOSE_STEP}
 ARM_LEAVES = {Action.APPROACH, Action.CENTRE, Action.GO_HOME}
-MOVES = JAWS_CLOSE | ARM_LEAVES | {Action.OPEN_JAWS, Action.PLACE_ACCEPT, Action.PLACE_REJECT}
+MOVES = JAWS_CLOSE | ARM_LEAVES | {Action.OPEN_JAWS, Action.FREE_FRUIT, Action.PLACE_ACCEPT, Action.PLACE_REJECT}
 
 
 @dataclass(frozen=True)

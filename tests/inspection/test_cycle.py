@@ -166,7 +166,7 @@ def test_a_fruit_is_centred_and_looked_at_again_within_one_inspection():
     assert counted[Action.CENTRE] == 2
     assert counted[Action.TAKE_REFERENCE] == counted[Action.PUBLISH] == counted[Action.RECORD] == 1
     for place in (place for place, action in enumerate(actions) if action == Action.CENTRE):
-        assert actions[place - 1] == Action.OPEN_JAWS, "the arm moves with open jaws alone"
+        assert actions[place - 1] == Action.FREE_FRUIT, "the arm moves with open jaws alone"
 
 
 @pytest.mark.parametrize("state", [State.OPENING_AGAIN, State.CENTRING])

@@ -1,19 +1,16 @@
-"""What is measured, or moved, while something else is waited for: it comes to the same, and nothing is done twice."""
+"""Measurement ahead: what is measured while more frames are captured comes to the same, and nothing is done twice."""
 
 import asyncio
-import time
 from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from station.devices.camera.interface import Frame
-from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.service import eye as eye_module
 from station.service.eye import Eye
-from station.service.grip import Cell, Grip, GripStep
+from station.service.grip import GripStep
 from station.service.keeping import Kept
 from station.service.reference import Golden
 from station.settings.recipe import find_recipe
@@ -141,52 +138,3 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
     again = [tracker.measure_step([each.image for each in frames]) for frames in steps[2:]]
     assert [one.area_px for one in again] == [one.area_px for one in contacts[1:]]
     assert [one.confidence for one in again] == [one.confidence for one in contacts[1:]]
-
-
-class SlowGripper:
-    """Fingers that get to a width at once, but on their way ahead wait until they are stopped."""
-
-    max_width_mm = 53.0
-
-    def __init__(self) -> None:
-        self.asked_mm: list[float] = []
-        self.stops = 0
-        self._stopped = asyncio.Event()
-
-    async def move_to_width(self, width_mm: float, _speed_mm_s: float, _force_n: float) -> MoveResult:
-        ahead = bool(self.asked_mm) and not self.stops
-        self.asked_mm.append(width_mm)
-        if ahead:
-            await self._stopped.wait()
-            raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
-        return MoveResult(width_mm, 0, reading(width_mm))
-
-    async def stop(self) -> GripperReading:
-        self.stops += 1
-        self._stopped.set()
-        return reading(self.asked_mm[-1])
-
-
-class Camera:
-    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        return Frame(np.zeros((2, 2, 3), np.uint8), 1, time.monotonic())
-
-
-def test_fingers_on_their_way_to_the_next_width_stop_once_the_last_is_found_to_touch():
-
-    async def scenario():
-        gripper = SlowGripper()
-        grip = Grip(Cell(cast("Any", Camera()), cast("Any", gripper), None), BLUEBERRY)
-        largest_mm = BLUEBERRY.expected_width.largest_mm
-
-        async def touches(step):
-            await asyncio.sleep(0.01)
-            return step.move.width_mm < largest_mm + 0.5
-
-        before, start = await grip.approach(touches)
-        assert gripper.stops == 1
-        assert before is not None
-        assert start.move.width_mm < largest_mm + 0.5 <= before.move.width_mm
-        assert min(gripper.asked_mm) == pytest.approx(largest_mm - BLUEBERRY.steps.step_mm)
-
-    asyncio.run(scenario())

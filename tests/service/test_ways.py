@@ -28,7 +28,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             poses, line = cell.configuration.arm.poses, cell.line
 
             def stands_at():
-                places = {name: poses.joints_rad(name) for name in ("nest", "accept", "reject", "home")}
+                places = {name: poses.joints_rad(name) for name in ("nest", "accept", "reject", "above_nest")}
                 return [
                     name
                     for name, joints in places.items()
@@ -67,7 +67,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert done.done, done.why
             await line.ready()
             assert AlarmId.FRUIT_HELD not in active(cell)
-            assert stands_at() == ["home"]
+            assert stands_at() == ["above_nest"]
 
             crew = cell.station.service._crew
             renew, crew.renew_health = crew.renew_health, lambda _lease_s: None

@@ -78,8 +78,12 @@ class Gripper(Protocol):
         """
         ...
 
-    async def open(self) -> MoveResult:
-        """Let go: open fully. Idempotent."""
+    async def open(self, width_mm: float | None = None) -> MoveResult:
+        """Open fast: fully, or to a width. Idempotent.
+
+        Args:
+            width_mm: gap between the finger surfaces; None for `max_width_mm`.
+        """
         ...
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:

@@ -106,9 +106,14 @@ class Robotiq2F85:
                     raise GripperFaultError(status.fault)
                 await self._wait_until(deadline_s, "its activation", status)
 
-    async def open(self) -> MoveResult:
-        """Let go: open fully. Idempotent. Raises as `move_to_width`."""
-        return await self.move_to_width(self.max_width_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
+    async def open(self, width_mm: float | None = None) -> MoveResult:
+        """Open fast: fully, or to a width. Idempotent. Raises as `move_to_width`.
+
+        Args:
+            width_mm: gap between the finger surfaces; None for `max_width_mm`.
+        """
+        to_mm = self.max_width_mm if width_mm is None else width_mm
+        return await self.move_to_width(to_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:
         """Move until the width is reached or something is felt. Idempotent.
