@@ -42,6 +42,7 @@ from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 from station.settings.recipe import Recipe, load_recipes
 from station.twin.console import ask
+from station.twin.fruit import Kind, draw_fruit
 
 ROOT = Path(__file__).resolve().parents[1]
 HOST = "127.0.0.11"
@@ -106,7 +107,8 @@ async def inspect(configuration: Configuration) -> dict[str, list[Inspected]]:
                 ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
                 await ready()
                 began_s = time.monotonic()
-                trigger = Begin(trigger_id=repeat + 1, encoder=0, lot="")
+                length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
+                trigger = Begin(trigger_id=repeat + 1, encoder=0, lot="", fruit_length_mm_x10=length)
                 begun = await client.ask(trigger, Begun, deadline_s=5)
                 if begun.sequence is None:
                     raise SystemExit(f"the station refuses: {begun.refusal}")

@@ -78,12 +78,19 @@ class Inspector:
         return Event.JAWS_OPEN
 
     async def go_home(self) -> Event:
-        """Bring the arm to where it waits; from the nest, or from where it is not known, over the place above it."""
+        """Bring the arm to where it waits, and open the jaws fully meanwhile.
+
+        From the nest, or from where it is not known, the arm goes over the place above it.
+        """
         arm = self._crew.cell.arm
-        if arm is not None:
-            if (await arm.state()).at not in {"home", "above_nest", "accept", "reject"}:
-                await arm.move_to("above_nest")
-            await arm.move_to(self._arm.waits_at)
+
+        async def leave() -> None:
+            if arm is not None:
+                if (await arm.state()).at not in {"home", "above_nest", "accept", "reject"}:
+                    await arm.move_to("above_nest")
+                await arm.move_to(self._arm.waits_at)
+
+        await at_once(leave(), self._crew.cell.gripper.open())
         return Event.HOME
 
     async def take_reference(self, now: Inspection) -> Event:
@@ -98,23 +105,37 @@ class Inspector:
             )
             return Event.REFERENCE_BAD
         self._crew.watches[GRIPPER].heard()
-        recipe = now.active.recipe
-        frames = await self._grip(now, self._count).sound_frames(recipe.imaging.reference_frames)
-        self._crew.watches[CAMERA].heard()
-        now.reference_s = frames[-1].captured_s
-        self._examining = asyncio.ensure_future(self._examine(now, frames))
+        self._examining = asyncio.ensure_future(self._examined(now))
         return Event.REFERENCE_TAKEN
 
     async def approach(self, now: Inspection) -> Event:
-        """Bring the jaws to the fruit, a little wider than it may be, while the reference is examined."""
-        recipe, gripper = now.active.recipe, self._crew.cell.gripper
-        widest_mm = max(recipe.expected_width.largest_mm, recipe.steps.start_width_mm or 0.0)
-        await at_once(
-            self._grip(now).go("above_nest", "nest"),
-            gripper.open(min(widest_mm + self._arm.jaw_clearance_mm, gripper.max_width_mm)),
+        """Bring the jaws to the fruit, a little wider than it may be, while the reference is taken and examined."""
+        examining = self._examining
+        if examining is None:
+            raise RuntimeError("the arm approaches before a reference is taken")
+        good: list[bool] = []
+
+        async def examined() -> None:
+            good.append(await examining)
+
+        jaws = self._crew.cell.gripper.open(self._width_around(now))
+        await at_once(self._grip(now).go("above_nest", "nest"), jaws, examined())
+        return Event.ARRIVED if all(good) else Event.REFERENCE_BAD
+
+    def _width_around(self, now: Inspection) -> float:
+        """The jaws' width beside any fruit that the recipe expects, and beside the one that was met."""
+        recipe = now.active.recipe
+        widest_mm = max(
+            recipe.expected_width.largest_mm, recipe.steps.start_width_mm or 0.0, now.met_mm or 0.0, now.onset_mm or 0.0
         )
-        good = self._examining is not None and await self._examining
-        return Event.ARRIVED if good else Event.REFERENCE_BAD
+        return min(widest_mm + self._arm.jaw_clearance_mm, self._crew.cell.gripper.max_width_mm)
+
+    async def _examined(self, now: Inspection) -> bool:
+        """Take the reference's frames, while nothing touches the gel, and examine them."""
+        frames = await self._grip(now, self._count).sound_frames(now.active.recipe.imaging.reference_frames)
+        self._crew.watches[CAMERA].heard()
+        now.reference_s = frames[-1].captured_s
+        return await self._examine(now, frames)
 
     async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
         """Whether the frames may serve as the reference; tells why not."""
@@ -289,14 +310,16 @@ class Inspector:
 
     async def place(self, now: Inspection) -> Event:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
-        if self._settings.placing == "arm" and self._crew.cell.arm is not None:
+        carried = self._settings.placing == "arm" and self._crew.cell.arm is not None
+        if carried:
             await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
+        width_mm = None if carried else self._width_around(now)
         try:
-            await self._crew.cell.gripper.open()
+            await self._crew.cell.gripper.open(width_mm)
         except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
             # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
             # unknown needs a person.
-            await self._crew.cell.gripper.open()
+            await self._crew.cell.gripper.open(width_mm)
         return Event.PLACED
 
     @staticmethod
