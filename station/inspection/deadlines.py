@@ -71,6 +71,8 @@ _WAITS_FOR = {
         State.APPROACHING,
         State.CENTRING,
         State.RETREATING,
+        State.RETREATING_READY,
+        State.RETREATING_ACCEPTED,
         State.HOMING,
         State.HOMING_UNRECORDED,
         State.RECOVERING,
@@ -86,6 +88,7 @@ _WAITS_FOR = {
     Event.CAMERA_FAULT: (State.REFERENCE, State.CAPTURING, State.CAPTURING_MEASURING),
     Event.RECORDS_FAULT: (
         State.ACCEPTING,
+        State.RETREATING_ACCEPTING,
         State.CLEARING,
         State.RECORDING_ACCEPT,
         State.RECORDING_REJECT,
@@ -127,7 +130,8 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
         + 2 * FREED_BY_MM / recipe.steps.step_mm * (step_s + pace.measure_s)
     )
     inspection_s = GRACE_S + INSPECTION_MARGIN * (
-        expected_s[State.REFERENCE]
+        expected_s[State.RETREATING_ACCEPTED]
+        + expected_s[State.REFERENCE]
         + expected_s[State.APPROACHING]
         + expected_s[State.CLOSING_TO_ONSET]
         + press_s
@@ -189,5 +193,7 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
         State.RECOVERING: _RECOVERY_S,
     }
     expected_s |= dict.fromkeys(_OPENING, opening_s)
-    expected_s |= dict.fromkeys((State.RETREATING, State.HOMING, State.HOMING_UNRECORDED), 2 * pace.arm_move_s)
+    leaving = (State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED)
+    # The jaws open meanwhile.
+    expected_s |= dict.fromkeys((*leaving, State.HOMING, State.HOMING_UNRECORDED), max(2 * pace.arm_move_s, opening_s))
     return expected_s | dict.fromkeys(_WAITS_FOR[Event.RECORDS_FAULT], pace.record_s)

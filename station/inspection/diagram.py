@@ -51,12 +51,15 @@ COLUMNS: tuple[tuple[str, dict[State, int]], ...] = (
         "judged",
         {
             State.RETREATING: 0,
-            State.RELEASING: 2,
-            State.RECORDING_RELEASE: 3,
-            State.PLACING_ACCEPT: 5,
-            State.RECORDING_ACCEPT: 6,
-            State.PLACING_REJECT: 7,
-            State.RECORDING_REJECT: 8,
+            State.RELEASING: 1,
+            State.RECORDING_RELEASE: 2,
+            State.RETREATING_ACCEPTED: 3,
+            State.RETREATING_ACCEPTING: 4,
+            State.RETREATING_READY: 5,
+            State.PLACING_ACCEPT: 6,
+            State.RECORDING_ACCEPT: 7,
+            State.PLACING_REJECT: 8,
+            State.RECORDING_REJECT: 9,
         },
     ),
     (
@@ -80,7 +83,7 @@ COLOURS = {False: "#dfe7ee", True: "#f3d9d4"}
 def diagram() -> str:
     """The drawing, an SVG of fixed text: black on white, readable without colour."""
     arrows = _arrows()
-    width, height = len(COLUMNS) * COLUMN_PX + EDGE_PX, 9 * ROW_PX + 20
+    width, height = len(COLUMNS) * COLUMN_PX + EDGE_PX, 10 * ROW_PX + 20
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif">',
         '<marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" orient="auto">',

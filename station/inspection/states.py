@@ -40,6 +40,10 @@ class State(StrEnum):
     PLACING_REJECT = "placing_reject"
     RELEASING = "releasing"
     RETREATING = "retreating"
+    RETREATING_READY = "retreating_ready"
+    """Fruit and jaws are free, so that the next trigger is accepted already."""
+    RETREATING_ACCEPTING = "retreating_accepting"
+    RETREATING_ACCEPTED = "retreating_accepted"
     RECORDING_HELD = "recording_held"
     OPENING_HELD = "opening_held"
     OPENING_UNRECORDED = "opening_unrecorded"
@@ -120,7 +124,14 @@ STATES: dict[State, StateFacts] = {
     State.PLACING_ACCEPT: _inspecting("The fruit goes where good fruit goes."),
     State.PLACING_REJECT: _inspecting("The fruit goes where rejected fruit goes."),
     State.RELEASING: _inspecting("The jaws open and leave the fruit where it is."),
-    State.RETREATING: _inspecting("The arm goes home.", PackmlState.COMPLETING),
+    State.RETREATING: _inspecting("The arm leaves the nest.", PackmlState.COMPLETING),
+    State.RETREATING_READY: StateFacts(
+        PackmlState.COMPLETING, None, "The arm leaves the nest; the next trigger is accepted already."
+    ),
+    State.RETREATING_ACCEPTING: _inspecting(
+        "A trigger is made durable while the arm leaves the nest.", PackmlState.STARTING
+    ),
+    State.RETREATING_ACCEPTED: _inspecting("The next inspection begins once the arm has left the nest."),
     State.RECORDING_HELD: _inspecting("A device failed; NO_RESULT is made durable.", PackmlState.HOLDING),
     State.OPENING_HELD: _preparing("A device failed; the jaws open if they can.", PackmlState.HOLDING),
     State.OPENING_UNRECORDED: _preparing("The outcome could not be made durable; the jaws open.", PackmlState.HOLDING),

@@ -229,7 +229,7 @@ class Orders:
             request: which stop.
             by: who gives it, and in what role.
         """
-        if STATES[self._service.state].refusal is Refusal.BUSY:
+        if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
             return CommandDone(done=False, why="an inspection is under way")
         log.info("a person at the cell asks for: %s", request.what)
         try:
@@ -265,7 +265,7 @@ class Orders:
             return why_not
         service.stop_wanted = False
         await asyncio.to_thread(self._kept.write, _STOPPED, b"no")
-        if state is State.IDLE:
+        if state in {State.IDLE, State.RETREATING_READY}:
             return ""
         service.reset_wanted = True
         self._crew.confirmed_clear = True

@@ -9,7 +9,7 @@ from functools import partial
 from station.channel.line import Begin, Begun, Outcome
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.cycle import REASONS, UNJUDGED, Action, Event, Raise
+from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
 from station.records.model import Trigger
@@ -206,9 +206,9 @@ class Service:
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Keep the phases' times, and what hangs on a state."""
         self._told_late = None
-        if self._now is not None and STATES[after].refusal is Refusal.BUSY and after is not State.ACCEPTING:
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
-        inspecting_now = STATES[state].refusal is Refusal.BUSY and state is not State.ACCEPTING
+        inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
         self._crew.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
