@@ -258,7 +258,8 @@ class Grip:
             if before is not None or from_mm >= widest_mm:
                 break
             from_mm += step_mm
-        while not await touches(start := await self.step(0, seen_mm)):
+        # Without the pause of a step: nothing creeps yet where nothing is pressed.
+        while not await touches(start := await self._glance(seen_mm, 0, self._recipe.imaging.frames_per_step)):
             seen_mm, nearer = await self._search(seen_mm - FINEST_STEP_MM, touches)
             before = nearer or before
         return before, start
@@ -310,9 +311,9 @@ class Grip:
             f"{self._recipe.name} in the nest, and is the arm there?"
         )
 
-    async def _glance(self, width_mm: float) -> GripStep:
+    async def _glance(self, width_mm: float, number: int = -1, frames: int = 1) -> GripStep:
         move = await self.close_to(width_mm)
-        return GripStep(-1, move, await self.sound_frames(1))
+        return GripStep(number, move, await self.sound_frames(frames))
 
     async def let_go(self) -> str | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
