@@ -1,20 +1,27 @@
-"""What one fruit's cycle is made of: motion, settling, camera, ours; beside the same moves bare.
+"""One fruit's cycle: its times, fruit a minute, and what of it is motion, settling, camera and ours.
 
-Run with `./run bench cycle`. Starts a twin with an arm and the station's process, has fruit inspected over the
-channel, then makes the same moves and waits without the station: the same drivers, the measured widths, as many
-frames, nothing else. Writes `docs/cycle-time.md`.
+Run with `./run bench cycle [--before REVISION]`. Starts a twin with an arm and the station's process, has fruit
+inspected over the channel, one by one and then as fast as triggers are accepted, and makes the same moves and waits
+without the station: the same drivers, the measured widths, as many frames, nothing else. With a revision of the
+repository the same fruit are inspected by the station of then in the same run. Writes `docs/cycle-time.md` and
+`docs/images/cycle-time.svg`.
 """
 
+import argparse
 import asyncio
+import contextlib
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
 
 from station.channel.client import ChannelClient
 from station.channel.line import (
@@ -37,21 +44,25 @@ from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.records.model import FullRecord
 from station.records.records import Records
-from station.service.grip import FINEST_STEP_MM, Cell, Grip
+from station.service.grip import FINEST_STEP_MM, MOST_UNSEEN_MM, Cell, Grip, at_once
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 from station.settings.recipe import Recipe, load_recipes
 from station.twin.console import ask
 from station.twin.fruit import Kind, draw_fruit
+from station.vocabulary import PackmlState
 
 ROOT = Path(__file__).resolve().parents[1]
+CHART = ROOT / "docs" / "images" / "cycle-time.svg"
 HOST = "127.0.0.11"
 CONSOLE = 49311
 FRUIT = (("strawberry", 4), ("raspberry", 4), ("blueberry", 1))
-REPEATS = 4
+REPEATS = 5
+IN_A_ROW = 8
 PATIENCE_S = 120.0
 PHASES = {
-    "reference": "reference",
+    "retreating_accepted": "approach",
+    "reference": "approach",
     "approaching": "approach",
     "closing_to_onset": "onset",
     "opening_again": "onset",
@@ -63,6 +74,55 @@ PHASES = {
     "recording_reject": "judging and recording",
 }
 """What the cycle's states belong to here; all others are steps."""
+PARTS = {
+    ("approach", "motion"): ("arm down, reference meanwhile", "#4477aa"),
+    ("onset", "motion"): ("closing to the onset", "#66ccee"),
+    ("onset", "camera"): ("its frames", "#aaddee"),
+    ("steps", "motion"): ("steps", "#228833"),
+    ("steps", "settling"): ("settling", "#ccbb44"),
+    ("steps", "camera"): ("frames of steps", "#ee6677"),
+    ("release", "motion"): ("release", "#aa3377"),
+}
+"""The chart's parts: phase and kind, their name and colour."""
+DOCUMENT = """\
+# Cycle time: fruit a minute, and what limits it
+
+Written by `./run bench cycle`: medians of {repeats} inspections of each fruit on the twin with its arm, which waits
+above the nest, with a load of {load:.1f} on {cores} cores. *Next trigger* is where the station accepts one again:
+fruit and jaws are free, and the arm leaves meanwhile. *Fruit a minute* is measured in a row of {in_a_row}, each
+triggered as soon as it is accepted; the arm's way back is in it. The fruit lies in the middle. One that is centred
+takes some 0.5 s more, one that is pressed twice some 2 s. Unverified on hardware.
+
+{table}
+
+*Before* is the station as it was before it closed without stops, in the same run.
+
+![The floor's parts and ours](images/cycle-time.svg)
+
+The **floor**: the same drivers make the same moves to the same widths, settle as long and take as many frames, with
+no reference examined, nothing measured, judged, recorded or published. Ours is the cycle less the floor; what others
+make of a busy machine's processors counts as ours.
+
+**What limits it**: closing at 20 mm/s, the slowest that the 2F-85 goes, from just wider than the widest fruit that
+the recipe expects; the pause of 0.2 s and three frames at 30 frames/s in each step; and the arm's way down.
+
+## Overshoot
+
+The fingers close until a frame that shows the contact is measured, and then stop: they run on for as long as that
+frame is old and the gripper takes to react. From the first frame with a contact on, mm:
+
+{overshoots}
+
+It is bounded by {most_mm:g} mm and one reaction, since the fingers wait for a measurement that is late. The onset is
+then found count by count from where nothing touched, so its uncertainty is one count, as in
+[the budget](quality.md).
+
+## Where ours goes
+
+Each phase of the station's less the floor's, ms, medians.
+
+{phases}
+"""
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 
 
@@ -70,72 +130,88 @@ class Inspected(NamedTuple):
     """One fruit as the station inspected it."""
 
     to_outcome_s: float
-    to_ready_s: float
+    to_next_s: float
+    """To where the next trigger is accepted."""
     sequence: int
     outcome: str
+    overshoot_mm: float = 0.0
+    """By the record."""
 
 
-def start(name: str, file: Path, *arguments: str) -> subprocess.Popen[str]:
+class Pace(NamedTuple):
+    """All inspections of one kind of fruit."""
+
+    alone: list[Inspected]
+    """Each triggered with the arm at rest where it waits."""
+    a_minute: float
+    """Fruit a minute where each is triggered as soon as the station accepts it."""
+
+
+def start(name: str, file: Path, *arguments: str, tree: Path = ROOT) -> subprocess.Popen[str]:
     """One of the station's programs; returns once it runs, and ends with its messages where it does not."""
     command = [sys.executable, "-m", "station", name, *arguments, "--config", str(file)]
     messages = file.with_name(f"{name}.log")
     with messages.open("w") as output:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True)
+        environment = {**os.environ, "PYTHONPATH": str(tree)}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True, cwd=tree, env=environment)
     if not any(line.startswith("running") for line in process.stdout or ()):
         process.communicate()
         raise SystemExit(f"station {name} ended with exit code {process.returncode}:\n{messages.read_text()}")
     return process
 
 
-async def inspect(configuration: Configuration) -> dict[str, list[Inspected]]:
-    """Every fruit some times over the channel."""
+@contextlib.contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[None]:
+    """End a program after its use."""
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.communicate()
+
+
+async def inspect(configuration: Configuration) -> dict[str, Pace]:
+    """Every fruit some times over the channel, from rest and in a row."""
     recipes, results = load_recipes(), {}
     endpoint = line_endpoint(configuration.handshake, configuration.home)
     async with ChannelClient(endpoint, "the station") as client:
 
-        async def ready() -> None:
+        async def ready(*, at_rest: bool = False) -> None:
             deadline_s = time.monotonic() + PATIENCE_S
-            while not (state := await client.ask(LINE, StationState, deadline_s=20)).ready:
+            while True:
+                state = await client.ask(LINE, StationState, deadline_s=20)
+                if state.ready and (not at_rest or state.packml_state is PackmlState.IDLE):
+                    return
                 if time.monotonic() > deadline_s:
                     raise SystemExit(f"the station does not become ready: {state.why_not_ready}")
                 await asyncio.sleep(0.005)
 
+        async def one(kind: str, seed: int, number: int, *, at_rest: bool) -> Inspected:
+            await ready(at_rest=at_rest)
+            began_s = time.monotonic()
+            length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
+            trigger = Begin(trigger_id=number, encoder=0, lot="", fruit_length_mm_x10=length)
+            begun = await client.ask(trigger, Begun, deadline_s=5)
+            if begun.sequence is None:
+                raise SystemExit(f"the station refuses: {begun.refusal}")
+            outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
+            told_s = time.monotonic() - began_s
+            await ready()
+            again_s = time.monotonic() - began_s
+            await client.ask(Published(outcome=outcome), Noted, deadline_s=5)
+            await client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
+            return Inspected(told_s, again_s, outcome.sequence, outcome.outcome)
+
         for kind, seed in FRUIT:
             order = Command(command=CommandName.CHANGE_RECIPE, argument=recipes[kind].plc_number)
             await client.ask(order, CommandDone, deadline_s=40)
-            for repeat in range(REPEATS):
-                ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
-                await ready()
-                began_s = time.monotonic()
-                length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
-                trigger = Begin(trigger_id=repeat + 1, encoder=0, lot="", fruit_length_mm_x10=length)
-                begun = await client.ask(trigger, Begun, deadline_s=5)
-                if begun.sequence is None:
-                    raise SystemExit(f"the station refuses: {begun.refusal}")
-                outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
-                told_s = time.monotonic() - began_s
-                await ready()
-                again_s = time.monotonic() - began_s
-                await client.ask(Published(outcome=outcome), Noted, deadline_s=5)
-                await client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
-                results.setdefault(kind, []).append(Inspected(told_s, again_s, outcome.sequence, outcome.outcome))
+            ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
+            alone = [await one(kind, seed, 1 + number, at_rest=True) for number in range(REPEATS)]
+            began_s = time.monotonic()
+            for number in range(IN_A_ROW):
+                await one(kind, seed, 1 + REPEATS + number, at_rest=False)
+            results[kind] = Pace(alone, 60 * IN_A_ROW / (time.monotonic() - began_s))
     return results
-
-
-def widths_mm(recipe: Recipe, record: FullRecord, widest_mm: float) -> tuple[list[float], list[float]]:
-    """The widths that the station asked for: at a glance on the way to the onset, and in full steps."""
-    judged = record.judged
-    if judged is None or not judged.curve:
-        raise SystemExit(f"inspection {record.sequence} was not measured: {judged and judged.explanation}")
-    onset_mm, step_mm = judged.curve[0].width_mm, recipe.steps.step_mm
-    glances = [min(recipe.expected_width.largest_mm, widest_mm)]
-    while glances[-1] > onset_mm:
-        glances.append(glances[-1] - step_mm)
-    fine = [glances[-1] + step_mm]
-    while fine[-1] > onset_mm + FINEST_STEP_MM / 2:
-        fine.append(fine[-1] - FINEST_STEP_MM)
-    steps = [onset_mm - number * step_mm for number in range(len(judged.curve))]
-    return [*glances, *fine], steps
 
 
 class Stopwatch:
@@ -144,6 +220,7 @@ class Stopwatch:
     def __init__(self) -> None:
         self.kinds_s: dict[str, float] = {"motion": 0.0, "settling": 0.0, "camera": 0.0}
         self.phases_s: dict[str, float] = {}
+        self.parts_s: dict[tuple[str, str], float] = {}
 
     async def time(self, phase: str, kind: str, work: Awaitable[object]) -> None:
         """Wait for something."""
@@ -151,29 +228,46 @@ class Stopwatch:
         await work
         spent_s = time.monotonic() - began_s
         self.kinds_s[kind] += spent_s
+        self.parts_s[phase, kind] = self.parts_s.get((phase, kind), 0.0) + spent_s
         self.phases_s[phase] = self.phases_s.get(phase, 0.0) + spent_s
 
 
-Spent = dict[str, list[tuple[dict[str, float], Stopwatch]]]
-"""For each inspection of a fruit the station's phases, and the floor."""
+Spent = dict[str, list[tuple[Inspected, dict[str, float], Stopwatch]]]
+"""For each inspection of a fruit from rest, the station's phases and the floor."""
 
 
-async def bare(cell: Cell, recipe: Recipe, record: FullRecord) -> Stopwatch:
+async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record: FullRecord) -> Stopwatch:
     """The same moves, waits and frames as in an inspection, and nothing else."""
     grip, watch, imaging = Grip(cell, recipe), Stopwatch(), recipe.imaging
-    glances, steps = widths_mm(recipe, record, cell.gripper.max_width_mm)
-    await watch.time("reference", "motion", cell.gripper.open())
-    await watch.time("reference", "camera", grip.sound_frames(imaging.reference_frames))
-    await watch.time("approach", "motion", grip.go("above_nest", "nest"))
-    for width_mm in glances:
-        await watch.time("onset", "motion", grip.close_to(width_mm))
+    judged = record.judged
+    if judged is None or not judged.curve:
+        raise SystemExit(f"inspection {record.sequence} was not measured: {judged and judged.explanation}")
+    onset_mm = judged.curve[0].width_mm
+    around_mm = min(recipe.expected_width.largest_mm + configuration.arm.jaw_clearance_mm, cell.gripper.max_width_mm)
+
+    async def frames() -> None:
+        await grip.sound_frames(imaging.reference_frames)
+
+    async def arrive() -> None:
+        await at_once(grip.go("above_nest", "nest"), cell.gripper.open(around_mm), frames())
+
+    await watch.time("approach", "motion", cell.gripper.open())
+    await watch.time("approach", "motion", arrive())
+    overshoot_mm = float(judged.measures.get("overshoot_mm") or 0.0)
+    await watch.time("onset", "motion", grip.close_to(onset_mm - overshoot_mm))
+    await watch.time("onset", "camera", grip.sound_frames(1))
+    await watch.time("onset", "motion", cell.gripper.open(onset_mm + 2 * FINEST_STEP_MM))
+    for counts in (2, 1):
+        await watch.time("onset", "motion", grip.close_to(onset_mm + counts * FINEST_STEP_MM))
         await watch.time("onset", "camera", grip.sound_frames(1))
-    for phase, width_mm in zip(["onset", *("steps" for _ in steps)], steps, strict=False):
-        await watch.time(phase, "motion", grip.close_to(width_mm))
-        await watch.time(phase, "settling", asyncio.sleep(imaging.settle_s))
-        await watch.time(phase, "camera", grip.sound_frames(imaging.frames_per_step))
-    await watch.time("release and return", "motion", cell.gripper.open())
-    await watch.time("release and return", "motion", grip.go("above_nest", "home"))
+    await watch.time("onset", "motion", grip.close_to(onset_mm))
+    await watch.time("onset", "camera", grip.sound_frames(imaging.frames_per_step))
+    for number in range(1, len(judged.curve)):
+        await watch.time("steps", "motion", grip.close_to(onset_mm - number * recipe.steps.step_mm))
+        await watch.time("steps", "settling", asyncio.sleep(imaging.settle_s))
+        await watch.time("steps", "camera", grip.sound_frames(imaging.frames_per_step))
+    await watch.time("release", "motion", cell.gripper.open(around_mm))
+    await at_once(grip.go("above_nest"), cell.gripper.open())
     return watch
 
 
@@ -185,8 +279,8 @@ def phases_s(record: FullRecord) -> dict[str, float]:
     return spent_s
 
 
-async def floors(configuration: Configuration, results: dict[str, list[Inspected]]) -> Spent:
-    """The station's phases and the bare moves of every inspection."""
+async def floors(configuration: Configuration, results: Mapping[str, Pace]) -> Spent:
+    """The station's phases and the bare moves of every inspection from rest that pressed once."""
     recipes, spent = load_recipes(), {}
     records = Records(configuration.home / "records", configuration.records, "bench")
     await records.reopen()
@@ -196,110 +290,158 @@ async def floors(configuration: Configuration, results: dict[str, list[Inspected
         await arm.ready(PATIENCE_S)
         arm.renew_health(600.0)
         await gripper.activate()
-        await arm.move_to("home")
+        await arm.move_to("above_nest")
         for kind, seed in FRUIT:
-            for inspected in results[kind]:
-                ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
+            ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
+            for inspected in results[kind].alone:
                 record = await records.inspection(inspected.sequence)
-                floor = await bare(Cell(camera, gripper, arm), recipes[kind], record)
-                spent.setdefault(kind, []).append((phases_s(record), floor))
+                if record.judged is None or record.judged.measures.get("closings") != 1:
+                    continue
+                overshoot_mm = float(record.judged.measures.get("overshoot_mm") or 0.0)
+                floor = await bare(configuration, Cell(camera, gripper, arm), recipes[kind], record)
+                spent.setdefault(kind, []).append(
+                    (inspected._replace(overshoot_mm=overshoot_mm), phases_s(record), floor)
+                )
     await gripper.close()
     await camera.close()
     await records.close()
     return spent
 
 
-def table(results: dict[str, list[Inspected]], spent: Spent) -> list[str]:
+def medians(pace: Pace) -> tuple[float, float]:
+    """Seconds to the outcome and to the next trigger."""
+    return (
+        statistics.median(each.to_outcome_s for each in pace.alone),
+        statistics.median(each.to_next_s for each in pace.alone),
+    )
+
+
+def table(results: Mapping[str, Pace], before: Mapping[str, Pace], spent: Spent) -> list[str]:
     """Medians over the repeats."""
     rows = []
     for kind, _ in FRUIT:
-        outcomes = ", ".join(sorted({each.outcome for each in results[kind]}))
-        outcome_s = statistics.median(each.to_outcome_s for each in results[kind])
-        cycle_s = statistics.median(each.to_ready_s for each in results[kind])
-        floors_s = [floor.kinds_s for _, floor in spent[kind]]
-        parts = {name: statistics.median(each[name] for each in floors_s) for name in floors_s[0]}
-        floor_s = sum(parts.values())
-        ours_s = cycle_s - floor_s
-        rows.append(
-            f"| {kind} | {outcomes} | {outcome_s:.2f} | {cycle_s:.2f} | {parts['motion']:.2f} | "
-            f"{parts['settling']:.2f} | {parts['camera']:.2f} | {floor_s:.2f} | {ours_s:.2f} | "
-            f"{100 * ours_s / cycle_s:.1f} % |"
-        )
-    return rows
+        pace = results[kind]
+        outcomes = ", ".join(sorted({each.outcome for each in pace.alone}))
+        outcome_s, next_s = medians(pace)
+        floor_s = statistics.median(sum(floor.kinds_s.values()) for _, _, floor in spent[kind])
+        ours_s = statistics.median(each.to_next_s - sum(floor.kinds_s.values()) for each, _, floor in spent[kind])
+        then = [f"{seconds:.2f}" for seconds in medians(before[kind])] if kind in before else ["", ""]
+        then.append(f"{before[kind].a_minute:.1f}" if kind in before else "")
+        cells = [kind, outcomes, f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}", *then]
+        rows.append(f"| {' | '.join(cells)} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / floor_s:.1f} % |")
+    names = ("fruit", "outcome", "to outcome, s", "to next trigger, s", "fruit a minute")
+    then = ("before: to outcome", "to next trigger", "fruit a minute")
+    header = [f"| {' | '.join((*names, *then, 'floor, s', 'ours, s', '% of the floor'))} |", "|---" * 11 + "|"]
+    return [*header, *rows]
 
 
-def phase_table(results: dict[str, list[Inspected]], spent: Spent) -> list[str]:
+def phase_table(spent: Spent) -> list[str]:
     """Where ours goes: each phase of the station's beside the floor's, medians, ms."""
-    names = ("reference", "approach", "onset", "steps", "last measurement", "judging and recording")
+    names = ("approach", "onset", "steps", "last measurement", "judging and recording")
     rows = []
     for kind, _ in FRUIT:
-        cells, rest_ms = (
-            [],
-            1000
-            * statistics.median(
-                all_.to_ready_s - sum(station.values()) - floor.phases_s["release and return"]
-                for all_, (station, floor) in zip(results[kind], spent[kind], strict=True)
-            ),
-        )
+        cells = []
         for name in names:
             ours_s = statistics.median(
-                station.get(name, 0.0) - floor.phases_s.get(name, 0.0) for station, floor in spent[kind]
+                station.get(name, 0.0) - floor.phases_s.get(name, 0.0) for _, station, floor in spent[kind]
             )
             cells.append(f"{1000 * ours_s:.0f}")
-        rows.append(f"| {kind} | {' | '.join(cells)} | {rest_ms:.0f} |")
-    return [f"| fruit | {' | '.join(names)} | trigger, release, return |", "|---" * 8 + "|", *rows]
+        rest_s = statistics.median(
+            each.to_next_s - sum(station.values()) - floor.phases_s["release"] for each, station, floor in spent[kind]
+        )
+        rows.append(f"| {kind} | {' | '.join(cells)} | {1000 * rest_s:.0f} |")
+    return [f"| fruit | {' | '.join(names)} | trigger and release |", "|---" * 7 + "|", *rows]
+
+
+def overshoot_table(spent: Spent) -> list[str]:
+    """How far the fingers ran on after the first frame with a contact."""
+    rows = []
+    for kind, _ in FRUIT:
+        ways_mm = sorted(each.overshoot_mm for each, *_ in spent[kind])
+        rows.append(f"| {kind} | {statistics.median(ways_mm):.1f} | {ways_mm[-1]:.1f} |")
+    return ["| fruit | median | most |", "|---|---|---|", *rows]
+
+
+def draw(spent: Spent) -> None:
+    """The floor's parts and ours, one bar for each fruit."""
+    figure = Figure(figsize=(9, 2.6), layout="constrained")
+    axes = figure.subplots()
+    kinds = [kind for kind, _ in FRUIT]
+    left = dict.fromkeys(kinds, 0.0)
+    for (phase, what), (label, colour) in PARTS.items():
+        widths = {
+            kind: statistics.median(floor.parts_s.get((phase, what), 0.0) for *_, floor in spent[kind])
+            for kind in kinds
+        }
+        axes.barh(
+            kinds, [widths[kind] for kind in kinds], left=[left[kind] for kind in kinds], label=label, color=colour
+        )
+        left = {kind: left[kind] + widths[kind] for kind in kinds}
+    ours = [max(0.0, statistics.median(each.to_next_s for each, *_ in spent[kind]) - left[kind]) for kind in kinds]
+    axes.barh(kinds, ours, left=[left[kind] for kind in kinds], label="ours", color="black")
+    axes.set_xlabel("seconds from the trigger to the next")
+    axes.invert_yaxis()
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.45), ncols=4, frameon=False, fontsize=8)
+    with mpl.rc_context({"svg.hashsalt": "cycle-time"}):
+        figure.savefig(CHART, metadata={"Date": None})
+
+
+def configured(folder: str) -> tuple[Path, Configuration]:
+    """A cell's configuration file, and what it says."""
+    file = Path(folder) / "station.yaml"
+    file.write_text(
+        f"home: {folder}\narm: {{host: {HOST}}}\n"
+        f"gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}}}\n"
+        "camera: {twin: {port: 49310}}\nmetrics: {port: 49312}\nrecords: {free_reserve_mb: 1}\n"
+        "service: {patience: 10.0}\n"
+    )
+    configuration = load_configuration(file, {})
+    calibrate_simulated_unit(configuration, "bench")
+    return file, configuration
+
+
+def inspected_before(revision: str) -> dict[str, Pace]:
+    """The same fruit by the station of a revision."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as home:
+        tree = Path(folder) / "tree"
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*git, "add", "--detach", str(tree), revision], check=True)
+        try:
+            file, configuration = configured(home)
+            with (
+                ended(start("twin", file, "--console", str(CONSOLE), tree=tree)),
+                ended(start("service", file, tree=tree)),
+            ):
+                return asyncio.run(inspect(configuration))
+        finally:
+            subprocess.run([*git, "remove", "--force", str(tree)], check=True)
 
 
 def main() -> None:
-    """Measure, print and write the table."""
+    """Measure, print, and write the document and its chart."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--before", metavar="REVISION", help="compare with the station of this revision")
+    revision = parser.parse_args().before
+    before = inspected_before(revision) if revision else {}
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "station.yaml"
-        file.write_text(
-            f"home: {folder}\narm: {{host: {HOST}}}\n"
-            f"gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}}}\n"
-            "camera: {twin: {port: 49310}}\nmetrics: {port: 49312}\nrecords: {free_reserve_mb: 1}\n"
-            "service: {patience: 10.0}\n"
-        )
-        configuration = load_configuration(file, {})
-        calibrate_simulated_unit(configuration, "bench")
-        twin = start("twin", file, "--console", str(CONSOLE))
-        try:
-            service = start("service", file)
-            try:
+        file, configuration = configured(folder)
+        with ended(start("twin", file, "--console", str(CONSOLE))):
+            with ended(start("service", file)):
                 results = asyncio.run(inspect(configuration))
-            finally:
-                service.terminate()
-                service.communicate()
             spent = asyncio.run(floors(configuration, results))
-        finally:
-            twin.terminate()
-            twin.communicate()
-    load = os.getloadavg()[0]
-    lines = [
-        "# How long a fruit takes, and what of it is ours",
-        "",
-        f"Written by `./run bench cycle`: medians of {REPEATS} inspections of each fruit on the twin with its arm,",
-        f"with a load of {load:.1f} on {os.cpu_count()} cores. The cycle is from trigger to ready again. Beside it,",
-        "in the same run, the floor: the same drivers make the same moves to the same widths, settle as long and take",
-        "as many frames, with no reference examined, nothing measured, judged, recorded or told. Ours is the cycle",
-        "less the floor; what others make of a busy machine's processors counts as ours.",
-        "",
-        "| fruit | outcome | to outcome, s | cycle, s | motion, s | settling, s | camera, s | floor, s | ours, s | % |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-        *table(results, spent),
-        "",
-        "## Where ours goes",
-        "",
-        "Each phase of the station's less the floor's, ms, medians. On the onset's last millimetres nothing else can",
-        "go on while a picture is measured, and a stride that was begun meanwhile on the way there is stopped. The",
-        "steps' measurements overlap their moves; their last one, after which an early stop ends the next step's move,",
-        "does not.",
-        "",
-        *phase_table(results, spent),
-        "",
-    ]
-    print("\n".join(lines))
-    (ROOT / "docs" / "cycle-time.md").write_text("\n".join(lines))
+    draw(spent)
+    document = DOCUMENT.format(
+        repeats=REPEATS,
+        in_a_row=IN_A_ROW,
+        load=os.getloadavg()[0],
+        cores=os.cpu_count(),
+        table="\n".join(table(results, before, spent)),
+        overshoots="\n".join(overshoot_table(spent)),
+        most_mm=MOST_UNSEEN_MM,
+        phases="\n".join(phase_table(spent)),
+    )
+    print(document)
+    (ROOT / "docs" / "cycle-time.md").write_text(document)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from station.calibration.gate import gated
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
-from station.devices.gripper.interface import MoveResult, ObjectState
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
 from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
@@ -20,7 +20,7 @@ from station.service.alarm_desk import AlarmDesk
 from station.service.calibrated import Calibrated
 from station.service.crew import CAMERA, GRIPPER, Crew
 from station.service.eye import Eye, Seen
-from station.service.grip import FRAME_DEADLINE_S, Grip, at_once, GripStep, NothingTouchedError, UnseenContactError
+from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError, at_once
 from station.service.inspection import Inspection
 from station.service.metrics import Metrics
 from station.service.reference import ALARMS, BadReferenceError
@@ -171,7 +171,9 @@ class Inspector:
                 start = await grip.step(0, plan.start_width_mm)
             else:
                 met = await grip.sweep(self._touches)
-                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip)):
+                stopped = await self._crew.cell.gripper.read()
+                now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
+                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip, stopped)):
                     now.closings = 1
                     now.let_go(met.width_mm)
                     return Event.OFF_MIDDLE
@@ -193,9 +195,9 @@ class Inspector:
         await self._eye.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    async def _first_contact(self, now: Inspection, grip: Grip) -> Way | None:
+    async def _first_contact(self, now: Inspection, grip: Grip, at: GripperReading) -> Way | None:
         """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
-        step = GripStep(-1, MoveResult(0.0, 0, await self._crew.cell.gripper.read()), await grip.sound_frames(1))
+        step = GripStep(-1, MoveResult(at.width_mm, at.echoed_count, at), await grip.sound_frames(1))
         return self._off_middle(now, await self._eye.measure(step))
 
     @staticmethod
