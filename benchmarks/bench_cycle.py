@@ -4,7 +4,7 @@ Run with `./run bench cycle [--before REVISION]`. Starts a twin with an arm and 
 inspected over the channel, one by one and then as fast as triggers are accepted, and makes the same moves and waits
 without the station: the same drivers, the measured widths, as many frames, nothing else. With a revision of the
 repository the same fruit are inspected by the station of then in the same run. Writes `docs/cycle-time.md` and
-`docs/images/cycle-time.svg`.
+`docs/images/cycle-time.svg`, and the pace into `README.md`.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from sections import write
 
 from station.channel.client import ChannelClient
 from station.channel.line import (
@@ -335,6 +336,15 @@ def table(results: Mapping[str, Pace], before: Mapping[str, Pace], spent: Spent)
     return [*header, *rows]
 
 
+def pace_table(results: Mapping[str, Pace]) -> list[str]:
+    """What a line builder asks first."""
+    rows = []
+    for kind, _ in FRUIT:
+        outcome_s, next_s = medians(results[kind])
+        rows.append(f"| {kind} | {results[kind].a_minute:.0f} | {outcome_s:.1f} | {next_s:.1f} |")
+    return ["| fruit | fruit a minute | trigger to outcome, s | to the next trigger, s |", "|---" * 4 + "|", *rows]
+
+
 def phase_table(spent: Spent) -> list[str]:
     """Where ours goes: each phase of the station's beside the floor's, medians, ms."""
     names = ("approach", "onset", "steps", "last measurement", "judging and recording")
@@ -442,6 +452,7 @@ def main() -> None:
     )
     print(document)
     (ROOT / "docs" / "cycle-time.md").write_text(document)
+    write(ROOT / "README.md", {"pace": pace_table(results)})
 
 
 if __name__ == "__main__":

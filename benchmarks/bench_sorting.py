@@ -8,10 +8,10 @@ published as the result.
 """
 
 import argparse
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from sections import write
 from sorting import tables
 from sorting.cycle import Inspected, Practice, Unmeasured, inspect
 from sorting.presses import PRESSED_ON, Closing, PressCache
@@ -91,18 +91,6 @@ def main() -> None:
     if asked.seeds == "judging" and set(asked.kinds) == set(KINDS):
         write(DOCUMENT, sections)
         write(README, {"errors": sections["errors"]})
-
-
-def write(document: Path, sections: Mapping[str, Sequence[str]]) -> None:
-    """Put tables between their marks in a document."""
-    text = document.read_text(encoding="utf-8")
-    for name, lines in sections.items():
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)"
-        table = "\n".join(lines) + "\n"
-        text, times = re.subn(pattern, lambda marks, table=table: marks[1] + table + marks[2], text, flags=re.DOTALL)
-        if times != 1:
-            raise SystemExit(f"{document}: expected the marks <!-- {name} --> and <!-- /{name} --> once")
-    document.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -267,7 +267,7 @@ class Grip:
     async def _seen(
         self, newer_than_s: float, readings: list[GripperReading], touches: Touches
     ) -> tuple[GripStep, bool]:
-        """The next frame with the width at its capture, from readings before and after it; whether it shows a contact."""
+        """The next frame with the width at its capture, interpolated; and whether it shows a contact."""
         frame = await self._sound_frame(newer_than_s)
         readings.append(await self._cell.gripper.read())
         times_s, widths_mm = [each.at_s for each in readings], [each.width_mm for each in readings]

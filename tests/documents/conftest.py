@@ -208,7 +208,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
             length_mm = round(drawn.length_mm)
             press = _pressed(shown, recipe, FruitSize(length_mm))
             verdict = judge(press, recipe)
-            decided = verdict.areas[0]
+            deciding = verdict.deciding
             began_ms = 1_782_828_000_000 + number * 9000
             sequence = await records.begin(
                 Trigger(number + 1, 0, "A-17", began_ms, snapshot, simulated=True, fruit_length_mm_x10=10 * length_mm)
@@ -222,9 +222,9 @@ async def _inspect(folder: Path, fruit: int) -> None:
                     explanation=tuple(finding.sentence for finding in verdict.findings),
                     late=False,
                     partial=verdict.partial,
-                    area_mm2=decided.area_mm2,
-                    area_px=None if decided.area_mm2 is None else round(decided.area_mm2 / MM_PER_PX**2),
-                    closing_mm=decided.closing_mm,
+                    area_mm2=None if deciding is None else deciding.area_mm2,
+                    area_px=None if deciding is None else deciding.area_px,
+                    closing_mm=None if deciding is None else deciding.closing_mm,
                     confidence=0.9,
                     ended_utc_ms=began_ms + 6000,
                     duration_ms=6000,

@@ -91,7 +91,7 @@ def quick_recipes(folder: Path) -> Path:
         if file.stem in {"strawberry", "raspberry", "blueberry"}:
             changes = {
                 "steps.number": 4,
-                "steps.result_closings_mm": [3],
+                "steps.result_closings_mm": [1.9, 3] if file.stem == "strawberry" else [3],
                 "steps.closing_limit_mm": 4.5,
                 "imaging.settle_s": 0.02,
                 "imaging.frames_per_step": 1,

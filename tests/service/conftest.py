@@ -167,7 +167,8 @@ def quick_recipes(folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
     for name in NUMBERS:
         values = load_recipes()[name].model_dump(mode="json")
-        values["steps"] |= {"number": 4, "result_closings_mm": [3], "closing_limit_mm": 4.5}
+        limits_mm = [limit["closing_mm"] for limit in values["damage"]["area"]]
+        values["steps"] |= {"number": 4, "result_closings_mm": limits_mm, "closing_limit_mm": 4.5}
         values["imaging"] |= {"settle_s": 0.02, "frames_per_step": 1, "reference_frames": 3}
         values["damage"]["growth_mm2_per_mm"] = 60
         values["damage"].pop("size", None)

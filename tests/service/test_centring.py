@@ -22,7 +22,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
             sensor_mm = []
             cell.at(State.RECORDING_ACCEPT, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))
             outcome = await cell.line.inspect()
-            await cell.line.ready()
+            await cell.reach(State.IDLE)
             record = await cell.station.service.ledger.records.inspection(outcome.sequence)
             return outcome, record.judged, sensor_mm, cell.twin.world.sensor_mm()
 
@@ -35,4 +35,4 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
     assert sensor_mm == pytest.approx((measures["moved_right_mm"], measures["moved_down_mm"]), abs=0.03)
     assert measures["left_off_mm"] < 0.6
     assert {"opening_again", "centring"} <= set(judged.phases_s)
-    assert at_last is None, "the arm is home again"
+    assert at_last is None, "the arm waits above the nest again"

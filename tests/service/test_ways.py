@@ -43,7 +43,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                 await line.ready()
                 cell.lay("blueberry", 1, bruised=bruised)
                 let_go = []
-                cell.at(State.RETREATING, lambda let_go=let_go: let_go.extend(stands_at()))
+                cell.at(State.RETREATING_READY, lambda let_go=let_go: let_go.extend(stands_at()))
                 outcome = await line.inspect()
                 await line.ready()
                 assert (outcome.outcome == "PASS") == (pose == "accept"), outcome
@@ -174,6 +174,7 @@ def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench)
             await cell.line.ready()
             assert lost
             assert AlarmId.FRUIT_HELD not in active(cell)
+            await cell.reach(State.IDLE)
             assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
 
     asyncio.run(scenario())
