@@ -10,7 +10,6 @@ from station.inspection.cycle import LATCHES, REASONS, ROWS, START, TABLE, Actio
 from station.inspection.states import STATES, State
 from station.vocabulary import PackmlState, Refusal
 
-
 READY = {State.IDLE, State.RETREATING_READY}
 
 
