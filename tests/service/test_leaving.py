@@ -1,0 +1,74 @@
+"""Triggers while the arm leaves the fruit before: accepted at once, begun when it has left, each with one outcome."""
+
+import asyncio
+
+import pytest
+
+from station.channel.line import CommandName
+from station.inspection.states import State
+from station.vocabulary import Reason, Refusal
+
+
+async def ready_with_arm(cell):
+    """A cell with its arm at rest, and a sound blueberry in the nest."""
+    assert (await cell.line.order(CommandName.CHANGE_RECIPE, 2)).done
+    async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated
+        while cell.phase is not State.IDLE:
+            await asyncio.sleep(0.1)
+    cell.lay("blueberry", 1)
+
+
+async def inspected_until_leaving(cell):
+    """One fruit, up to where the arm leaves it, ten times as slowly as usual."""
+    cell.at(State.RETREATING_READY, lambda: cell.twin.boards["arm"].set("slow", 9.0))
+    outcome = await cell.line.inspect()
+    await cell.line.ready()
+    assert cell.phase is State.RETREATING_READY
+    return outcome
+
+
+@pytest.mark.timeout(240)
+def test_a_trigger_is_accepted_while_the_arm_leaves_and_a_fault_then_gives_it_one_no_result(bench):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            line = cell.line
+            await ready_with_arm(cell)
+
+            first = await inspected_until_leaving(cell)
+            begun = await line.begin()
+            assert begun.refusal is None
+            cell.twin.boards["arm"].clear()
+            second = await line.outcome(begun.sequence)
+            await line.publish(second)
+            assert (first.outcome, second.outcome) == ("PASS", "PASS")
+            assert second.sequence == first.sequence + 1
+            record = await cell.station.service.ledger.records.inspection(second.sequence)
+            assert {"retreating_accepted", "approaching"} <= set(record.judged.phases_s)
+
+            await inspected_until_leaving(cell)
+            cell.at(State.RETREATING_ACCEPTED, lambda: cell.twin.boards["gripper"].set("off"))
+            begun = await line.begin()
+            lost = await line.outcome(begun.sequence)
+            await line.publish(lost)
+            assert (lost.outcome, lost.reasons[0]) == ("NO_RESULT", Reason.GRIPPER_FAULT)
+            cell.twin.boards["arm"].clear()
+            cell.twin.boards["gripper"].clear()
+            await line.ready()
+            assert (await line.inspect()).sequence == lost.sequence + 1
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_stop_while_the_arm_leaves_lets_no_trigger_in(bench):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            await ready_with_arm(cell)
+            await inspected_until_leaving(cell)
+            cell.station.service.stop_wanted = True
+            cell.twin.boards["arm"].clear()
+            refused = await cell.line.begin()
+            assert refused.refusal is Refusal.NOT_READY
+            await cell.reach(State.STOPPED)
+
+    asyncio.run(scenario())
