@@ -144,7 +144,7 @@ def main() -> int:
     time.sleep(2.0)
     assert controller.pid is not None
     server = psutil.Process(controller.pid)
-    rows = [("nobody connected", share({"controller": server}, MEASURE_S))]
+    rows = [("no client connected", share({"controller": server}, MEASURE_S))]
     rows.append(bare_receive(server))
     at_500, durations_s = asyncio.run(with_driver(server, 500.0))
     at_125, _ = asyncio.run(with_driver(server, 125.0))

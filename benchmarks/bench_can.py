@@ -128,7 +128,7 @@ def main() -> int:
         process.join()
     lines = [["what", "p50, ms", "p99, ms", "max, ms"], ["---"] * 4, *rows]
     text = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    text += f"\n\n{SHOTS} shots each, encoder at 100 Hz; {platform.machine()}, Python {platform.python_version()}; "
+    text += f"\n\n{SHOTS} actuations each, encoder at 100 Hz; {platform.machine()}, Python {platform.python_version()}; "
     text += f"load average of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores."
     print(text)
     before, _, rest = DOCUMENT.read_text(encoding="utf-8").partition(BEGIN)

@@ -108,7 +108,7 @@ def words(plan: month.Plan, told: Sequence[history.Told], fruit: float, took_s: 
     )
     if not plan.troubles:
         return head + f"without troubles, **{len(told)}** alerts fired.\n"
-    lines = ["| what | from | until | alert | told after | until |", "|---|---|---|---|---|---|"]
+    lines = ["| what | from | until | alert | fired after | until |", "|---|---|---|---|---|---|"]
     left = list(told)
     for trouble in plan.troubles:
         begin_s, end_s = plan.begin_s + trouble.begin_s, plan.begin_s + trouble.end_s
