@@ -147,14 +147,14 @@ def main() -> None:
             twin.terminate()
             twin.communicate()
     lines = [
-        "# What the twin and the drivers cost",
+        "# Processor load of the twin and the drivers",
         "",
         f"Written by `./run bench cell`: share of one core over {MEASURED_S:.0f} s, from the processes' own CPU times.",
-        "Every frame is taken, the arm's state with each, RTDE at 500 Hz. Ready: the gripper is looked at ten times a",
+        "Every frame is taken, the arm's state with each, RTDE at 500 Hz. Ready: the gripper is polled ten times a",
         "second. Gripping: in the nest a strawberry is squeezed by steps of 1 mm over and over, which no cycle does.",
         "",
         f"Load of the machine while it was measured, on {os.cpu_count()} cores: {min(loads):.1f} to {max(loads):.1f};",
-        "what else runs shares its caches and raises these figures.",
+        "other programs share its caches and raise these figures.",
         "",
         "| process | ready | gripping |",
         "|---|---|---|",
@@ -163,7 +163,7 @@ def main() -> None:
         f"| station: camera, gripper and arm drivers | {ready.station:.2f} | {gripping.station:.2f} |",
         f"| together | {sum(ready[:3]):.2f} | {sum(gripping[:3]):.2f} |",
         f"| frames/s | {ready.frames_per_s:.1f} | {gripping.frames_per_s:.1f} |",
-        f"| looks or steps of the gripper a second | {ready.steps_per_s:.1f} | {gripping.steps_per_s:.1f} |",
+        f"| polls or steps of the gripper a second | {ready.steps_per_s:.1f} | {gripping.steps_per_s:.1f} |",
         f"| peer: ur-rtde's receive interface alone at 500 Hz, read every 20 ms | {bare:.2f} | |",
         "",
     ]

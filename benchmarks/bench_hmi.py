@@ -139,16 +139,16 @@ def first_load(browser: Browser, address: str) -> Load:
 def written(load: Load, found: dict[str, list[Round]], conditions: str) -> str:
     """The document."""
     told = (
-        "Written by `./run bench hmi`: a demonstration with fruit after fruit, the page Run told what is new "
-        f"{1 / REFRESH_S:.0f} times a second. Three panels: clients in a process of their own that take the page's "
-        "stream and fetch its pictures, as panels ask that are computers of their own. Three browsers: headless "
+        "Written by `./run bench hmi`: a demonstration with fruit after fruit, the page Run updated "
+        f"{1 / REFRESH_S:.0f} times a second. Three panels: clients in a process of their own that read the page's "
+        "stream and fetch its pictures, as separate panel computers do. Three browsers: headless "
         "Chromium that renders the pages on the station's own cores, the worst case."
     )
     first = (
         f"First load of the page Run: {load.transferred_bytes / 1000:.0f} kB in {load.requests} requests, its picture "
-        f"shown after {load.shown_s:.1f} s."
+        f"displayed after {load.shown_s:.1f} s."
     )
-    lines = ["# What the operators' pages cost", "", told, "", *table(found), "", *differences(found)]
+    lines = ["# Cost of the operators' pages", "", told, "", *table(found), "", *differences(found)]
     return "\n".join([*lines, "", first, "", conditions, ""])
 
 

@@ -118,9 +118,9 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
         judged = {row for (row,) in database.execute(f"{query} WHERE sequence = i.sequence) = {STEPS}")}
         wrong["acknowledged outcomes missing"] = len(told["concluded"].keys() - judged)
         query = "SELECT sequence FROM inspections WHERE published_utc_ms NOT NULL AND outcome = 'FAIL'"
-        wrong["told outcomes missing"] = len(told["published"].keys() - {row for (row,) in database.execute(query)})
+        wrong["published outcomes missing"] = len(told["published"].keys() - {row for (row,) in database.execute(query)})
         query = "SELECT row FROM outbox WHERE kind = 'inspection'"
-        wrong["told outcomes not in the outbox"] = len(
+        wrong["published outcomes not in the outbox"] = len(
             told["published"].keys() - {r for (r,) in database.execute(query)}
         )
         query = "SELECT count(*) FROM inspections WHERE outcome IS NULL"
@@ -170,7 +170,7 @@ def main() -> int:
         "random moment,\none time in ten while it starts. A sample is part of every test run.\n\n"
         "| acknowledged before a kill | |\n| --- | --- |\n"
         f"| kills | {arguments.rounds} |\n| triggers | {len(told['begun'])} |\n"
-        f"| outcomes | {len(told['concluded'])} |\n| outcomes noted as told | {len(told['published'])} |\n"
+        f"| outcomes | {len(told['concluded'])} |\n| outcomes recorded as published | {len(told['published'])} |\n"
         f"| rows of the audit trail | {len(told['audited'])} |\n\n"
         "| wrong afterwards | |\n| --- | --- |\n"
         + "".join(f"| {what} | {count} |\n" for what, count in wrong.items())

@@ -153,9 +153,9 @@ def main() -> int:
         some, folder = rows // STATIONS, Path(place) / "station-0"
         alone_s, bare_s = undisturbed(server, folder, some), bare(server, folder, some)
         text = (
-            "# How fast other systems are told\n\n"
+            "# Speed of the outbox\n\n"
             f"`./run bench outbox` writes this page. {STATIONS} stations, {rows} inspections with 4 curve points "
-            f"each, one PostgreSQL. Half of\nthem are written while they are told; meanwhile the server is disturbed "
+            f"each, one PostgreSQL. Half of\nthem are written while others are published; meanwhile the server is disturbed "
             f"at random moments.\n\n"
             f"| done to the server | times |\n| --- | --- |\n| connections cut | {done['cut']} |\n"
             f"| crashed (stopped with `immediate`) | {done['crashed']} |\n| stopped orderly | {done['stopped']} |\n\n"

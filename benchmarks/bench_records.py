@@ -283,7 +283,7 @@ def main() -> int:
         filled_s, size_gb = time.perf_counter() - began_s, (folder / FILE_NAME).stat().st_size / 1e9
         found, exported = pages(folder, arguments.rows), exports(folder, arguments.rows)
     text = (
-        "# How long the records take\n\n"
+        "# Speed of the records\n\n"
         "`./run bench records` writes this page.\n\n## To write\n\nAn inspection is three commits with "
         "`synchronous=FULL`: begin, conclude with 13 curve points, published.\nA begin of the station also makes the "
         "sequence's mark durable, a second sync.\n\n"
@@ -292,10 +292,10 @@ def main() -> int:
         )
         + f"\n\n{INSPECTIONS} inspections each; one sync of 4 KiB took {synced_ms:.2f} ms (median).\n\n## To find\n\n"
         f"Pages of 50 among {arguments.rows:,} inspections ({size_gb:.1f} GB, generated in {filled_s:.0f} s), read "
-        "with their curves,\nup to 20 pages of each question. Bare sqlite3 gets the same question in plain SQL on "
+        "with their curves,\nup to 20 pages of each query. Bare sqlite3 gets the same query in plain SQL on "
         "the same tables and indexes, for the\nnumbers of the first page alone, and is given up after "
         f"{PATIENCE_S:g} s; the answers are the same.\n\n"
-        + markdown(["asked for", "found", "first page, ms", "slowest page, ms", "bare sqlite3, ms"], found)
+        + markdown(["query", "found", "first page, ms", "slowest page, ms", "bare sqlite3, ms"], found)
         + "\n\n## To export\n\nWith curves and recipes, in constant memory.\n\n"
         + markdown(["way", "inspections", "inspections/s", "MB"], exported)
         + f"\n\n{platform.machine()}, Python {platform.python_version()}, SQLite {sqlite3.sqlite_version}.\n"

@@ -193,7 +193,7 @@ def written(phases: dict[str, Phase], sizes: tuple[float, float, float], count: 
         parts.append(f"| {words} | {statistics.median(replies):.2f} | {tail} | {len(replies)} |\n")
     parts.append("\n" + _head("on the disk", ""))
     parts.append(f"| a fruit's record | {sizes[0]:.1f} kB |\n")
-    parts.append(f"| a fruit's images, where they are kept | {sizes[1] / 1e3:.1f} MB |\n")
+    parts.append(f"| a fruit's images, where they are stored | {sizes[1] / 1e3:.1f} MB |\n")
     parts.append(f"| an empty database | {sizes[2]:.2f} MB |\n")
     daily, quota_mb = 60 * HOURS * 60 / seconds, Configuration().records.images_quota_mb
     parts.append(

@@ -231,7 +231,7 @@ def gauge_table(study: GaugeStudy) -> str:
     facts = "\n".join(f"- {name}: {words}." for name, words in study.facts)
     return (
         f"{facts}\n\n{shown}\n\n{verdict(gauge)[1]} The interaction is "
-        f"{'pooled' if gauge.pooled else 'significant and stands for itself'}."
+        f"{'pooled' if gauge.pooled else 'significant and not pooled'}."
     )
 
 

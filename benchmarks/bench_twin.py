@@ -188,7 +188,7 @@ def health() -> str:
                     counts[2] += named == {fault.removeprefix("frame_")}
     rows: list[list[object]] = [["good", good, false, "-"]]
     rows += [[fault.removeprefix("frame_"), *counts] for fault, counts in found.items()]
-    return table(["frames", "number", "said to have a fault", "rightly named"], rows)
+    return table(["frames", "number", "reported as faulty", "correctly named"], rows)
 
 
 def milliseconds(call: Callable[[], object], times: int) -> float:

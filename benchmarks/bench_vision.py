@@ -126,7 +126,7 @@ def main() -> None:
     with threadpool_limits(1):
         rows = paper_rows(image, reference) + whole_rows()
     lines = [
-        "# How long a measurement takes",
+        "# Speed of the measurement",
         "",
         f"Written by `./run bench vision`: medians of {RUNS} runs ({PEER_RUNS} of the other libraries), one thread,",
         f"640x480: the stages of a simulated raspberry at {CLOSINGS_MM[1]:g} mm of closing, the whole methods of four",

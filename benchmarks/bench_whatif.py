@@ -107,7 +107,7 @@ def main() -> None:
     for press in presses:
         judge(press, draft)
     alone = len(presses) / (time.perf_counter() - began_s)
-    text = f"""# How fast the what-if is
+    text = f"""# Speed of the what-if
 
 {number} stored inspections of strawberries, judged again by a draft; `./run bench whatif` makes this page. The
 better of two runs each, on {os.cpu_count()} cores with a load of {load:.0f} before: where other work fills them,

@@ -14,7 +14,7 @@ import psutil
 from bench_plc import Figures, measured
 from playwright.sync_api import Browser
 
-NOBODY, PANELS, BROWSERS = "nobody looks", "three panels", "three browsers on these cores"
+NOBODY, PANELS, BROWSERS = "no client", "three panels", "three browsers on these cores"
 LOOKERS = 3
 SCAN_US = 10_000
 MOST_PERCENT = 5
@@ -156,7 +156,7 @@ def table(found: dict[str, list[Round]]) -> list[str]:
 
 def differences(found: dict[str, list[Round]]) -> list[str]:
     """Each condition against nobody looking, round by round, and what follows."""
-    lines = ["| against nobody looking | " + " | ".join(list(found)[1:]) + " |", "|---|" + "---|" * (len(found) - 1)]
+    lines = ["| against no client | " + " | ".join(list(found)[1:]) + " |", "|---|" + "---|" * (len(found) - 1)]
     sentences = []
     told = {row: {name: _against(found, name, row) for name in list(found)[1:]} for row in (BOTH, P50, P99)}
     for row, each in told.items():
@@ -200,5 +200,5 @@ def conditions_of(rounds: int, seconds: float) -> str:
     return (
         f"{rounds} rounds of {seconds:g} s for each, another first in each round; median, and lowest to highest round. "
         f"FastAPI {version('fastapi')}, uvicorn {version('uvicorn')}, Python {sys.version.split()[0]}, {CORES} cores "
-        "that twin, station, line, who looks and other work share."
+        "that twin, station, line, clients and other work share."
     )

@@ -7,24 +7,24 @@ from .play import Row
 from .scenario import ClockFault, DeviceFault, DiskFault, NestFault, Phase, ProcessFault, Scenario
 
 _ELSEWHERE = re.compile(r"/tmp/[^/ ]+/")
-_HEAD = """# What becomes of the fruit when something fails
+_HEAD = """# Effect of faults on the fruit
 
 <!-- made by ./run bench faults -->
 
 Written by `./run bench faults`: the simulated cell, the station's process and the PLC interface as real processes
-under the supervisor, the line's PLC program on Modbus TCP. Each row begins a fault at a phase of one fruit's
-inspection, as it can be seen from outside, takes it back, and then has a good fruit inspected. A row holds where
+under the supervisor, the line's PLC program on Modbus TCP. Each row starts a fault at a phase of one fruit's
+inspection, as visible from outside, ends it, and then inspects a good fruit. A row holds where
 
 - the accepted trigger got exactly one result, with its own id, that never changed or came again,
-- SQLite's record says what the PLC read, and that it was acknowledged,
-- a PASS has a whole curve that the station judged so,
-- the jaws stand open in the end, by the twin's truth,
-- the station was ready again by itself, or stayed stopped with a sentence on why, and was ready after the verbs given,
+- the record in SQLite equals what the PLC read, and is acknowledged,
+- a PASS has a complete curve that the station judged as PASS,
+- the jaws are open at the end, by the twin's truth,
+- the station was ready again by itself, or stayed stopped with a sentence on the reason, and was ready after the given commands,
 - the next fruit, a good one, got PASS.
 
-Phases: *trigger*: the PLC has seen its trigger accepted; *approach*: the arm moves; *stepping*: the fruit is deformed
-by 0.5 mm; *releasing*: the PLC sees the result. Scenarios and what is expected of each: `tests/reliability/scenarios`.
-The station works with a quick recipe of 6 steps and a patience of 5; times are from the fault's end, or the last verb,
+Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm moves; *stepping*: the fruit is deformed
+by 0.5 mm; *releasing*: the PLC reads the result. Scenarios and their expected results: `tests/reliability/scenarios`.
+The station works with a quick recipe of 6 steps and a patience of 5; times are from the fault's end, or the last command,
 to ready for a trigger, on a machine with other work.
 
 """
@@ -47,7 +47,7 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
         "|---|---|---|---|---|---|",
         *(_line(row, known[row.scenario]) for row in rows),
         "",
-        "## What the station says",
+        "## Reasons for not ready",
         "",
         "The last sentence at `/readyz` while it was not ready, in the phase stepping or the first played.",
         "",

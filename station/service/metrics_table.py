@@ -103,7 +103,7 @@ TABLE: dict[str, Row] = {
         "station_references_refused",
         "counter",
         ("id",),
-        "Pictures of the untouched gel that could not be a reference, by the alarm that tells why",
+        "Refused reference images of the untouched gel, by alarm",
         known=tuple((alarm,) for alarm in REFERENCE_ALARMS),
     ),
     "reference_age": Row("station_reference_age_seconds", "gauge", (), "Age of the reference in use", at_scrape=True),
@@ -187,13 +187,13 @@ TABLE: dict[str, Row] = {
         known=(("kept",), ("dropped",), ("failed",), ("removed",)),
     ),
     "outbox_connected": Row(
-        "station_outbox_connected", "gauge", ("destination",), "1 while another system can be told", at_scrape=True
+        "station_outbox_connected", "gauge", ("destination",), "1 while another system is connected", at_scrape=True
     ),
     "outbox_waiting": Row(
         "station_outbox_waiting",
         "gauge",
         ("destination",),
-        "Entries that another system has not been told; absent while that is not known",
+        "Entries not yet sent to another system; absent while unknown",
         at_scrape=True,
     ),
     "outbox_lag": Row(

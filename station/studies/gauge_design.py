@@ -92,8 +92,8 @@ def _fruit_facts(design: TwinDesign) -> list[tuple[str, str]]:
     closing_mm = deciding_closing_mm(find_recipe(design.fruit))
     return [
         ("Parts", f"{design.parts} fruit of the twin: {design.fruit}, every second one bruised, seed {design.seed}"),
-        ("Operators", f"{design.operators}: another sensor unit, gripper zero and habit each; fruit laid in anew"),
-        ("Repeats", f"{design.repeats}: gripped where it lies, with the sensor's noise as measured on real ones"),
+        ("Operators", f"{design.operators}: another sensor unit, gripper zero and habit each; fruit placed again"),
+        ("Repeats", f"{design.repeats}: gripped without moving it, with the sensor's noise as measured on real ones"),
         ("Measured", f"the area that the station judges, at {closing_mm:g} mm of closing, by the shipped recipe"),
     ]
 

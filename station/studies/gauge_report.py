@@ -31,7 +31,7 @@ def verdict(gauge: Gauge) -> tuple[str, str]:
         else (grr.tolerance_percent, "the tolerance")
     )
     judged = "acceptable" if percent <= GOOD else "to be weighed" if percent <= BEARABLE else "not acceptable"
-    enough = "enough" if gauge.distinct_categories >= LEAST_CATEGORIES else f"at least {LEAST_CATEGORIES} are asked for"
+    enough = "enough" if gauge.distinct_categories >= LEAST_CATEGORIES else f"at least {LEAST_CATEGORIES} are required"
     categories = f"{gauge.distinct_categories} distinct categories ({enough})"
     style = "good" if percent <= GOOD else "" if percent <= BEARABLE else "bad"
     return style, f"GRR is {percent:.1f} % of {of}: {judged}; {categories}."

@@ -25,7 +25,7 @@ _PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
 _TOLERANCE_FRUIT = 30
 
 PART_TRUTHS = (
-    "Fruit laid in anew: true areas at the true closing",
+    "Fruit placed again: true areas at the true closing",
     "and the gripper's counts: true areas at the closing as the station counts it",
 )
 """What the true areas of a measured fruit vary with, each with all before it."""
