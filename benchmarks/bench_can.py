@@ -128,8 +128,9 @@ def main() -> int:
         process.join()
     lines = [["what", "p50, ms", "p99, ms", "max, ms"], ["---"] * 4, *rows]
     text = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    text += f"\n\n{SHOTS} actuations each, encoder at 100 Hz; {platform.machine()}, Python {platform.python_version()}; "
-    text += f"load average of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores."
+    text += f"\n\n{SHOTS} actuations each, encoder at 100 Hz; {platform.machine()}, "
+    text += f"Python {platform.python_version()}; load average of the machine {os.getloadavg()[0]:.1f} "
+    text += f"on {os.cpu_count()} cores."
     print(text)
     before, _, rest = DOCUMENT.read_text(encoding="utf-8").partition(BEGIN)
     _, _, after = rest.partition(END)

@@ -118,7 +118,9 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
         judged = {row for (row,) in database.execute(f"{query} WHERE sequence = i.sequence) = {STEPS}")}
         wrong["acknowledged outcomes missing"] = len(told["concluded"].keys() - judged)
         query = "SELECT sequence FROM inspections WHERE published_utc_ms NOT NULL AND outcome = 'FAIL'"
-        wrong["published outcomes missing"] = len(told["published"].keys() - {row for (row,) in database.execute(query)})
+        wrong["published outcomes missing"] = len(
+            told["published"].keys() - {row for (row,) in database.execute(query)}
+        )
         query = "SELECT row FROM outbox WHERE kind = 'inspection'"
         wrong["published outcomes not in the outbox"] = len(
             told["published"].keys() - {r for (r,) in database.execute(query)}

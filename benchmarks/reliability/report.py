@@ -19,13 +19,13 @@ inspection, as visible from outside, ends it, and then inspects a good fruit. A 
 - the record in SQLite equals what the PLC read, and is acknowledged,
 - a PASS has a complete curve that the station judged as PASS,
 - the jaws are open at the end, by the twin's truth,
-- the station was ready again by itself, or stayed stopped with a sentence on the reason, and was ready after the given commands,
+- the station was ready again by itself, or stayed stopped, gave the reason, and was ready after the given commands,
 - the next fruit, a good one, got PASS.
 
-Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm moves; *stepping*: the fruit is deformed
-by 0.5 mm; *releasing*: the PLC reads the result. Scenarios and their expected results: `tests/reliability/scenarios`.
-The station works with a quick recipe of 6 steps and a patience of 5; times are from the fault's end, or the last command,
-to ready for a trigger, on a machine with other work.
+Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm moves; *stepping*: the fruit is
+deformed by 0.5 mm; *releasing*: the PLC reads the result. Scenarios and their expected results:
+`tests/reliability/scenarios`. The station works with a quick recipe of 6 steps and a patience of 5; times are from the
+fault's end, or the last command, to ready for a trigger, on a machine with other work.
 
 """
 

@@ -134,7 +134,7 @@ class CanSettings(Settings):
     shot_deadline_s: float = setting(
         60.0,
         title="Shot deadline",
-        description="How long an ordered shot may wait for its count, as when the belt stands still.",
+        description="How long an ordered shot may wait for its count, for example when the belt stops.",
         unit="s",
         ge=0.5,
         le=3600.0,

@@ -81,14 +81,14 @@ class Configuration(Settings):
     gripper: GripperSettings = setting(GripperSettings(), title="Gripper", description="The Robotiq 2F-85.")
     camera: CameraSettings = setting(CameraSettings(), title="Camera", description="The tactile camera.")
     calibration: CalibrationSettings = setting(
-        CalibrationSettings(), title="Calibration", description="The ball, and what a calibration is good for."
+        CalibrationSettings(), title="Calibration", description="The ball, and the limits of a calibration."
     )
     can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
-        RecordsSettings(), title="Records", description="What the station keeps of its inspections."
+        RecordsSettings(), title="Records", description="Storage of inspections and their images."
     )
     outbox: OutboxSettings = setting(
-        OutboxSettings(), title="Outbox", description="Which other systems are told of inspections."
+        OutboxSettings(), title="Outbox", description="Publishing of inspections to other systems."
     )
     service: ServiceSettings = setting(
         ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."

@@ -116,7 +116,7 @@ class SizeOfFruit(Settings):
         None,
         title="Expected length over width",
         description="A length outside, of the width at which the gripper met the fruit, is another fruit's: no result. "
-        "Null: not looked at.",
+        "Null: not checked.",
     )
     uncertainty_mm: float = setting(
         title="Uncertainty of the length",
@@ -128,7 +128,7 @@ class SizeOfFruit(Settings):
     classes: tuple[SizeClass, ...] = setting(
         (),
         title="Size classes",
-        description="The grader's classes, in ascending order. Where there are none, a class is not looked at.",
+        description="The grader's classes, in ascending order. Where there are none, a class is not used.",
         max_length=50,
     )
     without_size: Literal["no_result", "plain_limit"] = setting(
@@ -189,7 +189,7 @@ class AreaUncertainty(Settings):
     coverage: float = setting(
         0.95,
         title="Coverage",
-        description="One-sided probability with which a fruit at its limit is kept from PASS, and from FAIL; 0.95 is a "
+        description="One-sided probability with which a fruit at its limit does not get PASS, or FAIL; 0.95 is a "
         "coverage factor of 1.64.",
         ge=0.5,
         le=0.9999,

@@ -89,7 +89,7 @@ class ModbusSettings(Settings):
     max_connections: int = setting(
         32,
         title="Connections",
-        description="Connections at one time; four more are kept for the writer to come back.",
+        description="Connections at one time; four more are reserved for the writer to reconnect.",
         ge=1,
         le=512,
     )

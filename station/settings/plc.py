@@ -26,7 +26,7 @@ class HandshakeSettings(Settings):
     beat_period_s: float = setting(
         0.1,
         title="Beat period",
-        description="How often the station is asked for its state; its heartbeat to the PLC changes as often.",
+        description="Period of reading the station's state; its heartbeat to the PLC changes as often.",
         unit="s",
         ge=0.02,
         le=5.0,
@@ -52,7 +52,7 @@ class HandshakeSettings(Settings):
     result_margin_s: float = setting(
         0.3,
         title="Result's margin",
-        description="So long after the deadline that the station itself keeps, the interface answers NO_RESULT for it.",
+        description="So long after the station's own deadline the interface answers NO_RESULT for it.",
         unit="s",
         ge=0.0,
         le=10.0,
@@ -60,7 +60,7 @@ class HandshakeSettings(Settings):
     command_deadline_s: float = setting(
         30.0,
         title="Command's deadline",
-        description="A command that the station has not ended by then is told as timed out.",
+        description="A command that the station has not ended by then is reported as timed out.",
         unit="s",
         ge=0.1,
         le=300.0,
@@ -68,8 +68,8 @@ class HandshakeSettings(Settings):
     plc_heartbeat_timeout_s: float = setting(
         1.0,
         title="PLC lost after",
-        description="A PLC whose heartbeat has once changed and then stands still so long is lost: disarmed, results "
-        "kept. A client that never changes it is not watched.",
+        description="A PLC whose heartbeat has changed once and then not for so long is lost: disarmed, results "
+        "retained. A client that never changes it is not monitored.",
         unit="s",
         ge=0.05,
         le=60.0,

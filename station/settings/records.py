@@ -18,7 +18,7 @@ class RecordsSettings(Settings):
         200,
         title="Free reserve",
         description=(
-            "With less space than this (megabytes) left on the disk no inspection is begun; with less than twice as "
+            "With less space than this (megabytes) left on the disk no inspection starts; with less than twice as "
             "much, images are removed as beyond their quota."
         ),
         unit="MB",
@@ -30,7 +30,7 @@ class RecordsSettings(Settings):
         title="Images' quota",
         description=(
             "Space for images (megabytes). Beyond it the oldest of accepted fruit are removed first, then the oldest "
-            "of rejected; 0 keeps none. An inspection's images take about 5 MB."
+            "of rejected; 0 stores none. An inspection's images take about 5 MB."
         ),
         unit="MB",
         ge=0,
@@ -39,14 +39,14 @@ class RecordsSettings(Settings):
     accepted_share: float = setting(
         0.02,
         title="Share of accepted fruit",
-        description="Share of the PASS fruit whose images are kept, evenly spread; of all others they always are.",
+        description="Share of the PASS fruit whose images are stored, evenly spread; those of all others always are.",
         ge=0.0,
         le=1.0,
     )
     images_queue: int = setting(
         4,
         title="Images' queue",
-        description="Inspections whose images may wait for the disk; those of one more are dropped, and said so.",
+        description="Inspections whose images may wait for the disk; those of one more are dropped and reported.",
         ge=1,
         le=64,
     )

@@ -112,14 +112,14 @@ class RobustParameters(Settings):
     gate_ratio: float = setting(
         3.0,
         title="Gate",
-        description="Contact is looked for where the gel bends more than this many times the background's median.",
+        description="Contact is searched where the curvature response exceeds the background's median by this factor.",
         ge=1.5,
         le=20.0,
     )
     least_bend: float = setting(
         0.15,
         title="Least bending",
-        description="Bending below this is never contact, however quiet the image: light drifts by as much.",
+        description="A curvature response below this is never contact, even without noise: light drifts by as much.",
         unit="grey level/px",
         ge=0.01,
         le=10.0,
@@ -135,7 +135,7 @@ class RobustParameters(Settings):
     edge_stiffness: float = setting(
         0.1,
         title="Edge stiffness",
-        description="How smooth the edge is kept: the higher, the more it bridges where the light shows no fall.",
+        description="Smoothness of the edge: the higher, the more it bridges where the light has no fall.",
         ge=0.0,
         le=2.0,
     )
