@@ -170,7 +170,7 @@ def verdict(idle: dict[tuple[str, int, int], Figures], busy: dict[tuple[str, int
         [
             "| wanted | measured |",
             "|---|---|",
-            f"| p99 beside vision at most 2 times our own idle | {loaded / alone:.1f} times |",
+            f"| p99 beside vision at most 2 times this server's idle | {loaded / alone:.1f} times |",
             f"| p99 beside vision below stock pymodbus | {loaded:,.0f} µs, stock {stock:,.0f} µs |",
             f"| throughput with 32 clients at least 1.5 times stock | {ratio:.1f} times, both at ordinary priority |",
         ]

@@ -225,7 +225,7 @@ def costs() -> str:
     judge, frame = FrameHealth(0.2, SENSOR_SHAPE), sensor.frame(None, 0.0)
     rows = [
         ["frame, nothing moves (clean image kept)", milliseconds(still, 150)],
-        ["frame while the fingers close (dent and optics anew)", milliseconds(moving, 150)],
+        ["frame while the fingers close (dent and optics computed again)", milliseconds(moving, 150)],
         ["judging a frame's health, in the driver", milliseconds(lambda: judge.judge(frame, None, 0.0), 50)],
         ["for comparison: one image of white noise from numpy", milliseconds(peer, 30)],
     ]

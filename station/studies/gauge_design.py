@@ -102,7 +102,7 @@ def _dummy_facts(design: TwinDesign, made: Sequence[Simulated]) -> list[tuple[st
     refused, areas_mm2 = sum(one.refused for one in made), [one.measurement.area_mm2 for one in made]
     spread = f"{min(areas_mm2):.0f} to {max(areas_mm2):.0f} mm²"
     balls = f"{design.parts} firm balls of {SMALLEST_MM:g} to {LARGEST_MM:g} mm in a jig"
-    laid_in = f"taken out and laid in again ({PLAY_MM:g} mm of play, {STOP_MM:g} mm at the stop, standard deviations)"
+    laid_in = f"taken out and placed again ({PLAY_MM:g} mm of play, {STOP_MM:g} mm at the stop, standard deviations)"
     return [
         ("Parts", f"{balls}, each pressed by {stop_mm(design.fruit):g} mm, to a stop; seed {design.seed}"),
         ("Operators", f"{design.operators}: another sensor unit each"),
