@@ -155,8 +155,8 @@ def main() -> int:
         text = (
             "# Speed of the outbox\n\n"
             f"`./run bench outbox` writes this page. {STATIONS} stations, {rows} inspections with 4 curve points "
-            f"each, one PostgreSQL. Half of\nthem are written while others are published; during this time the server is "
-            f"disturbed at random moments.\n\n"
+            f"each, one PostgreSQL. Half of\nthem are written while others are published; during this time the "
+            f"server is disturbed at random moments.\n\n"
             f"| done to the server | times |\n| --- | --- |\n| connections cut | {done['cut']} |\n"
             f"| crashed (stopped with `immediate`) | {done['crashed']} |\n| stopped orderly | {done['stopped']} |\n\n"
             "| found afterwards | inspections |\n| --- | --- |\n"
