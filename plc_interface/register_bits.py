@@ -18,7 +18,7 @@ CONTROL_BITS = _bits(
     ("trigger", "Rising edge: inspect one fruit, by the trigger id written with or before it; hold until answered"),
     ("acknowledge", "Rising edge: the result with the acknowledged sequence is taken; hold until result_valid falls"),
     ("buffer_results", "On: up to 8 results wait for their acknowledgement. Off: one; a trigger before it is refused"),
-    ("execute_command", "Rising edge: carry out the command code with its argument; hold until done or failed"),
+    ("execute_command", "Rising edge: execute the command code with its argument; hold until done or failed"),
     ("clear_error", "Rising edge: overrun, missed and the last refusal are cleared"),
     ("offline", "The PLC takes the station out of the line: every trigger is refused"),
     ("latch_lot", "Rising edge: the lot id is taken for the inspections from here on; hold until latched"),
@@ -40,7 +40,7 @@ STATUS_BITS = _bits(
     ("error", "The station is faulted, see the error code and alarms, or it is lost"),
     ("toggle", "Changes with each new result presented; for a display, never for a decision"),
     ("lot_latched", "The lot id was taken; falls with latch_lot"),
-    ("writer_owned", "A client holds the right to write"),
+    ("writer_owned", "A client has the write lock"),
     ("simulated", "A device of the station is simulated"),
 )
 
@@ -90,7 +90,7 @@ _REFUSALS: Mapping[Refusal, str] = {
     Refusal.OFFLINE: "The PLC has set offline",
     Refusal.STATION_LOST: "The station does not answer",
     Refusal.RECIPE_CHANGING: "A recipe is being changed",
-    Refusal.NOT_WRITER: "The client does not hold the right to write",
+    Refusal.NOT_WRITER: "The client does not have the write lock",
     Refusal.RECORDS_FULL: "The station could not store the trigger",
 }
 REFUSAL_CODES = {
@@ -116,7 +116,7 @@ COMMAND_RESULT_CODES = {
     0: Code("none", "No command since the interface started"),
     1: Code("executing", "Being carried out"),
     2: Code("done", "Done"),
-    3: Code("failed", "The station could not; its log and its HMI say why"),
+    3: Code("failed", "The station failed to execute it; its log and its HMI give the reason"),
     4: Code("timed_out", "The station did not end it in time"),
     5: Code("station_lost", "The station does not answer"),
     6: Code("no_command", "The command code is 0"),

@@ -56,11 +56,11 @@ def _u32(name: str, address: int, meaning: str, access: Access = RO, unit: str =
 
 
 CONTROL = (
-    Register("control", 0, Kind.BITS, RW, "", None, None, "What the PLC wants", bits=CONTROL_BITS),
+    Register("control", 0, Kind.BITS, RW, "", None, None, "Requests of the PLC", bits=CONTROL_BITS),
     _u16("trigger_id", 1, "The PLC's number of the fruit to inspect, 1 to 65535, other than the one before", RW),
     _u32("acknowledged_sequence", 2, "Sequence of the result that the PLC has taken; it has to be the presented one",
          RW),
-    Register("command_code", 4, Kind.U16, RW, "", 0, len(CommandName), "What to carry out", codes=COMMAND_CODES),
+    Register("command_code", 4, Kind.U16, RW, "", 0, len(CommandName), "Command to execute", codes=COMMAND_CODES),
     _u16("command_argument", 5, "The command's argument", RW),
     _u16("command_sequence", 6, "The PLC's number of the command, echoed with its result", RW),
     _u16("plc_heartbeat", 7, "Changed by the PLC in each scan; the interface disarms when it then stops changing",
@@ -68,7 +68,7 @@ CONTROL = (
     _u32("encoder", 8, "The line's encoder at the trigger, given back with the result", RW, "counts"),
     Register("lot", 10, Kind.TEXT, RW, "", None, None, "The lot's id, taken by latch_lot",
              text_words=LOT_CHARACTERS // 2),
-    Register("write_key", 26, Kind.U16, RW, "", 0, U16_MAX, "Claims or gives back the right to write",
+    Register("write_key", 26, Kind.U16, RW, "", 0, U16_MAX, "Claims or releases the write lock",
              codes=WRITE_KEY_CODES),
     _u16("fruit_length_mm_x10", 27, "Length of the fruit from stem to tip, taken with the trigger and used up by it; "
          "0: not given", RW, "mm/10"),
@@ -77,21 +77,21 @@ CONTROL = (
 """Written by the one writer, read by anybody."""
 
 STATUS = (
-    Register("status", 100, Kind.BITS, RO, "", None, None, "What the station says", bits=STATUS_BITS),
+    Register("status", 100, Kind.BITS, RO, "", None, None, "State of the station", bits=STATUS_BITS),
     Register("packml_state", 101, Kind.U16, RO, "", 0, 17, "PackML state", codes=PACKML_STATE_CODES),
     Register("packml_mode", 102, Kind.U16, RO, "", 0, 3, "PackML unit mode", codes=PACKML_MODE_CODES),
     _u16("accepted_trigger_id", 103, "The last trigger id accepted, 0 for none"),
     _u16("station_heartbeat", 104, "Changes while the station and this interface are healthy"),
     _u16("plc_heartbeat_echo", 105, "The PLC's heartbeat as last written"),
     _u16("command_sequence_echo", 106, "The sequence of the command that command_result is about"),
-    Register("command_result", 107, Kind.U16, RO, "", 0, 6, "How the command went", codes=COMMAND_RESULT_CODES),
+    Register("command_result", 107, Kind.U16, RO, "", 0, 6, "Result of the command", codes=COMMAND_RESULT_CODES),
     _u16("active_recipe", 108, "The active recipe's number, 0 for none"),
     _u16("free_places", 109, "Results that can still wait", high=QUEUE_PLACES),
     _u32("active_recipe_checksum", 110, "CRC-32 of the active recipe's canonical JSON, 0 for none"),
     _u16("waiting_results", 112, "Results not acknowledged, with the presented one", high=QUEUE_PLACES),
     _u16("error_code", 113, "Number of the active alarm of the highest priority; 0: none; 1000: station lost"),
     Register("alarms", 114, Kind.BITS32, RO, "", None, None, "Active alarms", bits=ALARM_BITS),
-    Register("last_refusal", 116, Kind.U16, RO, "", 0, 10, "Why the last trigger refused was", codes=REFUSAL_CODES),
+    Register("last_refusal", 116, Kind.U16, RO, "", 0, 10, "Reason of the last refused trigger", codes=REFUSAL_CODES),
     _u16("last_refused_trigger_id", 117, "The id of that trigger"),
     _u32("writer_ipv4", 118, "IPv4 address of the client that may write, first octet highest; 0 for none"),
     _u32("latched_lot_checksum", 120, "CRC-32 of the lot id in force, in ASCII without its filling; 0 for none"),

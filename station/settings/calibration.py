@@ -18,7 +18,7 @@ class CalibrationSettings(Settings):
     holder_mm: float = setting(
         18.0,
         title="Holder",
-        description="What holds the ball takes so much of the width; the paper's 24 mm ball is met at 42 mm.",
+        description="Width that the ball's holder takes; the paper's 24 mm ball is met at 42 mm.",
         unit="mm",
         ge=0.0,
         le=60.0,
@@ -50,7 +50,7 @@ class CalibrationSettings(Settings):
     verify_every_h: float | None = setting(
         None,
         title="Verification demanded",
-        description="Nothing is inspected later than this after the last verification that passed; null demands none.",
+        description="No fruit is inspected later than this after the last passed verification; null requires none.",
         unit="h",
         gt=0.0,
         le=8760.0,

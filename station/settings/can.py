@@ -59,7 +59,7 @@ class CanSettings(Settings):
     heartbeat_s: float = setting(
         0.1,
         title="Heartbeat",
-        description="How often the station and each node say that they live.",
+        description="Period of the heartbeats of the station and of each node.",
         unit="s",
         ge=0.01,
         le=5.0,
@@ -67,8 +67,8 @@ class CanSettings(Settings):
     heartbeat_lost_s: float = setting(
         0.5,
         title="Heartbeat lost after",
-        description="After so long a silence a node is lost, and a node takes the station for lost and puts out its "
-        "safe output by itself.",
+        description="After so long a silence a node is lost; a node that has lost the station sets its safe output by "
+        "itself.",
         unit="s",
         ge=0.05,
         le=30.0,
@@ -100,7 +100,7 @@ class CanSettings(Settings):
     count_stale_s: float = setting(
         0.2,
         title="Count stale after",
-        description="An older encoder count is unknown: no shot is ordered on it, and the gate fires none.",
+        description="An older encoder count is unknown: no actuation is ordered on it, and the gate does not fire.",
         unit="s",
         ge=0.005,
         le=5.0,
@@ -115,7 +115,7 @@ class CanSettings(Settings):
     tolerance_counts: int = setting(
         100,
         title="Tolerance of a shot",
-        description="How far from the ordered count the gate may report its shot; it has to cover the belt's way in "
+        description="Largest distance of the reported from the ordered count; it has to cover the belt's way in "
         "one period of the encoder, 30 counts on the twin.",
         ge=0,
         le=1_000_000,
@@ -126,7 +126,7 @@ class CanSettings(Settings):
     echo_deadline_s: float = setting(
         0.25,
         title="Echo deadline",
-        description="How long the gate may take to confirm an order, and to report a shot once its count is reached.",
+        description="How long the gate may take to confirm an order, and to report its actuation at the count.",
         unit="s",
         ge=0.01,
         le=10.0,
@@ -134,7 +134,7 @@ class CanSettings(Settings):
     shot_deadline_s: float = setting(
         60.0,
         title="Shot deadline",
-        description="How long an ordered shot may wait for its count, for example when the belt stops.",
+        description="How long an ordered actuation may wait for its count, for example when the belt stops.",
         unit="s",
         ge=0.5,
         le=3600.0,
@@ -142,7 +142,7 @@ class CanSettings(Settings):
     safe_output: int = setting(
         1,
         title="Safe output",
-        description="What the gate puts out while the station is lost or not healthy: bit n opens the flap of lane "
+        description="Output of the gate while the station is lost or not healthy: bit n opens the flap of lane "
         "n + 1. 1 sends everything to lane 1, the rejects'.",
         ge=0,
         le=255,

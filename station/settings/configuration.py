@@ -57,14 +57,14 @@ class Configuration(Settings):
         Path("state"),
         title="Home folder",
         description=(
-            "Folder of the station's state. A relative path in the file counts from the file's folder, elsewhere "
-            "from the working folder."
+            "Folder of the station's state. A relative path in the file is relative to the file's folder, "
+            "elsewhere to the working folder."
         ),
     )
     recipes_folder: Folder | None = setting(
         None,
         title="Recipe folder",
-        description="Folder of the site's recipes, counted as the home folder is; null takes the recipes shipped.",
+        description="Folder of the site's recipes, relative like the home folder; null uses the shipped recipes.",
     )
     modbus: ModbusSettings = setting(
         ModbusSettings(), title="Modbus TCP", description="Where the line's PLC reaches the station."

@@ -135,7 +135,7 @@ class SizeOfFruit(Settings):
         "no_result",
         title="Without a size",
         description="Where the PLC writes no size: `no_result`, or `plain_limit`, which takes a fruit of the reference "
-        "length with `spread` as the uncertainty of its length. A size that cannot be is always no result.",
+        "length with `spread` as the uncertainty of its length. An impossible size is always no result.",
     )
     spread: float = setting(
         title="Spread of the lengths",
@@ -170,7 +170,7 @@ class Repeatability(Settings):
 
     closing_mm: float = setting(
         title="Closing",
-        description="Where it was measured; between two it is interpolated, beyond them the nearest holds.",
+        description="Where it was measured; between two it is interpolated, beyond them the nearest applies.",
         unit="mm",
         gt=0.0,
         le=50.0,
@@ -245,7 +245,7 @@ class DamageThresholds(Settings):
     size: Annotated[SizeOfFruit | None, Field(exclude_if=lambda size: size is None)] = setting(
         None,
         title="Size of the fruit",
-        description="How the limits go with the fruit's length; null where the size is not used.",
+        description="Dependence of the limits on the fruit's length; null where the size is not used.",
     )
     uncertainty: Annotated[AreaUncertainty, Field(exclude_if=lambda given: given == AREA_UNCERTAINTY)] = setting(
         AREA_UNCERTAINTY, title="Uncertainty", description="What the guard band of the thresholds is made of."

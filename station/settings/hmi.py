@@ -21,7 +21,7 @@ class HmiTlsSettings(Settings):
         default=False, title="Served", description="Whether the pages are served over TLS; it needs both files below."
     )
     certificate: File | None = setting(
-        None, title="Certificate", description="PEM file with the station's certificate and what it is signed by."
+        None, title="Certificate", description="PEM file with the station's certificate and its chain."
     )
     key: File | None = setting(
         None, title="Private key", description="PEM file with the certificate's private key, without a passphrase."
@@ -48,8 +48,8 @@ class HmiSettings(Settings):
     names: tuple[Host, ...] = setting(
         ("127.0.0.1", "localhost"),
         title="Names",
-        description="Under which names browsers may ask for the pages, beside the address above; a request for "
-        "another name is refused, as it may come from a foreign page that only points here.",
+        description="Names under which browsers may request the pages, besides the address above; a request for "
+        "another name is refused, because a foreign page may have sent it.",
         max_length=16,
     )
     tls: HmiTlsSettings = setting(
@@ -65,7 +65,7 @@ class HmiSettings(Settings):
     idle_s: float = setting(
         180.0,
         title="Idle time",
-        description="A person who touches nothing for so long is logged out; the page goes on as a viewer's.",
+        description="A person who touches nothing for so long is logged out; the page continues as a viewer's.",
         unit="s",
         ge=10.0,
         le=3600.0,
@@ -73,7 +73,7 @@ class HmiSettings(Settings):
     refresh_s: float = setting(
         0.2,
         title="Refresh",
-        description="How often the pages get what is new.",
+        description="Period of sending new data to the pages.",
         unit="s",
         ge=0.05,
         le=1.0,

@@ -27,7 +27,7 @@ class ModbusTlsSettings(Settings):
         le=65_535,
     )
     certificate: File | None = setting(
-        None, title="Certificate", description="PEM file with the station's certificate and what it is signed by."
+        None, title="Certificate", description="PEM file with the station's certificate and its chain."
     )
     key: File | None = setting(
         None, title="Private key", description="PEM file with the certificate's private key, without a passphrase."
@@ -77,7 +77,7 @@ class ModbusSettings(Settings):
     readers: tuple[Network, ...] = setting(
         LOOPBACK,
         title="Who may read",
-        description="Addresses and networks whose connections are taken; all others are closed. Loopback until set.",
+        description="Addresses and networks whose connections are accepted; all others are closed. Loopback until set.",
         max_length=64,
     )
     writers: tuple[Network, ...] = setting(
@@ -104,7 +104,7 @@ class ModbusSettings(Settings):
     frame_timeout_s: float = setting(
         5.0,
         title="Frame time-out",
-        description="A connection is closed where a request is not complete, or replies are not taken, for this time.",
+        description="A connection is closed when a request is not complete, or replies are not read, for this time.",
         unit="s",
         ge=0.1,
         le=60.0,

@@ -12,7 +12,7 @@ from station.settings.paths import File
 class OutboxPostgresqlSettings(Settings):
     """A PostgreSQL that many stations write to."""
 
-    enabled: bool = setting(default=False, title="Written", description="Whether rows are carried to PostgreSQL.")
+    enabled: bool = setting(default=False, title="Written", description="Whether rows are written to PostgreSQL.")
     host: str = setting(
         "127.0.0.1",
         title="Address",
@@ -22,7 +22,7 @@ class OutboxPostgresqlSettings(Settings):
     )
     port: int = setting(5432, title="Port", description="TCP port of the server.", ge=1, le=65_535)
     database: str = setting("fruit", title="Database", description="Its name.", min_length=1, max_length=63)
-    user: str = setting("fruit_station", title="User", description="Who writes.", min_length=1, max_length=63)
+    user: str = setting("fruit_station", title="User", description="The role that writes.", min_length=1, max_length=63)
     password_file: File | None = setting(
         None,
         title="Password's file",
@@ -60,7 +60,7 @@ class OutboxMqttSettings(Settings):
     authority: File | None = setting(
         None,
         title="Broker's authority",
-        description="PEM file of who signs the broker's certificate; null takes the system's.",
+        description="PEM file of the authority that signs the broker's certificate; null takes the system's.",
     )
 
 
@@ -70,7 +70,7 @@ class OutboxSettings(Settings):
     station: str = setting(
         "station-1",
         title="Station's name",
-        description="Who this station is to other systems; no two stations may have the same.",
+        description="Name of this station in other systems; every station needs a different one.",
         pattern=r"^[A-Za-z0-9_.-]{1,64}$",
     )
     longest_pause_s: float = setting(

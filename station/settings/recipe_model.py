@@ -179,7 +179,7 @@ class PressPlan(Settings):
         1,
         title="Attempts",
         description="With 2, a fruit that one press did not decide (near a limit, cut by the border, too "
-        "little confidence) is let go and pressed once more, and both presses are judged together.",
+        "little confidence) is released and pressed once more, and both presses are judged together.",
         ge=1,
         le=2,
     )
@@ -212,7 +212,7 @@ class Recipe(Settings):
     """One fruit's width steps, segmentation and damage thresholds."""
 
     schema_version: Annotated[Literal[1], BeforeValidator(_integer)] = setting(
-        title="Schema version", description="The version of this form; the number rises when a field's meaning changes."
+        title="Schema version", description="Version of the schema; it rises when a field's meaning changes."
     )
     name: str = setting(
         title="Name",
