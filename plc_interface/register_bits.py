@@ -13,7 +13,10 @@ def _bits(*named: tuple[str, str]) -> tuple[Bit, ...]:
 CONTROL_BITS = _bits(
     (
         "enable",
-        "Rising edge: arm, so that triggers are accepted. Off: disarm; a running inspection still gives its result",
+        (
+            "Rising edge: arm, so that triggers are accepted. Off: disarmed; a running inspection continues, "
+            "its result stays"
+        ),
     ),
     ("trigger", "Rising edge: inspect one fruit, by the trigger id written with or before it; hold until answered"),
     ("acknowledge", "Rising edge: the result with the acknowledged sequence is taken; hold until result_valid falls"),
@@ -38,7 +41,7 @@ STATUS_BITS = _bits(
     ("command_done", "The command with the echoed sequence is done; falls with execute_command"),
     ("command_failed", "The command with the echoed sequence failed, see its result; falls with execute_command"),
     ("error", "The station is faulted, see the error code and alarms, or it is lost"),
-    ("toggle", "Changes with each new result presented; for a display, never for a decision"),
+    ("toggle", "Changes with each newly published result; for a display, never for a decision"),
     ("lot_latched", "The lot id was taken; falls with latch_lot"),
     ("writer_owned", "A client has the write lock"),
     ("simulated", "A device of the station is simulated"),
@@ -123,7 +126,7 @@ COMMAND_RESULT_CODES = {
 }
 
 OUTCOME_CODES = {
-    0: Code("none", "No result is presented"),
+    0: Code("none", "No result is published"),
     1: Code("PASS", "Surely good"),
     2: Code("FAIL", "Over a limit of the recipe: divert"),
     3: Code("NO_RESULT", "Nothing is known of this fruit: divert"),
@@ -148,6 +151,6 @@ PACKML_MODE_CODES = {
 
 WRITE_KEY = 0x5AFE
 WRITE_KEY_CODES = {
-    0: Code("locked", "The write lock is not requested, or is released"),
-    WRITE_KEY: Code("claim", "The write lock is requested: an interlock against stray writes, no secret"),
+    0: Code("locked", "Writing is not claimed, or is released"),
+    WRITE_KEY: Code("claim", "Writing is claimed: an interlock against stray writes, no secret"),
 }

@@ -58,12 +58,12 @@ def _u32(name: str, address: int, meaning: str, access: Access = RO, unit: str =
 CONTROL = (
     Register("control", 0, Kind.BITS, RW, "", None, None, "Requests of the PLC", bits=CONTROL_BITS),
     _u16("trigger_id", 1, "The PLC's number of the fruit to inspect, 1 to 65535, other than the one before", RW),
-    _u32("acknowledged_sequence", 2, "Sequence of the result that the PLC has taken; it has to be the presented one",
+    _u32("acknowledged_sequence", 2, "The sequence of the published result, once the PLC has taken it",
          RW),
     Register("command_code", 4, Kind.U16, RW, "", 0, len(CommandName), "Command to execute", codes=COMMAND_CODES),
     _u16("command_argument", 5, "The command's argument", RW),
     _u16("command_sequence", 6, "The PLC's number of the command, echoed with its result", RW),
-    _u16("plc_heartbeat", 7, "Changed by the PLC in each scan; the interface disarms when it then stops changing",
+    _u16("plc_heartbeat", 7, "Changed by the PLC in each scan; the interface disarms if it stops changing after that",
          RW),
     _u32("encoder", 8, "The line's encoder at the trigger, given back with the result", RW, "counts"),
     Register("lot", 10, Kind.TEXT, RW, "", None, None, "The lot's id, taken by latch_lot",
@@ -88,7 +88,7 @@ STATUS = (
     _u16("active_recipe", 108, "The active recipe's number, 0 for none"),
     _u16("free_places", 109, "Results that can still wait", high=QUEUE_PLACES),
     _u32("active_recipe_checksum", 110, "CRC-32 of the active recipe's canonical JSON, 0 for none"),
-    _u16("waiting_results", 112, "Results not acknowledged, with the presented one", high=QUEUE_PLACES),
+    _u16("waiting_results", 112, "Results not acknowledged, including the published one", high=QUEUE_PLACES),
     _u16("error_code", 113, "Number of the active alarm of the highest priority; 0: none; 1000: station lost"),
     Register("alarms", 114, Kind.BITS32, RO, "", None, None, "Active alarms", bits=ALARM_BITS),
     Register("last_refusal", 116, Kind.U16, RO, "", 0, 10, "Reason of the last refused trigger", codes=REFUSAL_CODES),
@@ -96,13 +96,13 @@ STATUS = (
     _u32("writer_ipv4", 118, "IPv4 address of the client that may write, first octet highest; 0 for none"),
     _u32("latched_lot_checksum", 120, "CRC-32 of the lot id in force, in ASCII without its filling; 0 for none"),
     _u32("acknowledged_sequence_echo", 122, "The sequence up to which results are taken as acknowledged"),
-    _u32("result_deadline_ms", 124, "Within this time of acceptance the last trigger's result is presented", RO, "ms"),
+    _u32("result_deadline_ms", 124, "Longest time from the last trigger's acceptance to its result", RO, "ms"),
     _u16("interface_boots", 126, "Starts of this interface, modulo 65536"),
     _u16("station_boots", 127, "Starts of the station that this interface has seen, modulo 65536"),
 )  # fmt: skip
 
 RESULT = (
-    _u32("result_sequence", 128, "The inspection's number, 0 where no result is presented"),
+    _u32("result_sequence", 128, "The inspection's number, 0 if no result is published"),
     _u16("result_trigger_id", 130, "The trigger id that this is the result of"),
     Register("result_flags", 131, Kind.BITS, RO, "", None, None, "About the result", bits=FLAG_BITS),
     Register("result_reasons", 132, Kind.BITS32, RO, "", None, None, "Why it is not PASS", bits=REASON_BITS),
@@ -139,7 +139,7 @@ COUNTERS = (
     _u32(
         "count_communication",
         216,
-        "Times that the writer or its heartbeat was lost, or the handshake violated, for example by a bit left set",
+        "Losses of the writer or its heartbeat, and violations of the handshake, such as a bit that is not reset",
     ),
     _u32("count_bad_requests", 218, "Requests answered with an exception, and malformed ones"),
     _u32("count_refused_connections", 220, "Connections refused or closed by a limit"),

@@ -11,7 +11,7 @@ class DigitSettings(Settings):
     serial: str = setting(
         "D20966",
         title="Serial number",
-        description="The DIGIT's serial number as reported by udev (ID_SERIAL_SHORT); printed on its housing.",
+        description="The DIGIT's serial number as udev reports it (ID_SERIAL_SHORT); printed on its housing.",
         pattern=r"^[A-Za-z0-9_-]{1,32}$",
     )
     red: int = setting(
@@ -42,7 +42,7 @@ class ReplaySettings(Settings):
     frames_per_s: float | None = setting(
         30.0,
         title="Rate",
-        description="Frames a second in real time; null for as fast as they are read.",
+        description="Frames a second in real time; null for as fast as they are requested.",
         unit="1/s",
         gt=0.0,
         le=240.0,

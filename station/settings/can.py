@@ -134,7 +134,7 @@ class CanSettings(Settings):
     shot_deadline_s: float = setting(
         60.0,
         title="Shot deadline",
-        description="How long an ordered actuation may wait for its count, for example when the belt stops.",
+        description="Maximum wait of an ordered reject actuation for its count, for example if the belt stops.",
         unit="s",
         ge=0.5,
         le=3600.0,

@@ -85,10 +85,10 @@ class Configuration(Settings):
     )
     can: CanSettings = setting(CanSettings(), title="CAN", description="The line's reject gate and encoder.")
     records: RecordsSettings = setting(
-        RecordsSettings(), title="Records", description="Storage of inspections and their images."
+        RecordsSettings(), title="Records", description="Storage of inspections and images."
     )
     outbox: OutboxSettings = setting(
-        OutboxSettings(), title="Outbox", description="Publishing of inspections to other systems."
+        OutboxSettings(), title="Outbox", description="Other systems that receive inspections."
     )
     service: ServiceSettings = setting(
         ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."

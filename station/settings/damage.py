@@ -189,8 +189,8 @@ class AreaUncertainty(Settings):
     coverage: float = setting(
         0.95,
         title="Coverage",
-        description="One-sided probability with which a fruit at its limit does not get PASS, or FAIL; 0.95 is a "
-        "coverage factor of 1.64.",
+        description="One-sided probability that a fruit at its limit does not get PASS, and the same for FAIL; 0.95 is "
+        "a coverage factor of 1.64.",
         ge=0.5,
         le=0.9999,
     )

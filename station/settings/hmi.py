@@ -58,7 +58,7 @@ class HmiSettings(Settings):
     languages: tuple[Language, ...] = setting(
         ("en", "de", "es"),
         title="Languages",
-        description="Languages for a person to choose; the first is used where the browser requests none of them.",
+        description="Languages to choose from; the first is used if the browser requests none of them.",
         min_length=1,
         max_length=3,
     )
@@ -81,7 +81,7 @@ class HmiSettings(Settings):
     cleaning_s: float = setting(
         30.0,
         title="Cleaning time",
-        description="How long a screen with the cleaning lock ignores touches.",
+        description="Duration of the cleaning lock, during which a screen ignores touches.",
         unit="s",
         ge=5.0,
         le=300.0,

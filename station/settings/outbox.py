@@ -84,7 +84,7 @@ class OutboxSettings(Settings):
     alarm_after_s: float = setting(
         900.0,
         title="Alarm after",
-        description="An alarm is raised where an entry waits for another system for so long.",
+        description="An alarm is raised if an entry has not been delivered to another system for so long.",
         unit="s",
         ge=1.0,
         le=86_400.0 * 7,
@@ -92,7 +92,7 @@ class OutboxSettings(Settings):
     alarm_after_rows: int = setting(
         5000,
         title="Alarm after entries",
-        description="Likewise where so many entries wait, of any age.",
+        description="Likewise if so many entries wait for delivery, however young they are.",
         ge=1,
         le=100_000_000,
     )

@@ -26,7 +26,8 @@ class HandshakeSettings(Settings):
     beat_period_s: float = setting(
         0.1,
         title="Beat period",
-        description="Period of reading the station's state; its heartbeat to the PLC changes as often.",
+        description="Period of the queries of the station's state; its heartbeat to the PLC changes with "
+        "the same period.",
         unit="s",
         ge=0.02,
         le=5.0,
@@ -52,7 +53,7 @@ class HandshakeSettings(Settings):
     result_margin_s: float = setting(
         0.3,
         title="Result's margin",
-        description="So long after the station's own deadline the interface answers NO_RESULT for it.",
+        description="So long after the station's own deadline, the interface answers NO_RESULT for it.",
         unit="s",
         ge=0.0,
         le=10.0,
@@ -68,7 +69,7 @@ class HandshakeSettings(Settings):
     plc_heartbeat_timeout_s: float = setting(
         1.0,
         title="PLC lost after",
-        description="A PLC whose heartbeat has changed once and then not for so long is lost: disarmed, results "
+        description="A PLC whose heartbeat has changed once and then stops for so long is lost: disarmed, results "
         "retained. A client that never changes it is not monitored.",
         unit="s",
         ge=0.05,
@@ -76,7 +77,7 @@ class HandshakeSettings(Settings):
     )
     handshake_timeout_s: float = setting(
         5.0,
-        title="Forgotten bit after",
+        title="Time-out for the reset of a bit",
         description="A bit that the PLC has not taken back so long after its answer counts as taken back, as a fault.",
         unit="s",
         ge=0.05,

@@ -178,8 +178,9 @@ class PressPlan(Settings):
     attempts: int = setting(
         1,
         title="Attempts",
-        description="With 2, a fruit that one press did not decide (near a limit, cut by the border, too "
-        "little confidence) is released and pressed once more, and both presses are judged together.",
+        description="With 2, a fruit whose first press was inconclusive (near a limit, cut by the border,"
+        " too little confidence) is let go and pressed once more, and both presses are judged"
+        " together.",
         ge=1,
         le=2,
     )

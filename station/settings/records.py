@@ -18,7 +18,7 @@ class RecordsSettings(Settings):
         200,
         title="Free reserve",
         description=(
-            "With less space than this (megabytes) left on the disk no inspection starts; with less than twice as "
+            "With less space than this (megabytes) left on the disk no inspection is started; with less than twice as "
             "much, images are removed as beyond their quota."
         ),
         unit="MB",
@@ -39,14 +39,15 @@ class RecordsSettings(Settings):
     accepted_share: float = setting(
         0.02,
         title="Share of accepted fruit",
-        description="Share of the PASS fruit whose images are stored, evenly spread; those of all others always are.",
+        description="Share of the PASS fruit whose images are stored, evenly spread; images of all other "
+        "fruit are always stored.",
         ge=0.0,
         le=1.0,
     )
     images_queue: int = setting(
         4,
         title="Images' queue",
-        description="Inspections whose images may wait for the disk; those of one more are dropped and reported.",
+        description="Inspections whose images may wait for the disk; more are dropped, with a log line.",
         ge=1,
         le=64,
     )

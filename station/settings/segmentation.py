@@ -118,8 +118,9 @@ class RobustParameters(Settings):
     )
     least_bend: float = setting(
         0.15,
-        title="Least bending",
-        description="A curvature response below this is never contact, even without noise: light drifts by as much.",
+        title="Minimum curvature response",
+        description="A curvature response below this is never contact, however small the image's noise: "
+        "light drifts by as much.",
         unit="grey level/px",
         ge=0.01,
         le=10.0,
@@ -135,7 +136,7 @@ class RobustParameters(Settings):
     edge_stiffness: float = setting(
         0.1,
         title="Edge stiffness",
-        description="Smoothness of the edge: the higher, the more it bridges where the light has no fall.",
+        description="Smoothness of the edge: the higher, the longer the bridged gaps, where the light shows no fall.",
         ge=0.0,
         le=2.0,
     )
