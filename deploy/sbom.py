@@ -20,17 +20,17 @@ PIN = re.compile(r"^(?P<name>[A-Za-z0-9._-]+)==(?P<version>[^ ;]+)(?P<rest>(?:[^
 
 
 def normal(name: str) -> str:
-    """A package's name as all tools agree on it (PEP 503)."""
+    """Return a package's name in its normal form (PEP 503)."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def locked(text: str) -> dict[str, list[str]]:
-    """The hashes of a lock, by the packages' names."""
+    """Return the hashes of a lock, by the packages' names."""
     return {normal(pin["name"]): re.findall(r"sha256:([0-9a-f]{64})", pin["rest"]) for pin in PIN.finditer(text)}
 
 
 def shipped(bill: dict[str, Any], hashes: dict[str, list[str]]) -> dict[str, Any]:
-    """A bill of an environment with what the lock lists alone, and the lock's hashes."""
+    """Return the bill of an environment with only the packages in the lock, and the lock's hashes."""
     root = bill["metadata"]["component"]
     components = [each for each in bill["components"] if normal(each["name"]) in hashes]
     kept = {each["bom-ref"] for each in components} | {root["bom-ref"]}
@@ -47,7 +47,7 @@ def shipped(bill: dict[str, Any], hashes: dict[str, list[str]]) -> dict[str, Any
 
 
 def written(bill: dict[str, Any]) -> str:
-    """A bill as JSON, a line for each component: what changes with a lock is then seen."""
+    """Return a bill as JSON, one line per component, which shows the changes of a lock."""
     parts = []
     for key, value in sorted(bill.items()):
         text = json.dumps(value, sort_keys=True)
@@ -58,14 +58,14 @@ def written(bill: dict[str, Any]) -> str:
 
 
 def main() -> int:
-    """Ask cyclonedx-py, and write the file."""
+    """Run cyclonedx-py, and write the file."""
     if len(sys.argv) != 2:
         sys.stderr.write(f"{__doc__}\n")
         return 2
     options = ("--pyproject", ROOT / "pyproject.toml", "--output-reproducible", "--of", "JSON", "-o", "-")
     tool = Path(sys.executable).with_name("cyclonedx-py")
     command = [tool, "environment", *options, sys.argv[1]]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 (the developer's own words)
+    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 (the developer's own arguments)
     bill = shipped(json.loads(done.stdout), locked((ROOT / LOCK).read_text(encoding="utf-8")))
     BILL.write_text(written(bill), encoding="utf-8")
     return 0

@@ -1,4 +1,4 @@
-"""The doors of the pages: who asks, whether they may, and whether the order comes from one of our pages, once."""
+"""Access control of the pages: caller, rights, and the one-time token of each order."""
 
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
@@ -16,20 +16,12 @@ TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
 
 
 def hmi_of(request: Request) -> Hmi:
-    """The process's parts.
-
-    Args:
-        request: any.
-    """
+    """Return the process's parts."""
     return request.app.state.hmi
 
 
 def caller_of(request: Request) -> Caller:
-    """Who asks; a viewer where nobody is logged in.
-
-    Args:
-        request: any; a browser without a cookie gets one with the page.
-    """
+    """Return the caller; a viewer if nobody is logged in. A browser without a cookie gets one with the page."""
     session = request.cookies.get(SESSION_COOKIE, "")
     if not session:
         session = getattr(request.state, "new_session", "") or hmi_of(request).sessions.new()
@@ -38,17 +30,13 @@ def caller_of(request: Request) -> Caller:
 
 
 def wording_of(request: Request) -> Wording:
-    """The language in which to answer.
-
-    Args:
-        request: any.
-    """
+    """Return the language to answer in."""
     cookie, accepted = request.cookies.get(LANGUAGE_COOKIE, ""), request.headers.get("accept-language", "")
     return Wording(preferred(hmi_of(request).settings.languages, cookie, accepted))
 
 
 async def genuine(request: Request) -> Caller:
-    """The caller of an order that one of our own pages has sent, for the first time.
+    """Return the caller of an order that one of our own pages has sent, for the first time.
 
     Args:
         request: with the page's token in the form's field `csrf` or the header `X-CSRF-Token`.
@@ -68,11 +56,7 @@ async def genuine(request: Request) -> Caller:
 
 
 def may(right: Right) -> Callable[[Request], Awaitable[Caller]]:
-    """A dependency for a page or a file that not everybody may see.
-
-    Args:
-        right: that the caller needs.
-    """
+    """Make a dependency for a page or a file that needs a right."""
 
     async def check(request: Request) -> Caller:
         return _with_right(caller_of(request), right)
@@ -81,11 +65,7 @@ def may(right: Right) -> Callable[[Request], Awaitable[Caller]]:
 
 
 def orders(right: Right) -> Callable[[Request], Awaitable[Caller]]:
-    """A dependency for everything that changes something: the token first, then the role.
-
-    Args:
-        right: that the caller needs.
-    """
+    """Make a dependency for every request that changes something: the token is checked first, then the role."""
 
     async def check(request: Request) -> Caller:
         return _with_right(await genuine(request), right)

@@ -65,7 +65,7 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 
 @router.get("/health", tags=["health"])
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
-    """Whether the station takes fruit, and how its parts do."""
+    """Whether the station accepts fruit, and the state of each of its parts."""
     told = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
     return HealthAnswer(
         ready=told.ready,
@@ -91,7 +91,7 @@ async def inspections(
     limit: Annotated[int, Query(ge=1, le=100)] = 50,
     below: Annotated[int | None, Query(ge=1, le=2**32, description="From the page before.")] = None,
 ) -> InspectionList:
-    """Inspections, newest first, a page at a time; all conditions given have to hold."""
+    """Inspections, newest first, one page at a time; all given conditions have to be met."""
     search = Search(
         lot=lot,
         grower=grower,
@@ -118,14 +118,14 @@ async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionWh
 
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
-    """How all recipes stand."""
+    """The state of every recipe."""
     told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return RecipeList(recipes=[RecipeShort(**_short(row)) for row in told.rows])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
 async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
-    """One recipe, with the values that are in force."""
+    """One recipe, with the values in force."""
     told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     row = next((each for each in told.rows if each.name == name), None)
     if row is None:
@@ -139,7 +139,7 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
 
 @router.get("/lots", tags=["lots"])
 async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
-    """The last lots told of."""
+    """The latest lots."""
     told = await hmi.gateway.ask(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
     return LotList(lots=[LotAnswer.of(each) for each in told.lots])
 
@@ -155,14 +155,14 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
 
 @router.put("/lots/{name}", tags=["lots"])
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
-    """Tell of a lot's begin, by the name that the PLC gives with each trigger. Idempotent."""
+    """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     asked = StartLot(name=name, grower=begin.grower, actor=actor)
     return LotAnswer.of(await hmi.gateway.ask(asked, LotTold, deadline_s=DEADLINE_S))
 
 
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
 async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
-    """Tell of a lot's end. Idempotent."""
+    """End a lot. Idempotent."""
     if not (await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
     asked = EndLot(name=name, actor=actor)
@@ -180,7 +180,7 @@ def _short(row: RecipeRow) -> dict[str, Any]:
 
 
 def _utc_ms(at: datetime | None) -> int | None:
-    """Without an offset it is UTC."""
+    """Return ms since 1970; a time without an offset is UTC."""
     if at is None:
         return None
     known = at if at.tzinfo else at.replace(tzinfo=UTC)

@@ -1,4 +1,4 @@
-"""Who uses the HTTP API: a system with its token, or a person who is logged in at the pages."""
+"""Authentication of the HTTP API: a system by its token, or a person who is logged in at the pages."""
 
 from collections.abc import Awaitable, Callable
 from typing import Annotated
@@ -22,11 +22,7 @@ _CHALLENGE = {"www-authenticate": "Bearer"}
 
 
 def tokens_of(request: Request) -> ApiTokens:
-    """The station's tokens.
-
-    Args:
-        request: any.
-    """
+    """Return the station's tokens."""
     state = request.app.state
     if not hasattr(state, "api_tokens"):
         state.api_tokens = ApiTokens(hmi_of(request).people.path.parent)
@@ -34,25 +30,17 @@ def tokens_of(request: Request) -> ApiTokens:
 
 
 async def reader(request: Request, bearer: Bearer) -> Actor:
-    """Who reads: any token, or anybody who is logged in.
-
-    Args:
-        request: any.
-        bearer: the token, if there is one.
+    """Return the name of a caller who may read: any token, or any person who is logged in.
 
     Raises:
-        HTTPException: 401, neither is good.
+        HTTPException: 401, neither a valid token nor a log-in.
     """
     who, role = _known(request, bearer)
     return Actor(who=who, role=role)
 
 
 def changer(right: Right) -> Callable[[Request, HTTPAuthorizationCredentials | None], Awaitable[Actor]]:
-    """A dependency for what changes something. A browser's order needs the page's token beside the cookie.
-
-    Args:
-        right: that is needed.
-    """
+    """Make a dependency for what changes something. A browser's order needs the page's token beside the cookie."""
 
     async def check(request: Request, bearer: Bearer) -> Actor:
         who, role = _known(request, bearer)

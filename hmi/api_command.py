@@ -1,4 +1,4 @@
-"""`station api-token`: which of the plant's systems may use the HTTP API."""
+"""`station api-token`: the tokens of the systems that use the HTTP API."""
 
 import re
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FIL
 
 @click.group("api-token")
 def api_token() -> None:
-    """Make and withdraw the tokens by which a plant's systems use the HTTP API."""
+    """Create and withdraw the tokens by which a plant's systems use the HTTP API."""
 
 
 @api_token.command()
@@ -29,7 +29,7 @@ def api_token() -> None:
 )
 @_CONFIG
 def add(name: str, role: str, config: Path | None) -> None:
-    """Make a token for the system NAME and show it, this once. It counts at once, and until it is removed."""
+    """Create a token for the system NAME and print it, this once. It is valid at once, and until it is removed."""
     if not re.match(NAME, name):
         raise click.BadParameter("expected at most 40 letters, digits, spaces and _ . -", param_hint="NAME")
     click.echo(_tokens(config).add(name, Role(role)))
@@ -38,7 +38,7 @@ def add(name: str, role: str, config: Path | None) -> None:
 @api_token.command("list")
 @_CONFIG
 def list_all(config: Path | None) -> None:
-    """List the tokens by their names; what they are is not known any more."""
+    """List the tokens by their names; the tokens themselves are not stored."""
     for name, token in sorted(_tokens(config).all().items()):
         made = datetime.fromtimestamp(token.made_utc_ms / 1000, UTC)
         click.echo(f"{name:40}  {token.role:10}  made {made:%Y-%m-%d %H:%M} UTC")

@@ -1,4 +1,4 @@
-"""What the HTTP API takes and gives. Times are UTC; a field that has nothing to tell is null."""
+"""Request and response models of the HTTP API. Times are UTC; a field without a value is null."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
@@ -14,19 +14,19 @@ Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1
 
 
 class Model(BaseModel):
-    """The base: nothing unknown is taken."""
+    """Base model that refuses unknown fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Error(Model):
-    """Why a request was refused."""
+    """The reason of a refused request."""
 
     detail: str = Field(description="One sentence, with what to do.")
 
 
 class Part(Model):
-    """One thing that inspecting needs."""
+    """One part that an inspection needs."""
 
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
@@ -36,7 +36,7 @@ class Part(Model):
 
 
 class HealthAnswer(Model):
-    """Whether the station takes fruit, and how its parts do."""
+    """Whether the station accepts fruit, and the state of each of its parts."""
 
     ready: bool = Field(description="A trigger would be accepted now.")
     why: str = Field(description="Why not, with the remedy; empty where ready.")
@@ -61,11 +61,7 @@ class InspectionShort(Model):
 
     @classmethod
     def of(cls, row: InspectionRow) -> "InspectionShort":
-        """From the station's answer.
-
-        Args:
-            row: of the answer.
-        """
+        """Convert the station's answer."""
         return cls(
             sequence=row.sequence,
             trigger_id=row.trigger_id,
@@ -133,11 +129,7 @@ class InspectionWhole(Model):
 
     @classmethod
     def of(cls, told: InspectionTold) -> "InspectionWhole":
-        """From the station's answer.
-
-        Args:
-            told: the answer.
-        """
+        """Convert the station's answer."""
         standing = told.standing
         return cls(
             sequence=told.sequence,
@@ -171,7 +163,7 @@ class InspectionWhole(Model):
 
 
 class RecipeShort(Model):
-    """How one recipe stands."""
+    """The state of one recipe."""
 
     name: str
     title: str
@@ -202,11 +194,7 @@ class LotAnswer(Model):
 
     @classmethod
     def of(cls, told: LotTold) -> "LotAnswer":
-        """From the station's answer.
-
-        Args:
-            told: the answer.
-        """
+        """Convert the station's answer."""
         ended = None if told.ended_utc_ms is None else moment(told.ended_utc_ms)
         return cls(name=told.name, grower=told.grower, began=moment(told.began_utc_ms), ended=ended)
 
@@ -218,15 +206,11 @@ class LotList(Model):
 
 
 class LotBegin(Model):
-    """What is told of a lot when it begins."""
+    """The data of a lot that begins."""
 
     grower: Grower = Field(description="Whose fruit it is.")
 
 
 def moment(utc_ms: int) -> datetime:
-    """A time of the station's.
-
-    Args:
-        utc_ms: since 1970.
-    """
+    """Convert a time of the station's, ms since 1970."""
     return datetime.fromtimestamp(utc_ms / 1000, UTC)

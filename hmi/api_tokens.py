@@ -1,4 +1,4 @@
-"""The tokens by which a plant's systems use the HTTP API: known by their hashes alone."""
+"""API token store: the tokens of a plant's systems, as hashes only."""
 
 import hashlib
 import hmac
@@ -24,7 +24,7 @@ ROLES = (Role.VIEWER, Role.OPERATOR)
 
 
 class Token(BaseModel):
-    """What is kept of one token."""
+    """One token's stored data."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     role: Role
@@ -40,7 +40,7 @@ class _File(BaseModel):
 
 
 class ApiTokens:
-    """The tokens of one station; a change by the command line counts at once.
+    """Tokens of one station; a change by the command line takes effect at once.
 
     Args:
         folder: of the HMI within the home folder.
@@ -52,7 +52,7 @@ class ApiTokens:
         self._tokens: dict[str, Token] = {}
 
     def all(self) -> Mapping[str, Token]:
-        """By their names.
+        """Return the tokens by their names.
 
         Raises:
             StationError: the file cannot be read.
@@ -61,11 +61,7 @@ class ApiTokens:
         return self._tokens
 
     def holder(self, token: str) -> tuple[str, Role] | None:
-        """Whose token this is, and what it may; None for nobody's, and where the file cannot be read.
-
-        Args:
-            token: as it came.
-        """
+        """Return the owner of a token and its role; None if it is unknown, or the file cannot be read."""
         sha256 = hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
         try:
             self._look()
@@ -75,14 +71,14 @@ class ApiTokens:
         return found[0] if found else None
 
     def add(self, name: str, role: Role) -> str:
-        """Make a token; it is told this once.
+        """Create a token and return it; it cannot be read again.
 
         Args:
-            name: whose, for the audit trail.
-            role: what it may.
+            name: the owner, for the audit trail.
+            role: the token's role.
 
         Raises:
-            BadInputError: there is one of that name.
+            BadInputError: the name is in use.
             StationError: the file cannot be written.
         """
         self._look()
@@ -97,13 +93,10 @@ class ApiTokens:
         return token
 
     def remove(self, name: str) -> None:
-        """Have a token count no more.
-
-        Args:
-            name: its name.
+        """Withdraw a token.
 
         Raises:
-            BadInputError: there is none.
+            BadInputError: there is no token of that name.
             StationError: the file cannot be written.
         """
         self._look()

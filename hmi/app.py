@@ -1,4 +1,4 @@
-"""The web application: every page behind the guard, over one gateway to the station."""
+"""Web application: every page behind the security middleware, over one gateway to the station."""
 
 import asyncio
 import contextlib
@@ -38,13 +38,10 @@ log = logging.getLogger(__name__)
 
 
 def make_context(site: Configuration) -> Hmi:
-    """All that the pages work with; the gateway is not entered yet.
-
-    Args:
-        site: the site's configuration.
+    """Make the parts that all pages use; the gateway is not entered yet.
 
     Raises:
-        StationError: the people's file cannot be read, or the endpoint is none.
+        StationError: the user store cannot be read, or the endpoint is none.
     """
     settings, boot = site.hmi, uuid.uuid4().hex[:12]
     assets, gateway = Assets(), Gateway(panel_endpoint(site.hmi, site.home), site.hmi.refresh_s)
@@ -63,11 +60,7 @@ def make_context(site: Configuration) -> Hmi:
 
 
 def make_app(hmi: Hmi) -> Guard:
-    """The application.
-
-    Args:
-        hmi: its parts.
-    """
+    """Make the application."""
 
     @contextlib.asynccontextmanager
     async def running(_: FastAPI) -> AsyncIterator[None]:
@@ -132,7 +125,7 @@ async def _bad_form(request: Request, error: Exception) -> Response:
 
 
 async def _away(request: Request, error: Exception) -> Response:
-    """The station did not answer, or refused; whether an order was carried out is said as far as it is known."""
+    """Answer that the station refused or did not answer, and state the result of an order where it is known."""
     if isinstance(error, DeadlineError):
         return _told(request, 503, wording_of(request).text("problem.no_answer"), str(error))
     return _told(request, 409, wording_of(request).text("problem.refused"), str(error))

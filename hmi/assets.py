@@ -1,4 +1,4 @@
-"""The pages' own scripts, styles and icons, held in memory; nothing is fetched from outside."""
+"""Static files of the pages: scripts, styles and icons, held in memory; nothing is fetched from outside."""
 
 import gzip
 import hashlib
@@ -39,10 +39,7 @@ class Assets:
         }
 
     def address(self, name: str) -> str:
-        """Where a page finds a file.
-
-        Args:
-            name: the file's.
+        """Return the address of a file.
 
         Raises:
             KeyError: there is no such file.

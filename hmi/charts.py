@@ -1,4 +1,4 @@
-"""Charts as SVG, without colour: an area curve with its limits, a trend of rejects, a curve on a tile."""
+"""SVG charts, without colour: an area curve with its limits, a trend of rejects, a curve on a tile."""
 
 from collections.abc import Callable, Sequence
 
@@ -15,11 +15,11 @@ Scale = Callable[[float], float]
 
 
 def ticks(largest: float, most: int = 5) -> list[float]:
-    """Round numbers from 0 on for an axis.
+    """Return round numbers from 0 on for an axis.
 
     Args:
-        largest: that it has to reach.
-        most: about so many.
+        largest: the number to reach.
+        most: the approximate count.
     """
     if largest <= 0:
         return [0.0, 1.0]
@@ -34,12 +34,7 @@ def ticks(largest: float, most: int = 5) -> list[float]:
 
 
 def curve(fruit: Fruit, wording: Wording) -> Markup:
-    """A fruit's contact area over closing, with the recipe's limits.
-
-    Args:
-        fruit: the fruit.
-        wording: for the axes.
-    """
+    """Draw a fruit's contact area over closing, with the recipe's limits."""
     closings = [point.closing_mm for point in fruit.curve] + [each.closing_mm for each in fruit.limits]
     areas = [point.area_mm2 for point in fruit.curve] + [each.area_mm2 for each in fruit.limits]
     across, up = ticks(max([*closings, 1.0])), ticks(1.05 * max([*areas, 1.0]))
@@ -74,12 +69,7 @@ def curve(fruit: Fruit, wording: Wording) -> Markup:
 
 
 def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
-    """How many of ten fruit were rejected, ten after ten, the newest at the right: failed below, not judged above.
-
-    Args:
-        fruit: newest first.
-        wording: for the axis.
-    """
+    """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
     width, height, left, low = 300, 118, 46, 92
     parts = []
@@ -102,11 +92,7 @@ def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
 
 
 def sketch(areas_mm2: Sequence[float]) -> Markup:
-    """A curve's shape on a tile.
-
-    Args:
-        areas_mm2: in the steps' order.
-    """
+    """Draw a curve's shape on a tile."""
     most, last = max([*areas_mm2, 1.0]), max(1, len(areas_mm2) - 1)
     points = " ".join(f"{2 + 56 * n / last:.1f},{22 - 20 * area / most:.1f}" for n, area in enumerate(areas_mm2))
     return Markup('<svg class="sketch" viewBox="0 0 60 24" aria-hidden="true"><polyline points="{}"/></svg>').format(
@@ -115,12 +101,7 @@ def sketch(areas_mm2: Sequence[float]) -> Markup:
 
 
 def bar(value: float, largest: float) -> Markup:
-    """How much of what is allowed was used; decoration beside its number.
-
-    Args:
-        value: used.
-        largest: allowed.
-    """
+    """Draw the used share of a limit; decoration beside its number."""
     filled = 300 * min(1.0, max(0.0, value / largest)) if largest > 0 else 0.0
     drawn = Markup(
         '<svg class="chart bar" viewBox="0 0 300 16" aria-hidden="true">'
@@ -154,7 +135,7 @@ def _bar(name: str, x: float, y: float, width: float, height: float) -> str:
 
 
 def _svg(width: int, height: int, label: object, inside: str) -> Markup:
-    """A chart; what is inside was escaped as it was put together."""
+    """Make a chart; its content is already escaped."""
     return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
         f'<svg class="chart" viewBox="0 0 {width} {height}" role="img" aria-label="{label}">{inside}</svg>'
     )

@@ -15,7 +15,8 @@ from station.settings.configuration import load_configuration
 def hmi(config: Path | None) -> None:
     """Serve the operators' pages until SIGTERM or Ctrl-C; `station run` starts this by itself.
 
-    It shows the station through its channel; while the station is away the pages say so and go on by themselves.
+    It shows the station through its channel; while the station does not answer, the pages report that and recover by
+    themselves.
     """
     configure_logging("hmi")
     asyncio.run(serve(load_configuration(config)))

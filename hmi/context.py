@@ -1,4 +1,4 @@
-"""All that a page works with."""
+"""Parts that all pages use."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from station.settings.hmi import HmiSettings
 
 @dataclass(frozen=True, slots=True)
 class Hmi:
-    """One process's parts; `request.app.state.hmi`."""
+    """The process's parts; `request.app.state.hmi`."""
 
     settings: HmiSettings
     gateway: Gateway

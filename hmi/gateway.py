@@ -1,4 +1,4 @@
-"""The HMI's one way to the station: asked with deadlines, and looked at all the time."""
+"""Gateway to the station: the HMI's one channel client; requests with deadlines, and periodic polling."""
 
 import asyncio
 import contextlib
@@ -16,7 +16,7 @@ from station.errors import StationError
 
 ReplyT = TypeVar("ReplyT", bound=Message)
 STALE_S = 2.0
-"""What is older is not shown as live."""
+"""An older state is not shown as live."""
 DEADLINE_S = 2.0
 _LOOK_DEADLINE_S = 1.0
 
@@ -24,11 +24,11 @@ log = logging.getLogger(__name__)
 
 
 class Gateway:
-    """The station as the pages know it. Belongs to the event loop in which it is entered.
+    """Polled state of the station, and requests to it. Belongs to the event loop in which it is entered.
 
     Args:
         endpoint: the panel's channel.
-        period_s: how often the station is looked at; once for all pages, however many are open.
+        period_s: polling period; one poll serves all pages, however many are open.
     """
 
     def __init__(self, endpoint: str, period_s: float) -> None:
@@ -37,11 +37,11 @@ class Gateway:
         self._looking: asyncio.Task[None] | None = None
         self._looked = asyncio.Event()
         self._known: tuple[str, int | None] | None = None
-        """The station's start and last fruit that `last` and `recent` tell of."""
+        """The station's start and last fruit of `last` and `recent`."""
         self.state: PanelState | None = None
-        """As it was last heard; None before the first answer."""
+        """The last answer; None before the first."""
         self.heard_s: float | None = None
-        """When that was, monotonic."""
+        """Time of the last answer, monotonic."""
         self.last: Fruit | None = None
         """The last fruit."""
         self.recent = Recent(fruit=())
@@ -61,16 +61,16 @@ class Gateway:
 
     @property
     def age_s(self) -> float | None:
-        """Age of `state`; None where there never was one."""
+        """Age of `state`; None before the first answer."""
         return None if self.heard_s is None else time.monotonic() - self.heard_s
 
     @property
     def fresh(self) -> bool:
-        """Whether `state` may be shown as live."""
+        """True while `state` is recent enough to be shown as live."""
         return self.age_s is not None and self.age_s <= STALE_S
 
     async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
-        """Ask the station.
+        """Send a request to the station and return its answer.
 
         Args:
             request: a message of the panel's channel.
@@ -79,18 +79,14 @@ class Gateway:
 
         Raises:
             DeadlineError: no answer came in time; of an order it is unknown whether it was carried out.
-            RefusedError: the station refused; its words are the message.
+            RefusedError: the station refused; the message is the station's.
         """
         if self._client is None:
             raise DeadlineError("the channel to the station is not open")
         return await self._client.ask(request, reply, deadline_s=deadline_s)
 
     async def note(self, what: PersonNoted) -> None:
-        """Have something written into the audit trail; where the station is away, the log has it.
-
-        Args:
-            what: who did what.
-        """
+        """Write an event into the audit trail, and into the log if the station does not answer."""
         log.info("%s (%s): %s %s", what.person.who, what.person.role, what.what, what.subject)
         try:
             await self.ask(what, Noted)
@@ -98,7 +94,7 @@ class Gateway:
             log.warning("the audit trail does not have it: %s", error)
 
     async def looked(self) -> None:
-        """Wait until the station was looked at again, whether it answered or not."""
+        """Wait for the end of the next poll, with or without an answer."""
         await self._looked.wait()
 
     async def _look(self) -> None:
@@ -115,7 +111,7 @@ class Gateway:
             await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
 
     async def _fruit(self, sequence: int | None) -> Fruit | None:
-        """A fruit in full; None where the station knows no more of it than that it was."""
+        """Return a fruit in full; None if the station has no details of it any more."""
         if sequence is None:
             return None
         with contextlib.suppress(RefusedError):
@@ -124,9 +120,5 @@ class Gateway:
 
 
 def actor_of(caller: Caller) -> Actor:
-    """Who asks, for the audit trail.
-
-    Args:
-        caller: as logged in, or nobody.
-    """
+    """Return the caller as an actor of the audit trail."""
     return Actor(who=caller.name or "panel", role=caller.role)

@@ -1,4 +1,4 @@
-"""What every request has to pass before any page sees it, and the headers that every answer carries."""
+"""Security middleware: checks of every request before a page gets it, and the headers of every answer."""
 
 import contextlib
 from collections.abc import Iterable
@@ -25,15 +25,15 @@ _SECURE = {"strict-transport-security": "max-age=31536000"}
 
 
 class TooLargeError(Exception):
-    """More came than a request may hold."""
+    """A request body above the limit."""
 
 
 class Guard:
     """Refuses requests for a foreign host's name, from a foreign page, or too large, before they are read.
 
     Args:
-        app: what is guarded.
-        names: the host names that are ours.
+        app: the protected application.
+        names: the host names of this server.
         secure: whether TLS is served.
     """
 
@@ -62,7 +62,7 @@ class Guard:
             await self._within_size(scope, receive, told)
 
     async def _within_size(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve a request that may be larger than it says."""
+        """Serve a request whose body may be larger than its header states."""
         taken = 0
 
         async def take() -> Message:
@@ -74,7 +74,7 @@ class Guard:
             return message
 
         async def tell(message: Message) -> None:
-            if taken <= LARGEST_BODY_BYTES:  # else whatever the framework made of it is not what was wrong
+            if taken <= LARGEST_BODY_BYTES:  # else the framework's answer hides the cause
                 await send(message)
 
         with contextlib.suppress(TooLargeError):
@@ -94,13 +94,13 @@ class Guard:
         return None
 
     def _own(self, headers: Headers, host: str) -> bool:
-        """Whether the browser says that one of our pages asks; a program that is no browser says nothing."""
+        """Return whether the browser names one of our pages as the origin; true for a program that is no browser."""
         site, origin = headers.get("sec-fetch-site"), headers.get("origin")
         return site in {None, "same-origin", "none"} and origin in {None, f"{self._scheme}://{host}"}
 
 
 def _name_of(host: str) -> str:
-    """A Host header's name without its port."""
+    """Return a Host header's name without its port."""
     name = host[: host.rindex("]") + 1].strip("[]") if "]" in host else host.partition(":")[0]
     return name.lower()
 

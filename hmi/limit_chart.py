@@ -1,4 +1,4 @@
-"""Fruit against their limits: where every line and tick lies; `limit_chart.html.j2` draws it as SVG."""
+"""Layout of limit charts: coordinates of all lines and ticks; `limit_chart.html.j2` draws them as SVG."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ class Limit(NamedTuple):
 
 
 class Tick(NamedTuple):
-    """A number beside an axis, and where it is."""
+    """A number beside an axis, and its position."""
 
     at: float
     value: float
@@ -39,12 +39,12 @@ class Tick(NamedTuple):
 
 
 class LimitMark(NamedTuple):
-    """A threshold where it is drawn."""
+    """A threshold at its position."""
 
     x: float
     y: float
     least_y: float | None
-    """None where none is asked for."""
+    """None for no label."""
     limit: Limit
 
 
@@ -69,7 +69,7 @@ class StripLine(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """One number of many fruit on a line, with the limits that it is judged by."""
+    """One number of many fruit on a line, with the recipe's limits."""
 
     dots: tuple[tuple[str, float, float], ...]
     """Class, x and y; those that lie on each other are spread."""
@@ -83,7 +83,7 @@ def area_chart(curves: Sequence[Curve], limits: Sequence[Limit], early_stop_mm2:
     Args:
         curves: drawn in this order; points of the curve `own` are marked.
         limits: in ascending order of closing.
-        early_stop_mm2: where the steps end early; None for none.
+        early_stop_mm2: the early stop's area; None for none.
     """
     xs = [x for curve in curves for x, _ in curve.points] + [limit.closing_mm for limit in limits]
     ys = [y for curve in curves for _, y in curve.points] + [limit.area_mm2 for limit in limits]
@@ -124,7 +124,7 @@ def strip(values: Iterable[tuple[str, float]], limits: Sequence[tuple[str, float
     Args:
         values: class and value of each fruit.
         limits: `limit` or `early`, and its value.
-        from_zero: whether the line begins at 0; else a little below the smallest.
+        from_zero: whether the line begins at 0; else a little below the smallest value.
     """
     known = list(values)
     every = [value for _, value in (*known, *limits)]
@@ -145,12 +145,12 @@ def strip(values: Iterable[tuple[str, float]], limits: Sequence[tuple[str, float
 
 
 def spark(areas_mm2: Sequence[float | None], wide: float = 96.0, high: float = 28.0) -> str:
-    """A curve's points for a picture in a list's row, from 0 to its largest area.
+    """Return a curve's points for a list's row, scaled from 0 to its largest area.
 
     Args:
         areas_mm2: in the order of the steps; those without an area are left out.
-        wide: of the picture.
-        high: likewise.
+        wide: width of the picture.
+        high: height of the picture.
     """
     largest = max((area for area in areas_mm2 if area is not None), default=0.0) or 1.0
     gap = wide / max(1, len(areas_mm2) - 1)
@@ -162,12 +162,12 @@ def spark(areas_mm2: Sequence[float | None], wide: float = 96.0, high: float = 2
 
 
 def histogram(counts: Sequence[int], wide: float = 256.0, high: float = 80.0) -> str:
-    """A polygon of an image's histogram; the heights are roots, so that few pixels are seen beside many.
+    """Return the polygon of an image's histogram; heights are square roots, which keeps small bins visible.
 
     Args:
         counts: pixels a bin.
-        wide: of the picture.
-        high: likewise.
+        wide: width of the picture.
+        high: height of the picture.
     """
     largest = math.sqrt(max(counts, default=0)) or 1.0
     gap = wide / max(1, len(counts) - 1)
@@ -176,7 +176,7 @@ def histogram(counts: Sequence[int], wide: float = 256.0, high: float = 80.0) ->
 
 
 def _ticks(most: float, least: float = 0.0) -> tuple[list[Tick], float]:
-    """Round numbers from at most the least to at least the most, and the last of them."""
+    """Return round numbers from at most the least to at least the most, and the last of them."""
     span = max(most - least, 1e-6)
     power = 10.0 ** math.floor(math.log10(span / _TICKS))
     step = next(step * power for step in _STEPS if step * power * _TICKS >= span * 0.999)

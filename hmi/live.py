@@ -1,4 +1,4 @@
-"""The parts of pages that change by themselves: rendered once for all browsers, sent where they are looked at."""
+"""Live parts of pages: rendered once for all browsers, sent only to the pages that show them."""
 
 import asyncio
 import hashlib
@@ -16,7 +16,7 @@ from hmi.words import Wording
 from station.settings.hmi import Language
 
 BEAT_S = 0.5
-"""How often a page hears that all is well where nothing has changed."""
+"""Period of a page's events if nothing changes."""
 
 
 class Part(NamedTuple):
@@ -26,24 +26,24 @@ class Part(NamedTuple):
     depends_on: Callable[[Gateway], object]
     """Filled in anew when this is no longer equal to what it was; cheap."""
     values: Callable[[Gateway, Wording], Mapping[str, Any]]
-    """What the template needs, beside `may(right)`; `gateway.state` may be None, or old: the page says how old."""
+    """The template's values, beside `may(right)`; `gateway.state` may be None, or old: the page shows its age."""
 
 
 class Filled(NamedTuple):
-    """A part as it is now."""
+    """A part's present content."""
 
     digest: str
     html: Markup
 
 
 class Live:
-    """All parts of all pages.
+    """Live parts of all pages.
 
     Args:
         parts: by their names, `page.what`.
-        renderer: fills them in.
-        gateway: the station.
-        boot: another one after each start of this process: the page loads itself anew.
+        renderer: renders the templates.
+        gateway: state of the station.
+        boot: differs after each start of this process; then a page reloads itself.
     """
 
     def __init__(self, parts: Mapping[str, Part], renderer: Renderer, gateway: Gateway, boot: str) -> None:
@@ -52,23 +52,19 @@ class Live:
         self.open = 0
         """Streams under way."""
         self.ending = False
-        """The process is told to end: streams end."""
+        """The process ends: streams end."""
 
     def unknown(self, names: Iterable[str]) -> bool:
-        """Whether any of them is no part.
-
-        Args:
-            names: as asked for.
-        """
+        """Return whether any of the names is not a part."""
         return any(name not in self._parts for name in names)
 
     def part(self, name: str, wording: Wording, role: Role) -> Filled:
-        """A part as it is now.
+        """Return a part's present content.
 
         Args:
             name: a known one.
             wording: the language.
-            role: of who looks at it; an order within it has no token, which the page's script fills in.
+            role: of the reader; an order within the part has no token, which the page's script fills in.
         """
         part = self._parts[name]
         depends_on = part.depends_on(self._gateway)
@@ -84,12 +80,12 @@ class Live:
     async def stream(
         self, names: tuple[str, ...], wording: Wording, caller: Callable[[], Caller]
     ) -> AsyncIterator[bytes]:
-        """Server-sent events for one page, until it goes away. A browser that takes them slowly gets fewer.
+        """Send server-sent events to one page until it closes. A slow browser gets fewer.
 
         Args:
             names: the page's parts.
             wording: its language.
-            caller: who is logged in there now; the page loads itself anew when that changes.
+            caller: returns who is logged in there now; the page reloads itself when that changes.
         """
         sent: dict[str, str] = {}
         loop, beat_at_s = asyncio.get_running_loop(), 0.0

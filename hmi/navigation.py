@@ -1,4 +1,4 @@
-"""The pages that there are, in the order of the navigation. A new page is one more line here."""
+"""Navigation: the list of pages in their order. A new page is one more line here."""
 
 import importlib
 from collections.abc import Mapping
@@ -33,16 +33,16 @@ class Entry(NamedTuple):
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """The pages' modules."""
+    """Return the pages' modules."""
     return tuple(importlib.import_module(name) for name in PAGES)
 
 
 @cache
 def entries() -> tuple[Entry, ...]:
-    """The navigation."""
+    """Return the navigation's entries."""
     return tuple(module.ENTRY for module in modules() if hasattr(module, "ENTRY"))
 
 
 def parts() -> Mapping[str, Part]:
-    """All parts that change by themselves."""
+    """Return the live parts of all pages."""
     return {name: part for module in modules() for name, part in getattr(module, "PARTS", {}).items()}

@@ -1,4 +1,4 @@
-"""A whole page: its template within the frame that all pages share."""
+"""Page rendering: a page's template within the common layout."""
 
 from typing import Any
 
@@ -22,10 +22,10 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
 
     Args:
         request: the browser's.
-        template: it extends `base.html.j2`.
-        status: of HTTP.
-        values: what it needs, beside what every page has: `caller`, `Right`, `state` (the station's, or None),
-            `token()` for a form, and `live(name)`, which puts a part that changes by itself.
+        template: extends `base.html.j2`.
+        status: HTTP status.
+        values: the page's own, in addition to those of every page: `caller`, `Right`, `state` (the station's, or None),
+            `token()` for a form, and `live(name)`, which inserts a live part.
     """
     hmi, caller, wording = hmi_of(request), caller_of(request), wording_of(request)
     age_s = hmi.gateway.age_s
@@ -51,24 +51,14 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
 
 
 def give_session(request: Request, answer: Response, session: str) -> None:
-    """Give the browser its cookie, where it is a new one.
-
-    Args:
-        request: the browser's.
-        answer: that carries it.
-        session: the cookie; empty for none.
-    """
+    """Set the browser's cookie if it is new."""
     if session:
         secure = hmi_of(request).settings.tls.enabled
         answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="strict", path="/")
 
 
 def go_to(address: str) -> RedirectResponse:
-    """Answer an order: the browser goes to a page, whose reloading repeats nothing.
-
-    Args:
-        address: of a page of ours.
-    """
+    """Answer an order by redirecting to a page, which can be reloaded without repeating the order."""
     return RedirectResponse(address, 303)
 
 

@@ -1,4 +1,4 @@
-"""The people who may log in: one file of the home folder, readable by the station's user alone."""
+"""User store: the people who may log in, in one file of the home folder, readable by the station's user alone."""
 
 import json
 import logging
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class PeopleError(StationError):
-    """The people cannot be read or changed; `key` is of the catalogue."""
+    """The user store cannot be read or changed; `key` is of the catalogue."""
 
     def __init__(self, key: str, detail: str = "") -> None:
         super().__init__(f"{key} {detail}".strip())
@@ -48,21 +48,12 @@ class _File(BaseModel):
 
 
 def least_digits(role: Role) -> int:
-    """How long a role's PIN has to be.
-
-    Args:
-        role: of the person.
-    """
+    """Return the minimum length of a role's PIN."""
     return LEAST_DIGITS.get(role, _LEAST_DIGITS_ELSE)
 
 
 def pin_problem(pin: str, role: Role) -> str:
-    """What is wrong with a PIN, as a key of the catalogue; empty where nothing is.
-
-    Args:
-        pin: as typed.
-        role: of the person.
-    """
+    """Return the problem of a PIN as a key of the catalogue; empty if it is valid."""
     if not (pin.isascii() and pin.isdigit() and least_digits(role) <= len(pin) <= LONGEST_PIN):
         return "people.pin_length"
     steps = {int(after) - int(before) for before, after in pairwise(pin)}
@@ -70,11 +61,10 @@ def pin_problem(pin: str, role: Role) -> str:
 
 
 class PeopleFile:
-    """The people, by their names. Its verbs block: `check` for some 20 ms, which is what makes guessing slow.
+    """Users by their names. Its methods block: `check` for some 20 ms, which slows guessing down.
 
     Args:
         folder: of the HMI within the home folder.
-
     """
 
     def __init__(self, folder: Path) -> None:
@@ -84,25 +74,20 @@ class PeopleFile:
         self._unused = self._hasher.hash(_UNUSED_PIN)
         self._turn = threading.Lock()
         self.broken = ""
-        """Why the file that is there cannot be read: nobody can log in, and it is no first start."""
+        """Read error of an existing file: then no log-in is possible, and it is no first start."""
         self._people = self._read()
 
     @property
     def first_start(self) -> bool:
-        """Whether the first person at the panel is to choose an administrator's PIN."""
+        """True until somebody has set the first administrator's PIN."""
         return not self._people and not self.broken
 
     def names(self) -> Mapping[str, Role]:
-        """Everybody with their role."""
+        """Return all users with their roles."""
         return {name: person.role for name, person in sorted(self._people.items())}
 
     def check(self, name: str, pin: str) -> Role | None:
-        """The role of a person who has shown the right PIN; as slow for a name that nobody has.
-
-        Args:
-            name: who.
-            pin: as typed.
-        """
+        """Return the role of a user whose PIN is right; takes as long for an unknown name."""
         person = self._people.get(name)
         try:
             self._hasher.verify(self._unused if person is None else person.pin, pin[:100])
@@ -111,14 +96,10 @@ class PeopleFile:
         return None if person is None else person.role
 
     def begin(self, name: str, pin: str) -> None:
-        """The first start: the first person, an administrator.
-
-        Args:
-            name: whose.
-            pin: theirs.
+        """Add the first user, an administrator.
 
         Raises:
-            PeopleError: somebody is there already, or the name or the PIN is none.
+            PeopleError: there is a user already, or the name or the PIN is invalid.
         """
         with self._turn:
             if not self.first_start:
@@ -126,24 +107,16 @@ class PeopleFile:
             self._put(name, Role.ADMIN, pin)
 
     def put(self, name: str, role: Role, pin: str) -> None:
-        """Add a person, or give one another role or PIN.
-
-        Args:
-            name: whose.
-            role: from now on.
-            pin: from now on; empty leaves it.
+        """Add a user, or change a user's role or PIN.
 
         Raises:
-            PeopleError: the name or the PIN is none, or no administrator would be left.
+            PeopleError: the name or the PIN is invalid, or no administrator would be left.
         """
         with self._turn:
             self._put(name, role, pin)
 
     def remove(self, name: str) -> None:
-        """Remove a person; nothing happens where there is none of the name.
-
-        Args:
-            name: whose.
+        """Remove a user; does nothing for an unknown name.
 
         Raises:
             PeopleError: no administrator would be left.

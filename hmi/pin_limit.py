@@ -1,4 +1,4 @@
-"""How fast PINs may be tried: after a few wrong ones each further try has to wait, longer and longer."""
+"""Login rate limiter: after several wrong PINs each further try is delayed, longer and longer."""
 
 import time
 from collections import OrderedDict
@@ -12,7 +12,7 @@ _MOST_KEYS = 1000
 
 
 class PinLimit:
-    """Wrong PINs by name and by browser's address; what is right for one of them is forgotten for it.
+    """Wrong PINs by name and by browser's address; a right PIN clears the count of its keys.
 
     Args:
         clock: monotonic.
@@ -23,15 +23,15 @@ class PinLimit:
         self._wrong: OrderedDict[str, tuple[int, float]] = OrderedDict()
 
     def wait_s(self, *keys: str) -> float:
-        """How long the next try has to wait; 0 where it need not.
+        """Return the delay of the next try; 0 for none.
 
         Args:
-            keys: whose tries count: the name's and the address's.
+            keys: the name and the address of the try.
         """
         return max((self._wait_s(key) for key in keys), default=0.0)
 
     def tried(self, *keys: str) -> None:
-        """A PIN is about to be looked at; counts as wrong until `right`, so that many at once gain nothing.
+        """Count a try before its PIN is checked: as wrong until `right`, so that parallel tries gain nothing.
 
         Args:
             keys: as above.
@@ -44,7 +44,7 @@ class PinLimit:
             self._wrong.popitem(last=False)
 
     def right(self, *keys: str) -> None:
-        """The PIN was right.
+        """Clear the counts after a right PIN.
 
         Args:
             keys: as above.

@@ -1,4 +1,4 @@
-"""The HMI as a process: pages served until told to end."""
+"""HMI process: serves the pages until SIGINT or SIGTERM."""
 
 import asyncio
 import logging
@@ -27,7 +27,7 @@ async def serve(site: Configuration) -> None:
         site: the site's configuration.
 
     Raises:
-        StationError: the address, a certificate or the people's file cannot be used.
+        StationError: the address, a certificate or the user store cannot be used.
     """
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

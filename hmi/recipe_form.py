@@ -1,4 +1,4 @@
-"""A recipe as a form: every value with its title, description, unit and bounds from the model; and back from a form."""
+"""Recipe form: every value with title, description, unit and bounds from the model; and parsing of a filled form."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -9,7 +9,7 @@ from station.settings.recipe_model import Recipe
 from station.settings.schema import branches, expectation, find, resolved, schema_of
 
 FIXED = frozenset({"schema_version", "name"})
-"""What makes a recipe this one, and is not edited."""
+"""A recipe's identity, which is not edited."""
 _LIST = re.compile(r"[;\s]+")
 
 Path = tuple[str | int, ...]
@@ -26,7 +26,7 @@ class Field(NamedTuple):
     description: str
     unit: str
     expected: str
-    """In words, as `a number from 0.1 to 10 mm`."""
+    """As text: `a number from 0.1 to 10 mm`."""
     kind: str
     """`number`, `text`, `choice`, `list` or `switch`."""
     choices: tuple[str, ...]
@@ -35,7 +35,7 @@ class Field(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Fields that belong together."""
+    """A group of fields."""
 
     path: str
     key: str
@@ -45,7 +45,7 @@ class Group(NamedTuple):
 
 
 class BadFieldError(Exception):
-    """What was typed is no value of its field."""
+    """A typed text that is no value of its field."""
 
     def __init__(self, field: Field) -> None:
         super().__init__(field.path)
@@ -53,11 +53,7 @@ class BadFieldError(Exception):
 
 
 def groups(values: Mapping[str, Any]) -> list[Group]:
-    """A recipe's values, group by group, in the model's order.
-
-    Args:
-        values: as a recipe has them as JSON.
-    """
+    """Return a recipe's values, group by group, in the model's order."""
     root = schema_of(Recipe)
     gathered: dict[Path, list[Field]] = {}
     for path, value in _leaves(values, ()):
@@ -72,14 +68,14 @@ def groups(values: Mapping[str, Any]) -> list[Group]:
 
 
 def changed(values: Mapping[str, Any], form: Mapping[str, str]) -> dict[str, Any]:
-    """What a form changes.
+    """Return the differences between a form and the recipe.
 
     Args:
         values: the recipe's as they are.
-        form: texts by the fields' paths; those that are missing stay.
+        form: texts by the fields' paths; a missing field is unchanged.
 
     Raises:
-        BadFieldError: a text is no value of its field's kind; bounds are the station's to check.
+        BadFieldError: a text is no value of its field's kind; the station checks the bounds.
     """
     changes = {}
     for group in groups(values):
@@ -94,7 +90,7 @@ def changed(values: Mapping[str, Any], form: Mapping[str, str]) -> dict[str, Any
 
 
 def parsed(field: Field, text: str) -> Any:
-    """What a person has typed into a field.
+    """Parse a field's typed text.
 
     Args:
         field: which.
@@ -123,7 +119,7 @@ def parsed(field: Field, text: str) -> Any:
 
 
 def shown(field: Field, decimal: str) -> str:
-    """A field's value as a person types it.
+    """Format a field's value for typing.
 
     Args:
         field: which.
@@ -143,12 +139,7 @@ def shown(field: Field, decimal: str) -> str:
 
 
 def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """The recipe's values as they would be; nothing is checked.
-
-    Args:
-        values: as they are.
-        changes: new ones by their paths.
-    """
+    """Return the recipe's values after the changes, unchecked."""
 
     def walk(value: Any, path: Path) -> Any:
         if dotted(path) in changes:
@@ -163,17 +154,13 @@ def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
 
 
 def dotted(path: Path) -> str:
-    """A path as the recipe editor takes it.
-
-    Args:
-        path: keys and places.
-    """
+    """Return a path as the recipe editor takes it."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def field_keys() -> list[str]:
-    """The catalogue's keys of all fields and groups of a recipe."""
+    """Return the catalogue's keys of all fields and groups of a recipe."""
     root = schema_of(Recipe)
     paths = [path for path, _ in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
     return list(dict.fromkeys([*map(_key, paths), *(_key(_group(path)) for path in paths)]))
@@ -203,7 +190,7 @@ def _leaves(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
 
 
 def _group(path: Path) -> Path:
-    """The innermost mapping, with the place in a list: each threshold is a group of its own."""
+    """Return the innermost mapping, with the place in a list: each threshold is a group of its own."""
     return path[:-1]
 
 

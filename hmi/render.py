@@ -1,4 +1,4 @@
-"""Templates into pages and into parts of pages."""
+"""Template rendering of pages and live parts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from hmi.words import Wording
 
 
 class Renderer:
-    """The templates of the folder `templates`; whatever is put into them is text, never markup.
+    """Templates of the folder `templates`; inserted values are text, never markup.
 
     In every template: `t(key, **values)` a text of the catalogue, `w` the `Wording` with numbers and times,
     `static(name)` a file's address.
@@ -33,15 +33,15 @@ class Renderer:
         self._environment.globals["static"] = assets.address
 
     def render(self, template: str, wording: Wording, values: Mapping[str, Any]) -> Markup:
-        """Fill a template in.
+        """Render a template.
 
         Args:
-            template: its name.
+            template: its file name.
             wording: the language.
-            values: what it needs.
+            values: the template's values.
 
         Raises:
-            jinja2.UndefinedError: it needs more.
+            jinja2.UndefinedError: a value is missing.
         """
         filled = self._environment.get_template(template).render({**values, "t": wording.text, "w": wording})
         return Markup(filled)  # noqa: S704 (a template's output, escaped as it was filled in)

@@ -1,13 +1,13 @@
-"""Who may do what at the panel."""
+"""Roles and rights at the panel."""
 
 from enum import StrEnum
 
 
 class Role(StrEnum):
-    """In what capacity a person stands at the panel."""
+    """A person's role at the panel."""
 
     VIEWER = "viewer"
-    """Whoever is not logged in."""
+    """A person who is not logged in."""
     OPERATOR = "operator"
     QUALITY = "quality"
     MAINTENANCE = "maintenance"
@@ -15,7 +15,7 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """What asks for a role."""
+    """An action that needs a role."""
 
     RUN = "run"
     """Start, stop and call off; lots; recover after a stop."""
@@ -40,13 +40,9 @@ RIGHTS: dict[Role, frozenset[Right]] = {
     Role.MAINTENANCE: _OPERATING | {Right.MAINTAIN},
     Role.ADMIN: frozenset(Right),
 }
-"""Everything may be looked at by a viewer; what changes anything asks for one of these."""
+"""A viewer may read everything; a change needs one of these."""
 
 
 def least_role(right: Right) -> Role:
-    """The first role that has a right, for telling who may.
-
-    Args:
-        right: any.
-    """
+    """Return the lowest role that has a right."""
     return next(role for role in Role if right in RIGHTS[role])

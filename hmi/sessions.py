@@ -1,4 +1,4 @@
-"""Who is logged in at which browser, and the tokens that make each order one of this page and of this moment."""
+"""Sessions: the person logged in at each browser, and one-time tokens for orders."""
 
 import hashlib
 import hmac
@@ -17,7 +17,7 @@ _MOST_USED = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who asks."""
+    """The author of a request."""
 
     name: str
     """Empty for a viewer who is not logged in."""
@@ -26,11 +26,7 @@ class Caller:
     """The browser's cookie."""
 
     def may(self, right: Right) -> bool:
-        """Whether the role has a right.
-
-        Args:
-            right: which.
-        """
+        """Return whether the role has a right."""
         return right in RIGHTS[self.role]
 
 
@@ -42,10 +38,10 @@ class _LoggedIn:
 
 
 class Sessions:
-    """The browsers that a person is logged in at; a restart of the process logs everybody out.
+    """Log-ins by browser; a restart of the process logs everybody out.
 
     Args:
-        idle_s: after this time without a touch a person is logged out.
+        idle_s: a person is logged out after this time without a touch.
         clock: monotonic.
     """
 
@@ -57,38 +53,26 @@ class Sessions:
 
     @staticmethod
     def new() -> str:
-        """A cookie that nobody can guess."""
+        """Make a random cookie."""
         return secrets.token_urlsafe(32)
 
     def caller(self, session: str) -> Caller:
-        """Who asks with this cookie; a viewer where nobody is logged in, or nobody any more.
-
-        Args:
-            session: the cookie.
-        """
+        """Return the caller with this cookie; a viewer if nobody is logged in or the session has expired."""
         person = self._sessions.get(session)
         if person is None or self._clock() - person.touched_s > self._idle_s:
             return Caller("", Role.VIEWER, session)
         return Caller(person.name, person.role, session)
 
     def touch(self, session: str) -> None:
-        """A person has touched the page.
-
-        Args:
-            session: the cookie.
-        """
+        """Restart the session's idle time."""
         if self.caller(session).name:
             self._sessions[session].touched_s = self._clock()
 
     def log_in(self, name: str, role: Role) -> str:
         """Log a person in.
 
-        Args:
-            name: who has shown the PIN.
-            role: theirs.
-
         Returns:
-            A new cookie: one that was there before the log-in is worth nothing.
+            A new cookie; the one from before the log-in is not valid for this session.
         """
         session = self.new()
         self._sessions[session] = _LoggedIn(name, role, self._clock())
@@ -97,50 +81,38 @@ class Sessions:
         return session
 
     def log_out(self, session: str) -> None:
-        """Log out; nothing happens where nobody was logged in.
-
-        Args:
-            session: the cookie.
-        """
+        """Log out. Idempotent."""
         self._sessions.pop(session, None)
 
     def forget(self, name: str) -> None:
-        """Log a person out everywhere, as when the role or the PIN is another one now.
-
-        Args:
-            name: whose.
-        """
+        """Log a person out everywhere, as after a change of role or PIN."""
         self._sessions = OrderedDict((key, each) for key, each in self._sessions.items() if each.name != name)
 
     def sweep(self) -> list[Caller]:
-        """Forget those who were idle for too long.
+        """Remove expired sessions.
 
         Returns:
-            Who they were.
+            Their callers.
         """
         now_s = self._clock()
         idle = [key for key, each in self._sessions.items() if now_s - each.touched_s > self._idle_s]
         return [Caller(each.name, each.role, key) for key in idle if (each := self._sessions.pop(key))]
 
     def token(self, session: str) -> str:
-        """A token for one order from a page of this browser.
-
-        Args:
-            session: the cookie.
-        """
+        """Make a token for one order from a page of this browser."""
         body = f"{int(self._clock())}.{secrets.token_urlsafe(12)}"
         return f"{body}.{self._mac(session, body)}"
 
     def spend(self, session: str, token: str) -> str:
-        """Use a token up.
+        """Check and invalidate a token.
 
         Args:
-            session: the cookie that came with it.
-            token: as it came.
+            session: the cookie of the request.
+            token: the token of the request.
 
         Returns:
-            What is wrong with it, as a key of the catalogue: `problem.forged`, `problem.replayed` or `problem.old`;
-            empty where it was good.
+            The problem as a key of the catalogue: `problem.forged`, `problem.replayed` or `problem.old`; empty if the
+            token is valid.
         """
         body, _, mac = token.rpartition(".")
         issued = body.partition(".")[0]

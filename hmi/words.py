@@ -1,4 +1,4 @@
-"""What the pages say, in each language: catalogues of the folder `words`, one file for each page."""
+"""Translation: message catalogues of the folder `words`, one file for each page and language."""
 
 import json
 import re
@@ -18,15 +18,12 @@ SOURCE: Language = "en"
 _DECIMAL = {"en": ".", "de": ",", "es": ","}
 _NUMBER = re.compile(r"(?<![\w.])([0-9]+)\.([0-9]+)(?![\w.])")
 _DAY = {"en": "%Y-%m-%d", "de": "%d.%m.%Y", "es": "%d/%m/%Y"}
-NO_VALUE = "–"  # noqa: RUF001 (what is shown where nothing was measured)
+NO_VALUE = "–"  # noqa: RUF001 (for a value that was not measured)
 
 
 @cache
 def catalogue(language: Language) -> Mapping[str, str]:
-    """All texts of a language by their keys, `page.what`; a key begins with its file's name.
-
-    Args:
-        language: one of the folder's.
+    """Return all texts of a language by their keys, `page.what`; a key begins with its file's name.
 
     Raises:
         ValueError: a key is in another page's file.
@@ -42,9 +39,9 @@ def catalogue(language: Language) -> Mapping[str, str]:
 
 @cache
 def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """The station's own sentences, `said.what` of the English catalogue, as patterns; the most particular first.
+    """Return the station's own sentences, `said.*` of the English catalogue, as patterns; the most specific first.
 
-    A device's fault, `said.fault_of_what`, is a frame around what was seen and what to do: those come before all.
+    A device's fault, `said.fault_of_*`, encloses an observation and a remedy: these patterns come first.
     """
     texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("said.")}
     parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
@@ -60,16 +57,16 @@ def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """One language's texts, numbers and times."""
+    """Texts, numbers and times in one language."""
 
     language: Language
 
     def text(self, key: str, **values: object) -> str:
-        """A text; in English where the language has none, which a test refuses.
+        """Return a text; in English if the language has none, which a test refuses.
 
         Args:
             key: as in the catalogue.
-            values: what its braces stand for.
+            values: for the text's braces.
 
         Raises:
             KeyError: no language has it.
@@ -79,20 +76,11 @@ class Wording:
         return text.format(**values) if values else text
 
     def own(self, key: str, english: str) -> str:
-        """A text that comes from the station in English, in this language where the catalogue has it.
-
-        Args:
-            key: as in the catalogue.
-            english: as it came.
-        """
+        """Translate a text that the station sends in English; unchanged if the catalogue has none."""
         return catalogue(self.language).get(key, english)
 
     def said(self, english: str) -> str:
-        """A sentence of the station's in this language; where no catalogue has it, as it is and marked as English.
-
-        Args:
-            english: as it came.
-        """
+        """Translate a sentence of the station; unchanged and marked as English if no pattern matches."""
         if self.language == SOURCE:
             return english
         told = self._told(english)
@@ -105,14 +93,14 @@ class Wording:
         return None
 
     def _value(self, text: str) -> str:
-        """What stands within a sentence: a number, a sentence again, or a name."""
+        """Translate a part of a sentence: a number, another sentence, or a name."""
         lead = text.removesuffix(" ")
         if (told := self._told(lead)) is not None:
             return told + text[len(lead) :]
         return _NUMBER.sub(rf"\1{_DECIMAL[self.language]}\2", text)
 
     def number(self, value: float | None, digits: int = 0) -> str:
-        """A number with the language's decimal sign; thousands stand apart by a thin space.
+        """Format a number with the language's decimal sign and a thin space between thousands.
 
         Args:
             value: None is shown as a dash.
@@ -123,7 +111,7 @@ class Wording:
         return f"{value:,.{digits}f}".replace(".", "\0").replace(",", "\u202f").replace("\0", _DECIMAL[self.language])
 
     def percent(self, share: float | None, digits: int = 0) -> str:
-        """A share of one as a percentage.
+        """Format a fraction of one as a percentage.
 
         Args:
             share: None is shown as a dash.
@@ -135,24 +123,16 @@ class Wording:
 
     @staticmethod
     def clock(utc_ms: int) -> str:
-        """A time of day, in the machine's zone.
-
-        Args:
-            utc_ms: since 1970.
-        """
+        """Format a time of day, in the machine's zone."""
         return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime("%H:%M:%S")
 
     def day(self, utc_ms: int) -> str:
-        """A date, in the machine's zone.
-
-        Args:
-            utc_ms: since 1970.
-        """
+        """Format a date, in the machine's zone."""
         return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime(_DAY[self.language])
 
 
 def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> Language:
-    """The language to show.
+    """Return the language to show.
 
     Args:
         languages: the site's.

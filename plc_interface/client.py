@@ -28,7 +28,7 @@ CONTROL, STATUS = BY_NAME["control"], BY_NAME["status"]
 
 
 class StationClient(RegisterLink):
-    """One PLC: claims the right to write, arms, inspects one fruit at a time, keeps its heartbeat.
+    """One PLC: claims the right to write, arms, inspects one fruit at a time, sends its heartbeat.
 
     As a context manager it connects and checks the references; writing begins with `arm`.
     """
@@ -56,7 +56,7 @@ class StationClient(RegisterLink):
         await super().close()
 
     async def arm(self) -> None:
-        """Claim the right to write, give enable anew, and begin the heartbeat. Idempotent.
+        """Claim the right to write, set enable anew, and start the heartbeat. Idempotent.
 
         Raises:
             RequestRefusedError: another client holds the right to write.
@@ -68,20 +68,20 @@ class StationClient(RegisterLink):
             self._beating = asyncio.create_task(self._beat(), name="PLC's heartbeat")
 
     async def disarm(self) -> None:
-        """Take enable back and give the right to write away. Idempotent."""
+        """Clear enable and release the right to write. Idempotent."""
         await self._set(frozenset())
         await self.write({"write_key": 0})
 
     async def scan(self) -> dict[str, Any]:
-        """Status and result block by register names, from one read."""
+        """Read status and result block with one request, by register names."""
         return await self.read_groups("status", "result")
 
     async def status(self) -> frozenset[str]:
-        """The names of the status bits that are set."""
+        """Return the names of the status bits that are set."""
         return STATUS.names(await self.read("status"))
 
     async def shown(self) -> InspectionResult | None:
-        """The result that waits for its acknowledgement, or None."""
+        """Return the result that waits for its acknowledgement, or None."""
         return result_shown(await self.scan())
 
     async def inspect(
@@ -93,14 +93,14 @@ class StationClient(RegisterLink):
         fruit_length_mm: float | None = None,
         size_class: int | None = None,
     ) -> InspectionResult:
-        """Inspect one fruit: trigger, wait, take the result whose id is this one, acknowledge it. Not idempotent.
+        """Inspect one fruit: trigger, wait, read the result with this id, acknowledge it. Not idempotent.
 
         Args:
             trigger_id: 1 to 65535, other than the last one accepted.
             encoder: the line's encoder, given back with the result.
-            deadline_s: for all of it. A result that comes later waits, and has to be acknowledged by its sequence.
-            fruit_length_mm: as a grader measured it, sent to a tenth; None where it did not.
-            size_class: the grader's, 1 to 65535; None where it gave none.
+            deadline_s: for the whole inspection. A later result waits, and has to be acknowledged by its sequence.
+            fruit_length_mm: measured by a grader, sent to a tenth; None for none.
+            size_class: the grader's, 1 to 65535; None for none.
 
         Raises:
             NotReadyError: nothing was triggered.
@@ -143,11 +143,11 @@ class StationClient(RegisterLink):
         return taken
 
     async def acknowledge(self, sequence: int) -> None:
-        """Say that the result with this sequence was taken; returns once the station has noted it. Idempotent.
+        """Acknowledge the result with this sequence; returns once the station has noted it. Idempotent.
 
         Raises:
             NotReadyError: another result is shown, or none.
-            DeadlineMissedError: the station does not note it.
+            DeadlineMissedError: the station does not note it in time.
         """
         now = await self.scan()
         if now["acknowledged_sequence_echo"] == sequence:
@@ -166,7 +166,7 @@ class StationClient(RegisterLink):
             await self._set(self._control)
 
     async def command(self, command: CommandName, argument: int = 0, deadline_s: float = 40.0) -> None:
-        """Have the station carry out a command, and wait until it is done.
+        """Send a command to the station, and wait until it is done.
 
         Raises:
             CommandFailedError: it was not carried out.
@@ -192,18 +192,18 @@ class StationClient(RegisterLink):
             raise CommandFailedError(f"{command.value} {argument} was not carried out: {result.meaning}", result.name)
 
     async def change_recipe(self, number: int, deadline_s: float = 40.0) -> None:
-        """Have the recipe with this PLC number made active. Idempotent. Raises as `command`."""
+        """Make the recipe with this PLC number active. Idempotent. Raises as `command`."""
         await self.command(CommandName.CHANGE_RECIPE, number, deadline_s)
 
     async def latch_lot(self, lot: str) -> None:
-        """Name the lot of the inspections from here on. Idempotent.
+        """Set the lot of the inspections from here on. Idempotent.
 
         Args:
             lot: up to 32 printable ASCII characters.
 
         Raises:
             RegisterValueError: other characters, or too many.
-            DeadlineMissedError: the station did not take it.
+            DeadlineMissedError: the station did not accept it in time.
         """
         await self.write({"lot": lot})
         await self._raise("latch_lot")
@@ -217,7 +217,7 @@ class StationClient(RegisterLink):
             await self._set(self._control)
 
     async def counters(self) -> dict[str, int]:
-        """The counters by register name, from one read."""
+        """Return the counters by register name, from one read."""
         values = await self.read_groups("counters")
         return {register.name: values[register.name] for register in COUNTERS}
 
@@ -241,11 +241,11 @@ class StationClient(RegisterLink):
         self._control = control
 
     async def _raise(self, bit: str) -> None:
-        """Set one more control bit, which the next `_set` takes back."""
+        """Set one more control bit, which the next `_set` clears."""
         await self.write({"control": CONTROL.flags(self._control | {bit})})
 
     async def _until(self, holds: Callable[[dict[str, Any]], bool], ends_s: float, what: str) -> dict[str, Any]:
-        """The first scan in which something holds."""
+        """Return the first scan that meets a condition."""
         while not holds(now := await self.scan()):
             if time.monotonic() > ends_s:
                 bits = ", ".join(sorted(STATUS.names(now["status"]))) or "none"

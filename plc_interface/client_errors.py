@@ -1,4 +1,4 @@
-"""What the client of the register map raises. Each message says what was found and what to do."""
+"""Exceptions of the register map's client. Each message states what was found and what to do."""
 
 from station.errors import StationError
 
@@ -20,11 +20,11 @@ class RequestRefusedError(ClientError):
 
 
 class ReferencesError(ClientError):
-    """The reference registers do not read as they must: word order, address or map differ."""
+    """The reference registers have other values: word order, address or map differ."""
 
 
 class NotReadyError(ClientError):
-    """A trigger now could only be refused, or its result be mistaken; nothing was triggered."""
+    """A trigger now would be refused, or its result be ambiguous; nothing was triggered."""
 
 
 class TriggerRefusedError(ClientError):
@@ -37,7 +37,7 @@ class TriggerRefusedError(ClientError):
 
 
 class DeadlineMissedError(ClientError):
-    """What was waited for did not come in time: of a fruit nothing is known then, divert it."""
+    """No answer or result in time: of a fruit nothing is known then, divert it."""
 
 
 class CommandFailedError(ClientError):

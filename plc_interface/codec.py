@@ -1,4 +1,4 @@
-"""Between a value and its registers."""
+"""Conversion between a value and its registers."""
 
 import math
 import struct
@@ -10,7 +10,7 @@ from station.errors import BadInputError
 
 
 class WordOrder(StrEnum):
-    """Which register of a 32- or 64-bit value comes first; the bytes in a register are always big-endian."""
+    """Order of the registers of a 32- or 64-bit value; the bytes in a register are always big-endian."""
 
     HIGH_FIRST = "high_first"
     """As in the Modbus specification's spirit, and the default: 0x12345678 is 0x1234, 0x5678."""
@@ -19,7 +19,7 @@ class WordOrder(StrEnum):
 
 
 class RegisterValueError(BadInputError):
-    """A value that a register cannot hold, or that it must not."""
+    """A value that a register cannot hold, or must not."""
 
 
 _FORMATS = {
@@ -35,10 +35,10 @@ _FORMATS = {
 
 
 def encode(register: Register, value: float | str | None, order: WordOrder = WordOrder.HIGH_FIRST) -> tuple[int, ...]:
-    """The registers' contents for a value, `register.words` numbers from 0 to 65535.
+    """Return the registers' contents for a value, `register.words` numbers from 0 to 65535.
 
     Args:
-        register: where the value goes; its bounds are not looked at here, see `problem`.
+        register: the value's register; its bounds are not checked here, see `problem`.
         value: a number, a text for TEXT, or None for the register's own invalid value (0x80000000 for the area in
             mm²/100, NaN for the area in mm², 0xFFFFFFFF for the one in px, 0x8000 for closing, 0xFFFF for confidence).
         order: of the words of a number.
@@ -62,10 +62,10 @@ def encode(register: Register, value: float | str | None, order: WordOrder = Wor
 
 
 def decode(register: Register, words: Sequence[int], order: WordOrder = WordOrder.HIGH_FIRST) -> int | float | str:
-    """The value that lies in registers; an invalid value is given as it is, compare it by `is_invalid`.
+    """Return the value of registers; an invalid value is returned as it is, compare it by `is_invalid`.
 
     Args:
-        register: which value.
+        register: the value's register.
         words: `register.words` numbers from 0 to 65535.
         order: of the words of a number.
 
@@ -81,14 +81,14 @@ def decode(register: Register, words: Sequence[int], order: WordOrder = WordOrde
 
 
 def is_invalid(register: Register, value: float | str) -> bool:
-    """Whether the value is the register's own "there is none"."""
+    """Return whether the value is the register's own "there is none"."""
     if register.invalid is None or isinstance(value, str):
         return False
     return math.isnan(value) if math.isnan(register.invalid) else value == register.invalid
 
 
 def problem(register: Register, value: float | str) -> str:
-    """Why a decoded value must not stand in its register, as one sentence; empty where it may."""
+    """Return why a decoded value must not be in its register, as one sentence; empty if it may."""
     if isinstance(value, str) or is_invalid(register, value):
         return ""
     if register.codes:
@@ -113,7 +113,7 @@ def _encode_text(register: Register, value: float | str) -> tuple[int, ...]:
 
 
 def _decode_text(register: Register, words: Sequence[int]) -> str:
-    """Up to the first NUL, and without the spaces with which some PLCs fill a text up."""
+    """Return the text up to the first NUL, without the spaces with which some PLCs fill a text up."""
     raw = struct.pack(f">{len(words)}H", *words)
     text = raw.split(b"\0", 1)[0].rstrip(b" ").decode("latin-1")
     if not text.isascii() or not (text.isprintable() or not text):

@@ -26,7 +26,7 @@ plc.add_command(check_can)
 def run(config: Path | None) -> None:
     """Serve the line's PLC until Ctrl-C: registers, handshake, and the reject gate where CAN is enabled.
 
-    The station may come and go meanwhile: while it does not answer, the PLC reads so and its triggers are refused.
+    The station may start and stop meanwhile: while it does not answer, the PLC reads that and its triggers are refused.
     """
     configure_logging("plc")
     asyncio.run(serve(load_configuration(config)))

@@ -1,4 +1,4 @@
-"""The result block as a client sees it."""
+"""Result block for a client."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,15 +38,15 @@ class InspectionResult:
 
     @property
     def passed(self) -> bool:
-        """The fruit may go on: PASS without a flag that says otherwise. A simulated result counts as its outcome."""
+        """True if the fruit may go on: PASS without a flag against it. A simulated result counts as its outcome."""
         return self.outcome == "PASS" and "pass" in self.flags and "late" not in self.flags
 
 
 def result_shown(block: Mapping[str, Any]) -> InspectionResult | None:
-    """The result in one read of status and result block, by register names; None where none is shown, or read torn.
+    """Return the result in one read of status and result block; None if there is none, or the read is torn.
 
     Args:
-        block: decoded values, None where a register says that there is none.
+        block: decoded values by register names, None for a register's own "there is none".
     """
     sequence = block["result_sequence"]
     if "result_valid" not in BY_NAME["status"].names(block["status"]):

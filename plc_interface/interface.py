@@ -1,4 +1,4 @@
-"""The handshake joined to its registers, its journal, the station and the line's outputs."""
+"""PLC interface: the handshake joined to its registers, its journal, the station and the line's outputs."""
 
 import asyncio
 import ipaddress
@@ -32,19 +32,19 @@ log = logging.getLogger(__name__)
 
 
 class Interface:
-    """Feeds events to the handshake and carries out what it asks. Belongs to one event loop; nothing in it waits."""
+    """Feeds events to the handshake and carries out its actions. Belongs to one event loop; nothing in it waits."""
 
     def __init__(
         self, settings: HandshakeSettings, endpoint: str, image: RegisterImage, journal: JournalFile, output: LineOutput
     ) -> None:
-        """Continue with what the journal holds.
+        """Continue from the journal.
 
         Args:
             settings: time-outs and deadlines.
             endpoint: where the station answers.
-            image: what the PLC reads.
-            journal: what the run before kept.
-            output: given every outcome.
+            image: the registers.
+            journal: of the run before.
+            output: receives every outcome.
         """
         self._settings, self._image, self._journal, self._output = settings, image, journal, output
         self._loop = asyncio.get_running_loop()
@@ -60,27 +60,27 @@ class Interface:
         self._show()
 
     def start(self, statistics: Statistics) -> None:
-        """Begin to ask the station.
+        """Start the requests to the station.
 
         Args:
-            statistics: the server's counts.
+            statistics: the server's counters.
         """
         self._statistics = statistics
         self._wake_when_due()
         self._station.start()
 
     async def stop(self) -> None:
-        """End every question and timer. Idempotent."""
+        """End every request and timer. Idempotent."""
         if self._timer is not None:
             self._timer.cancel()
         await self._station.stop()
 
     def leave(self) -> None:
-        """Tell the PLC that the station is offline: nothing is begun any more."""
+        """Report to the PLC that the station is offline; nothing is started any more."""
         self.feed(ev.Leaving(now()))
 
     def on_write(self, _writer: Peer, values: Mapping[str, int | float | str]) -> None:
-        """The writer wrote these fields; the answer stands in the registers before its request is answered."""
+        """Handle a write; the answer is in the registers before the request is answered."""
         known: dict[str, Any] = {name: value for name, value in values.items() if name != "write_key"}
         if "control" in known:
             known["control"] = _CONTROL.names(known["control"])
@@ -91,7 +91,7 @@ class Interface:
         self.feed(ev.PlcWrote(now(), inputs, frozenset(known)))
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:
-        """The right to write changed hands."""
+        """Handle a change of the right to write."""
         self._writer = peer
         if peer is None or change is WriterChange.TAKEN_OVER:
             self.feed(ev.WriterWent(now()))
@@ -100,7 +100,7 @@ class Interface:
         self._image.commit({"writer_ipv4": _ipv4(peer)})
 
     def feed(self, event: ev.Event) -> None:
-        """One step: journal first, then the registers in one slice, then everything else."""
+        """Run one step: journal first, then the registers in one slice, then everything else."""
         epoch = self._state.journal.epoch
         self._state, actions = step(self._state, event, self._settings)
         if self._state.journal.epoch != epoch:
@@ -164,7 +164,7 @@ class Interface:
 
 
 def _ipv4(peer: Peer | None) -> int:
-    """As the register writer_ipv4 has it; 0 for none and for IPv6."""
+    """Return the address as the register writer_ipv4 has it; 0 for none and for IPv6."""
     if peer is None:
         return 0
     address = ipaddress.ip_address(peer.address)

@@ -1,4 +1,4 @@
-"""The handshake's journal on the disk."""
+"""Journal file of the handshake."""
 
 import contextlib
 import fcntl
@@ -16,10 +16,10 @@ log = logging.getLogger(__name__)
 
 
 class JournalFile:
-    """One file that is replaced as a whole, and a lock that keeps a second interface away from it."""
+    """One file that is replaced as a whole, and a lock that excludes a second interface."""
 
     def __init__(self, folder: Path) -> None:
-        """Make the folder and take the lock.
+        """Create the folder and take the lock.
 
         Args:
             folder: of this file alone.
@@ -31,7 +31,7 @@ class JournalFile:
         self._path = folder / "journal.json"
         self._new = folder / "journal.new"
         self.trouble = ""
-        """Why the last write failed; empty where it did not."""
+        """Error of the last write; empty for none."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / "lock").open("w")
@@ -49,7 +49,7 @@ class JournalFile:
             ) from error
 
     def read(self) -> Journal:
-        """What was written last; an empty journal where there is none, or none that can be read."""
+        """Return the last journal; an empty one if there is none, or none that can be read."""
         try:
             return Journal.model_validate_json(self._path.read_bytes())
         except FileNotFoundError:
@@ -63,10 +63,10 @@ class JournalFile:
                 type(error).__name__,
                 aside,
             )
-            return Journal(boots=int(time.time()) % 2**16)  # another number than before, whatever that was
+            return Journal(boots=int(time.time()) % 2**16)  # a number other than the last one
 
     def write(self, journal: Journal, *, durable: bool) -> None:
-        """Replace the file. A failure is logged and kept in `trouble`: the line goes on.
+        """Replace the file. A failure is logged and stored in `trouble`: the line goes on.
 
         Args:
             journal: the new content.
@@ -91,5 +91,5 @@ class JournalFile:
             self.trouble = ""
 
     def close(self) -> None:
-        """Give the lock back. Idempotent."""
+        """Release the lock. Idempotent."""
         self._lock.close()

@@ -1,20 +1,20 @@
-"""Make this process answer in time while others keep the cores busy."""
+"""Real-time priority: answers in time while other processes occupy the cores."""
 
 import gc
 import logging
 import os
 
 REAL_TIME_PRIORITY = 1
-"""The lowest one: above every ordinary process, below everything else that asked for real time."""
+"""The lowest one: above every ordinary process, below every other real-time process."""
 
 log = logging.getLogger(__name__)
 
 
 def favour_latency() -> bool:
-    """Call once all is set up: take its objects out of the garbage collector's rounds, and ask for real-time priority.
+    """Freeze the garbage collector's objects and request real-time priority. Call once all is set up.
 
-    Needs CAP_SYS_NICE (systemd: `CPUSchedulingPolicy=rr`, or `AmbientCapabilities=CAP_SYS_NICE`); without it a log
-    line says so and the process goes on as it is. Processes that it starts do not inherit the priority, and Linux
+    Needs CAP_SYS_NICE (systemd: `CPUSchedulingPolicy=rr`, or `AmbientCapabilities=CAP_SYS_NICE`); without it a log line
+    reports that and the process goes on as it is. Processes that it starts do not inherit the priority, and Linux
     leaves 5 % of each second to the others (`sched_rt_runtime_us`).
 
     Returns:

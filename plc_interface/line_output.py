@@ -1,4 +1,4 @@
-"""What becomes of an outcome beside the registers: nothing, or a shot of the reject gate."""
+"""Line outputs: the action on an outcome beside the registers, which is none or the reject gate."""
 
 import asyncio
 import logging
@@ -27,10 +27,10 @@ log = logging.getLogger(__name__)
 
 
 class LineOutput(Protocol):
-    """Where the interface hands outcomes on. Nothing here may wait or raise."""
+    """Interface of the outputs for outcomes. Nothing here may wait or raise."""
 
     async def start(self) -> None:
-        """Begin to reach the outputs."""
+        """Start the outputs."""
         ...
 
     async def stop(self) -> None:
@@ -38,84 +38,76 @@ class LineOutput(Protocol):
         ...
 
     def publish(self, outcome: Outcome) -> None:
-        """Act on an outcome. The same one may come again after a restart."""
+        """Act on an outcome. The same one may be published again after a restart."""
         ...
 
     def renew_health(self, lease_s: float) -> None:
-        """The station is healthy for so many seconds more."""
+        """Declare the station healthy for so many seconds more."""
         ...
 
     def acknowledge_faults(self) -> None:
-        """Forget the faults whose cause is gone."""
+        """Clear the faults whose cause is gone."""
         ...
 
     def encoder_count(self) -> int | None:
-        """The line's encoder now; None where the PLC's is to be used."""
+        """Return the line's encoder count; None if the PLC's is to be used."""
         ...
 
     @property
     def ready(self) -> bool:
-        """Whether a fruit can be diverted; where not, none is begun."""
+        """True if a fruit can be diverted; else no inspection is started."""
         ...
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """One sentence each."""
+        """Return one sentence for each fault."""
         ...
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """For the station's metrics, by names that the register map does not have."""
+        """Return counters for the station's metrics, by names that the register map does not have."""
         ...
 
 
 class NoOutput:
-    """The line's PLC diverts."""
+    """No output: the line's PLC diverts."""
 
     ready = True
     faults: tuple[str, ...] = ()
     counters: Mapping[str, int] = {}
 
     async def start(self) -> None:
-        """Nothing to reach."""
+        """Do nothing."""
 
     async def stop(self) -> None:
-        """Nothing to let go."""
+        """Do nothing."""
 
     def publish(self, outcome: Outcome) -> None:
-        """The PLC reads it.
-
-        Args:
-            outcome: unused.
-        """
+        """Do nothing: the PLC reads the outcome."""
 
     def renew_health(self, lease_s: float) -> None:
-        """Nobody waits for it.
-
-        Args:
-            lease_s: unused.
-        """
+        """Do nothing."""
 
     def acknowledge_faults(self) -> None:
-        """There are none."""
+        """Do nothing."""
 
     def encoder_count(self) -> int | None:
-        """The PLC has its own."""
+        """Return None: the PLC has its own encoder."""
         return None
 
 
 class RejectGate:
-    """Everything that is not PASS is shot into the rejects' lane, at the count at which it reaches the gate.
+    """Reject gate: diverts everything that is not PASS, at the count at which it reaches the gate.
 
-    A shot is ordered again whenever the gate, the bus or this process was lost, as long as its count lies ahead: the
-    gate takes an order that it has for the same one, and fires none that is past.
+    An order is repeated after a loss of the gate, the bus or this process, as long as its count is ahead: the gate
+    takes a repeated order for the same one, and does not actuate at a count that is past.
     """
 
     def __init__(self, settings: CanSettings, folder: Path) -> None:
-        """Take over the shots that the run before still had to fire.
+        """Restore the pending rejects of the run before.
 
         Args:
-            settings: the bus, and the way from the nest to the gate.
+            settings: the bus, and the distance from the nest to the gate.
             folder: of the journal.
         """
         self._io, self._distance = LineIo(settings), settings.distance_counts
@@ -126,20 +118,20 @@ class RejectGate:
         self.acknowledge_faults = self._io.acknowledge_faults
 
     async def start(self) -> None:
-        """Begin to bring the bus up, and order what is still to be fired."""
+        """Start bringing up the bus, and order the pending rejects."""
         await self._io.start()
         for sequence, at_count in self._due.items():
             self._order(sequence, at_count)
 
     async def stop(self) -> None:
-        """Stop the heartbeat: the gate puts out its safe output. What is not fired is ordered by the next run."""
+        """Stop the heartbeat: the gate sets its safe output. The next run orders the pending rejects."""
         for shot in self._shots:
             shot.cancel()
         await asyncio.gather(*self._shots, return_exceptions=True)
         await self._io.stop()
 
     def publish(self, outcome: Outcome) -> None:
-        """Order a shot for what is not PASS.
+        """Order a reject actuation for what is not PASS.
 
         Args:
             outcome: with the encoder's count at its trigger.
@@ -185,30 +177,30 @@ class RejectGate:
 
     @property
     def ready(self) -> bool:
-        """Whether what is not PASS would be diverted."""
+        """True if what is not PASS would be diverted."""
         return self._io.ready
 
     def encoder_count(self) -> int | None:
-        """The count that the encoder on the bus said last."""
+        """Return the last count of the encoder on the bus."""
         count = self._io.encoder_count()
         return None if count is None else count.value
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Of the bus, its nodes and recent shots, each named as CAN's."""
+        """Return faults of the bus, its nodes and recent actuations, each prefixed with CAN."""
         return tuple(f"CAN: {fault}" for fault in self._io.faults)
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Of the bus."""
+        """Return the bus's counters."""
         return {f"can_{name}": count for name, count in self._io.counters.items()}
 
 
 def make_output(settings: CanSettings, folder: Path) -> LineOutput:
-    """The outputs that the settings name.
+    """Make the outputs that the settings name.
 
     Args:
         settings: of the line's CAN.
-        folder: the journal's, where shots are kept.
+        folder: the journal's, which holds the pending rejects.
     """
     return RejectGate(settings, folder) if settings.enabled else NoOutput()

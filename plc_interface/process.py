@@ -1,4 +1,4 @@
-"""The PLC interface as a process: registers served, handshake held, station asked, until told to end."""
+"""PLC interface process: serves registers, runs the handshake, until SIGINT or SIGTERM."""
 
 import asyncio
 import logging
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 async def serve(configuration: Configuration) -> None:
-    """Serve until SIGINT or SIGTERM; then say offline, close the connections and return.
+    """Serve until SIGINT or SIGTERM; then report offline, close the connections and return.
 
     Args:
         configuration: the site's.

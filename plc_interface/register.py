@@ -1,4 +1,4 @@
-"""What a register of the map is."""
+"""Register definition: access, kind, flags, codes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 
 class Access(StrEnum):
-    """Who may write."""
+    """Writers of a register."""
 
     READ_ONLY = "read only"
     READ_WRITE = "read and write"
 
 
 class Kind(StrEnum):
-    """How a value lies in its registers."""
+    """Data type of a value in its registers."""
 
     U16 = "u16"
     I16 = "i16"
@@ -84,39 +84,39 @@ class Register:
 
     @property
     def words(self) -> int:
-        """How many registers the value takes."""
+        """Number of registers of the value."""
         return self.text_words if self.kind is Kind.TEXT else WORDS[self.kind]
 
     @property
     def end(self) -> int:
-        """The address behind its last register."""
+        """The first address after the register."""
         return self.address + self.words
 
     @property
     def mask(self) -> int:
-        """All its flags that have a meaning."""
+        """All flags with a meaning."""
         return sum(1 << bit.number for bit in self.bits)
 
     def bit(self, name: str) -> int:
-        """The mask of one flag; KeyError where the register has none of that name."""
+        """Return the mask of one flag; KeyError for an unknown name."""
         for bit in self.bits:
             if bit.name == name:
                 return 1 << bit.number
         raise KeyError(name)
 
     def flags(self, names: Iterable[str]) -> int:
-        """The value in which exactly these flags are set; KeyError for a name that it has not."""
+        """Return the value in which exactly these flags are set; KeyError for an unknown name."""
         value = 0
         for name in names:
             value |= self.bit(name)
         return value
 
     def names(self, value: int) -> frozenset[str]:
-        """The flags that are set in a value; those without a meaning are left out."""
+        """Return the flags that are set in a value; those without a meaning are left out."""
         return frozenset(bit.name for bit in self.bits if value >> bit.number & 1)
 
     def code(self, name: str) -> int:
-        """The value that an enumeration's name stands for; KeyError where it has none."""
+        """Return the value of an enumeration's name; KeyError for an unknown name."""
         for value, code in self.codes.items():
             if code.name == name:
                 return value

@@ -1,4 +1,4 @@
-"""The flags and codes of the register map."""
+"""Flags and codes of the register map."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Registers by name over Modbus TCP: the lower half of the client."""
+"""Register access by name over Modbus TCP: the lower half of the client."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ class RegisterLink:
         order: WordOrder = WordOrder.HIGH_FIRST,
         timeout_s: float = 1.0,
     ) -> None:
-        """Nothing is sent yet.
+        """Prepare a connection; nothing is sent yet.
 
         Args:
             host: name or address of the interface.
@@ -60,7 +60,7 @@ class RegisterLink:
         """Connect, and check the reference values.
 
         Raises:
-            UnreachableError: nobody answers there.
+            UnreachableError: there is no answer.
             ReferencesError: see `check_references`.
         """
         if not await self._client.connect():
@@ -73,12 +73,12 @@ class RegisterLink:
             raise
 
     async def close(self) -> None:
-        """Close the connection. Idempotent; the station disarms where this client was the writer."""
+        """Close the connection. Idempotent; the station disarms if this client was the writer."""
         self._client.close()
         await asyncio.sleep(0)
 
     async def read(self, name: str) -> Any:
-        """One register's value; None where it says that there is none.
+        """Return one register's value; None for the register's own "there is none".
 
         Args:
             name: of the register map; KeyError for another.
@@ -88,7 +88,7 @@ class RegisterLink:
         return self._value(register, words)
 
     async def read_groups(self, first: str, last: str | None = None) -> dict[str, Any]:
-        """The values of one group, or of neighbouring groups, from one read.
+        """Return the values of one group, or of neighbouring groups, from one read.
 
         Args:
             first: the group's name.
@@ -103,7 +103,7 @@ class RegisterLink:
         }
 
     async def write(self, values: Mapping[str, float | str]) -> None:
-        """Write registers that follow each other in one request, others in one request each run.
+        """Write neighbouring registers in one request each.
 
         Args:
             values: by register name.
@@ -129,8 +129,8 @@ class RegisterLink:
         """Compare the reference registers and the map's version and checksum.
 
         Raises:
-            ReferencesError: says which it is: another word order, swapped bytes, an address that is off by one,
-                another version of the map.
+            ReferencesError: names the cause: another word order, swapped bytes, an address that is off by one, another
+                version of the map.
         """
         group = GROUP_BY_NAME["identity"]
         count = BY_NAME["reference_u64"].end - group.address
@@ -156,7 +156,7 @@ class RegisterLink:
             )
 
     def _difference(self, words: Sequence[int]) -> str:
-        """What is wrong with the references in the identity block's words; empty where nothing is."""
+        """Describe the error of the references in the identity block's words; empty for none."""
         for order in (self._order, *(other for other in WordOrder if other is not self._order)):
             if _references_match(words, order):
                 if order is self._order:

@@ -27,9 +27,9 @@ from plc_interface.register_bits import (
 from station.channel.line import CommandName
 
 MAP_VERSION = 1
-"""Raised with every change that an integrator has to follow; `map_checksum` tells any change.
+"""Raised with every change that an integrator has to follow; `map_checksum` changes with any change.
 
-A map that only grows keeps its version: no register moves, the new ones lie behind those of their block, and a program
+A map that only grows has the same version: no register moves, the new ones follow those of their block, and a program
 that neither reads nor writes them works as before. Where the result block grows, another copy of the sequence ends it,
 so that a torn read of the new registers is found as well.
 """
@@ -175,7 +175,7 @@ REFERENCES: dict[str, int | float | str] = {
     "reference_text": "ABCD",
     "reference_u64": 0x0123456789ABCDEF,
 }
-"""What the reference registers hold."""
+"""Contents of the reference registers."""
 
 
 class Group(NamedTuple):
@@ -192,7 +192,7 @@ class Group(NamedTuple):
 
     @property
     def words(self) -> int:
-        """How many registers it has."""
+        """Number of its registers."""
         return self.registers[-1].end - self.address
 
 
@@ -210,12 +210,12 @@ BY_NAME = {register.name: register for register in REGISTERS}
 
 
 def bit_address(register: Register, number: int) -> int:
-    """Coil or discrete input of a flag: the register's address times 16 + the bit's number."""
+    """Return the coil or discrete input of a flag: the register's address times 16 + the bit's number."""
     return register.address * 16 + number
 
 
 def canonical_table() -> str:
-    """The map as JSON without white space or wording: what a change that matters to a client changes."""
+    """Return the map as JSON without white space or descriptions: it changes only if clients are affected."""
     rows = [
         {
             "name": register.name,
@@ -235,5 +235,5 @@ def canonical_table() -> str:
 
 
 def map_checksum() -> int:
-    """CRC-32 (as in zlib) of the canonical table, the value of the register `map_checksum`."""
+    """Return the CRC-32 (as in zlib) of the canonical table, the value of the register `map_checksum`."""
     return zlib.crc32(canonical_table().encode())

@@ -1,4 +1,4 @@
-"""The registers in a person's words, for the station's pages."""
+"""Formatted register values, for the station's pages."""
 
 from collections.abc import Callable
 
@@ -10,10 +10,10 @@ Value = int | float | str | None
 
 
 def registers_told(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
-    """Every register of the map with what it holds, in the order of the addresses.
+    """Return every register of the map with its formatted value, in the order of the addresses.
 
     Args:
-        value: gives a register's value by its name; None where there is none.
+        value: returns a register's value by its name; None if there is none.
     """
     return tuple(
         RegisterTold(

@@ -1,4 +1,4 @@
-"""The shots that are still to be fired, on the disk: fruit between the nest and the gate outlives the interface."""
+"""Pending rejects on the disk: they survive a restart of the interface."""
 
 import json
 import logging
@@ -11,10 +11,10 @@ _RANGE = 2**32
 
 
 class ShotFile:
-    """One file, replaced as a whole. It belongs to whoever holds the journal's lock."""
+    """One file, replaced as a whole. It belongs to the holder of the journal's lock."""
 
     def __init__(self, folder: Path) -> None:
-        """Nothing is read or written yet.
+        """Prepare the file; nothing is read or written yet.
 
         Args:
             folder: the journal's.
@@ -22,7 +22,7 @@ class ShotFile:
         self._path, self._new = folder / "shots.json", folder / "shots.new"
 
     def read(self) -> dict[int, int]:
-        """The counts at which flaps are to open, by sequence; none where the file is absent or damaged."""
+        """Return the counts at which flaps are to open, by sequence; none if the file is absent or damaged."""
         try:
             shots = {int(sequence): int(count) for sequence, count in json.loads(self._path.read_bytes()).items()}
         except FileNotFoundError:
@@ -40,7 +40,7 @@ class ShotFile:
         """Replace the file. A failure is logged: the line goes on.
 
         Args:
-            shots: as `read` gives them.
+            shots: as `read` returns them.
         """
         try:
             self._new.write_text(json.dumps(shots))

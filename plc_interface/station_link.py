@@ -1,4 +1,4 @@
-"""The questions of the handshake, asked of the station over the channel."""
+"""The handshake's requests to the station over the channel."""
 
 import asyncio
 import logging
@@ -35,23 +35,23 @@ log = logging.getLogger(__name__)
 
 
 def now() -> ev.Moment:
-    """The time on both clocks."""
+    """Return the time on both clocks."""
     return ev.Moment(time.monotonic(), time.time_ns() // 1_000_000)
 
 
 class StationLink:
-    """Carries out what the handshake asks of the station, and beats. Belongs to one event loop."""
+    """Carries out the handshake's requests, and sends beats. Belongs to one event loop."""
 
     def __init__(
         self, endpoint: str, settings: HandshakeSettings, feed: Callable[[ev.Event], None], line: Callable[[], Line]
     ) -> None:
-        """Nothing is asked before `start`.
+        """Prepare the link; nothing is sent before `start`.
 
         Args:
-            endpoint: where the station answers.
+            endpoint: the station's.
             settings: periods and deadlines.
-            feed: given every answer.
-            line: what the station is told with each beat.
+            feed: receives every answer as an event.
+            line: sent to the station with each beat.
         """
         self._settings, self._feed, self._line = settings, feed, line
         self._client = ChannelClient(endpoint, "the station")
@@ -63,11 +63,11 @@ class StationLink:
         self._said = ""
 
     def start(self) -> None:
-        """Begin to beat."""
+        """Start the beats."""
         self._spawn(self._beat(), "beats")
 
     async def stop(self) -> None:
-        """End every question."""
+        """End every request."""
         tasks = tuple(self._tasks)
         for task in tasks:
             task.cancel()
@@ -75,7 +75,7 @@ class StationLink:
         await self._client.close()
 
     def carry_out(self, action: do.Action) -> None:
-        """Ask; the answer comes as an event. Actions that are not for the station are passed over."""
+        """Send a request; its answer arrives as an event. Actions that are not for the station are ignored."""
         match action:
             case do.AskBegin():
                 self._spawn(self._begin(action), f"begin {action.trigger_id}")
@@ -173,7 +173,7 @@ class StationLink:
             self._feed(ev.CommandAnswered(now(), action.number, done.done, done.why))
 
     async def _note(self) -> None:
-        """Tell what there is to tell, one after the other: an acknowledgement never overtakes what it is about."""
+        """Send notes one after the other: an acknowledgement never overtakes its outcome."""
         while self._notes:
             action = self._notes[0]
             told = isinstance(action, do.TellPublished)
@@ -183,7 +183,7 @@ class StationLink:
             except RefusedError as error:
                 log.warning("the station did not take a note: %s", error)
             except ChannelError as error:
-                self._notes.clear()  # all that still stands is told again once the station answers
+                self._notes.clear()  # resynchronisation publishes final outcomes again
                 self._feed(ev.RequestFailed(now(), str(error)))
                 return
             else:

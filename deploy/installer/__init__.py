@@ -1,1 +1,1 @@
-"""The installer: standard library only, as it runs before there is anything else."""
+"""Installer: standard library only, because it runs before any package is installed."""

@@ -20,7 +20,7 @@ from installer.words import Failed, Refused, say
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Do what the arguments ask: exit code 0 when done, 2 when refused, 1 when it failed."""
+    """Run the command: exit code 0 when done, 2 when refused, 1 when it failed."""
     chosen = _parser().parse_args(arguments)
     os.umask(0o022)  # the station's user has to read what root makes
     layout = Layout(chosen.root.resolve())
@@ -107,7 +107,7 @@ def _roll_back(chosen: argparse.Namespace, layout: Layout, services: Services) -
 
 @contextlib.contextmanager
 def _alone(layout: Layout) -> Iterator[None]:
-    """Keep a second installer out; where nothing is installed yet, there is nothing to be at odds about."""
+    """Exclude a second installer; before the first installation there is nothing to protect."""
     if not installed(layout):
         yield
         return

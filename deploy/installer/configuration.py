@@ -1,4 +1,4 @@
-"""The site's configuration under another release."""
+"""Migration of the site's configuration to another release."""
 
 import shutil
 import tempfile
@@ -10,17 +10,17 @@ from installer.words import Failed, Refused, say
 
 
 def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
-    """See on a copy whether the configuration would be good.
+    """Check on a copy whether the configuration is valid in a release.
 
     Args:
-        layout: whose.
-        release: the one to come.
+        layout: the installation.
+        release: the next one.
 
     Returns:
-        What would have to be changed in the file.
+        The necessary changes of the file.
 
     Raises:
-        Refused: it would not be; with all that is wrong with it.
+        Refused: it is invalid; with all problems.
     """
     program = release / "venv" / "bin" / "station"
     with tempfile.TemporaryDirectory(prefix="station-config-") as folder:
@@ -37,12 +37,7 @@ def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
 
 
 def migrate(layout: Layout, release: Path) -> None:
-    """Bring the configuration into the words of a release. Doing so again changes nothing.
-
-    Args:
-        layout: whose.
-        release: the one to come.
-    """
+    """Migrate the configuration to a release. Idempotent."""
     program = release / "venv" / "bin" / "station"
     for line in run(program, "config", "migrate", "--write", layout.configuration).splitlines():
         say(line)

@@ -1,4 +1,4 @@
-"""Copies of all that a site cannot make again: records, state and configuration."""
+"""Backup of everything that a site cannot recreate: records, state and configuration."""
 
 import contextlib
 import itertools
@@ -19,18 +19,18 @@ _DATABASE = Path("records.sqlite3")
 
 
 def make_copy(layout: Layout, release: Path, kind: str) -> Path:
-    """Copy records, state and configuration into a new folder, while the station runs or not.
+    """Back up records, state and configuration into a new folder; the station may run meanwhile.
 
     Args:
-        layout: of what.
-        release: whose program copies the records.
+        layout: the installation.
+        release: its program backs up the records.
         kind: the first part of the folder's name.
 
     Returns:
         The folder. It has this name only when it is complete.
 
     Raises:
-        Failed: the records could not be copied, as for want of space.
+        Failed: the records could not be copied, for example because the disk is full.
     """
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
@@ -50,12 +50,12 @@ def make_copy(layout: Layout, release: Path, kind: str) -> Path:
 
 
 def thin_out(layout: Layout, kind: str, keep: int) -> None:
-    """Remove all copies of a kind but the newest.
+    """Remove all backups of a kind but the newest.
 
     Args:
-        layout: of what.
+        layout: the installation.
         kind: as for `make_copy`.
-        keep: how many stay.
+        keep: number of remaining ones.
     """
     found = sorted(path for path in layout.backups.glob(f"{kind}*") if path.is_dir())
     for path in found[: max(0, len(found) - keep)]:
@@ -64,10 +64,10 @@ def thin_out(layout: Layout, kind: str, keep: int) -> None:
 
 
 def form(folder: Path) -> str:
-    """The form of a records' database, as its migrations name it; empty where there is none.
+    """Return the schema version of a records' database, as its migrations name it; empty for none.
 
     Args:
-        folder: of the records, or of their copy.
+        folder: of the records, or of their backup.
     """
     if not (folder / _DATABASE).exists():
         return ""
@@ -85,7 +85,7 @@ def _copied(path: Path, to: Path) -> None:
 
 
 def _copied_file(path: Path | str, to: Path | str) -> None:
-    """Copy a file, unless it has gone meanwhile: what the station is about to put in place has a passing name."""
+    """Copy a file, unless it has been removed meanwhile: the station writes files under temporary names."""
     with contextlib.suppress(FileNotFoundError):
         shutil.copy2(path, to)
 

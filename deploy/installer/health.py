@@ -1,4 +1,4 @@
-"""Whether a station that was started is well."""
+"""Health check of a station after its start."""
 
 import http.client
 import json
@@ -15,12 +15,7 @@ _ASK_S = 3.0
 
 
 def ready(layout: Layout, release: Path) -> bool:
-    """Whether it would accept a trigger now; also False where it cannot be asked.
-
-    Args:
-        layout: whose configuration says where it answers.
-        release: the one in use.
-    """
+    """Return whether it would accept a trigger now; also False if it does not answer."""
     try:
         return _asked(*_address(layout, release), "/readyz")[0] == http.HTTPStatus.OK
     except (Failed, OSError, http.client.HTTPException):
@@ -28,19 +23,19 @@ def ready(layout: Layout, release: Path) -> bool:
 
 
 def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: bool, limit_s: float = LIMIT_S) -> None:
-    """Wait until the station is alive, is of this version, and is ready again if it was before.
+    """Wait until the station is alive, has this version, and is ready again if it was before.
 
     A station without devices is alive and not ready: on a first start nothing else is to be expected.
 
     Args:
-        layout: whose configuration says where it answers.
-        release: the one that was started.
-        version: which version has to answer.
+        layout: its configuration has the station's address.
+        release: the started one.
+        version: the expected one.
         was_ready: whether the one before it would have accepted a trigger.
-        limit_s: how long to wait.
+        limit_s: maximum wait.
 
     Raises:
-        Failed: it is not, by then; with what it says.
+        Failed: it is not healthy by then; with its report.
     """
     address, deadline_s, said = _address(layout, release), time.monotonic() + limit_s, "it does not answer"
     while time.monotonic() < deadline_s:
@@ -70,7 +65,7 @@ def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
 def _address(layout: Layout, release: Path) -> tuple[str, int]:
     metrics = json.loads(station(layout, release, "config", "show"))["metrics"]
     host = str(metrics["host"])
-    asked = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 (asked, not listened on)
+    asked = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 (a client, no listener)
     return asked, metrics["port"]
 
 

@@ -1,4 +1,4 @@
-"""Install, or upgrade: all is made and checked beside what runs, then switched, and switched back if it is not well."""
+"""Installation and upgrade: prepared and checked beside the running release, then switched, or rolled back."""
 
 import shutil
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _COPIES_KEPT = 3
 
 
 class Step(NamedTuple):
-    """One thing to do, told before it is done."""
+    """One step, announced before it is done."""
 
     sentence: str
     do: Callable[[], object]
@@ -27,11 +27,11 @@ class Installation:
     """One run of the installer.
 
     Args:
-        layout: where.
-        services: of the system there.
-        source: what is installed.
-        packages: from where the packages come.
-        limit_s: how long the station may take to be well.
+        layout: the place.
+        services: of the same system.
+        source: the release's source.
+        packages: source of the packages.
+        limit_s: time for the station to become healthy.
     """
 
     def __init__(
@@ -46,17 +46,17 @@ class Installation:
 
     @property
     def is_upgrade(self) -> bool:
-        """Whether another release is in use."""
+        """True if another release is in use."""
         return self._old is not None and self._old != self.release and complete(self._old)
 
     def check(self, *, during_lot: bool) -> None:
-        """See that it can be done.
+        """Check that it can be done.
 
         Args:
-            during_lot: whether it may be done while a lot is under way.
+            during_lot: whether it may be done during a lot.
 
         Raises:
-            Refused: it cannot.
+            Refused: it cannot be done.
         """
         precautions.check_machine(self._layout)
         self._source.check()
@@ -66,7 +66,7 @@ class Installation:
             precautions.check_quiet(self._layout, self._old)
 
     def steps(self) -> list[Step]:
-        """What is to be done, in order. Each may be done again; together they lead there from any state between."""
+        """Return the steps in order. Each may be repeated; together they lead to the goal from any state between."""
         layout, name = self._layout, self.release.name
         upgrading = [
             Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),
@@ -85,11 +85,11 @@ class Installation:
         ]
 
     def run(self) -> None:
-        """Do it.
+        """Carry out the steps.
 
         Raises:
-            Refused: the configuration is not good for the new release; the old one runs on.
-            Failed: a step did not come to its end. Of an upgrade, the old release is in use again.
+            Refused: the configuration is not valid in the new release; the old one runs on.
+            Failed: a step failed. After a failed upgrade, the old release is in use again.
         """
         under_way = False
         for step in self.steps():

@@ -1,4 +1,4 @@
-"""Where everything lies, below `/` or below a scratch root."""
+"""Layout of an installation, below `/` or below a scratch root."""
 
 import json
 import os
@@ -13,21 +13,21 @@ TIMER = f"{NAME}-backup.timer"
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The places of one installation.
+    """Paths of one installation.
 
     Args:
-        root: `/`, or a folder that stands for it.
+        root: `/`, or a scratch root.
     """
 
     root: Path
 
     @property
     def is_system(self) -> bool:
-        """Whether this is the running system and no scratch root."""
+        """True for the running system, False for a scratch root."""
         return self.root == Path("/")
 
     def place(self, path: str) -> Path:
-        """A path of the system, below the root.
+        """Return a path of the system, below the root.
 
         Args:
             path: absolute, as the system has it.
@@ -36,7 +36,7 @@ class Layout:
 
     @property
     def program(self) -> Path:
-        """The installed releases, and what is noted of them."""
+        """The installed releases, and the installer's notes of them."""
         return self.place(f"/opt/{NAME}")
 
     @property
@@ -56,12 +56,12 @@ class Layout:
 
     @property
     def manifest(self) -> Path:
-        """What lies outside `program` and is the installer's."""
+        """Note of the files and folders outside `program` that belong to the installer."""
         return self.program / "installed.json"
 
     @property
     def upgrade(self) -> Path:
-        """Where the last upgrade came from, and its backup."""
+        """Note of the release before the last upgrade, and its backup."""
         return self.program / "upgrade.json"
 
     @property
@@ -81,22 +81,22 @@ class Layout:
 
     @property
     def backups(self) -> Path:
-        """Copies of records, state and configuration."""
+        """Backups of records, state and configuration."""
         return self.place(f"/var/backups/{NAME}")
 
     @property
     def cache(self) -> Path:
-        """What may be lost."""
+        """Data that may be lost."""
         return self.place(f"/var/cache/{NAME}")
 
     def environment(self) -> dict[str, str]:
-        """The environment in which the station's commands find this installation, and no other configuration."""
+        """Environment of the station's commands, with this installation and no other configuration."""
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("STATION_", "PYTHON"))}
         return {**kept, "STATION_CONFIG": str(self.configuration), "STATION_HOME": str(self.home)}
 
 
 def target(link: Path) -> Path | None:
-    """The release that a link leads to, or None where it leads nowhere.
+    """Return the release that a link points to, or None.
 
     Args:
         link: `current` or `previous` of a layout.
@@ -105,7 +105,7 @@ def target(link: Path) -> Path | None:
 
 
 def point(link: Path, release: Path) -> None:
-    """Have a link lead to a release, from one moment to the next.
+    """Point a link to a release, atomically.
 
     Args:
         link: as above.
@@ -118,23 +118,14 @@ def point(link: Path, release: Path) -> None:
 
 
 def write_note(file: Path, content: Any) -> None:
-    """Write a note of the installer whole, or not at all.
-
-    Args:
-        file: where.
-        content: what JSON can hold.
-    """
+    """Write a note of the installer atomically."""
     new = file.with_name(f".{file.name}.new")
     new.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     new.replace(file)
 
 
 def read_note(file: Path) -> dict[str, Any]:
-    """A note of the installer; empty where there is none that can be read.
-
-    Args:
-        file: where.
-    """
+    """Read a note of the installer; empty if there is none that can be read."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):

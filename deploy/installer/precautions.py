@@ -1,4 +1,4 @@
-"""What has to be true before anything is changed."""
+"""Preflight checks, before anything is changed."""
 
 import importlib.util
 import os
@@ -17,13 +17,10 @@ _PROGRAMS = {"runuser": "util-linux", "systemctl": "systemd", "systemd-sysusers"
 
 
 def check_machine(layout: Layout) -> None:
-    """See that this user, this Python and these programs can do it.
-
-    Args:
-        layout: what is to be changed.
+    """Check this user, this Python and these programs.
 
     Raises:
-        Refused: they cannot.
+        Refused: one of them is not suitable.
     """
     if layout.is_system and os.geteuid() != 0:
         raise Refused("only root may install below /: sudo deploy/install (or --root DIR for a trial)")
@@ -37,10 +34,7 @@ def check_machine(layout: Layout) -> None:
 
 
 def check_room(layout: Layout) -> None:
-    """See that the disks have room for a release, and for a copy of the records.
-
-    Args:
-        layout: where both go.
+    """Check that the disks have room for a release, and for a backup of the records.
 
     Raises:
         Refused: they do not.
@@ -62,14 +56,14 @@ def check_room(layout: Layout) -> None:
 
 
 def check_quiet(layout: Layout, release: Path) -> None:
-    """See that no lot is under way.
+    """Check that no lot is in progress.
 
     Args:
         layout: with the records.
         release: the one in use, which reads them.
 
     Raises:
-        Refused: a lot has begun and not ended, or a fruit was inspected within the last minutes.
+        Refused: a lot is open, or a fruit was inspected within the last minutes.
     """
     if not (layout.home / "records" / "records.sqlite3").exists():
         return

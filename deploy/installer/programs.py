@@ -1,4 +1,4 @@
-"""Other programs, run for the installer."""
+"""Subprocesses of the installer."""
 
 import os
 import pwd
@@ -25,18 +25,18 @@ def run(
     Args:
         command: the program and its arguments.
         environment: its environment; the installer's own by default.
-        folder: where it runs.
-        limit_s: after which it is ended.
+        folder: the working folder.
+        limit_s: its time limit.
 
     Returns:
         Its output.
 
     Raises:
-        Failed: it could not be started, did not end in time, or its exit code was not 0; with its last words.
+        Failed: it could not be started, did not end in time, or its exit code was not 0; with its last output.
     """
     words = [str(part) for part in command]
     try:
-        done = subprocess.run(  # noqa: S603 (the installer's own words, never a shell's)
+        done = subprocess.run(  # noqa: S603 (arguments of the installer, without a shell)
             words, env=environment, cwd=folder, capture_output=True, text=True, timeout=limit_s, check=False
         )
     except subprocess.TimeoutExpired as error:
@@ -50,11 +50,11 @@ def run(
 
 
 def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: float = 120.0) -> str:
-    """Run a command of an installed station, as its own user where that is possible.
+    """Run a command of an installed station, as its own user if possible.
 
     Args:
-        layout: whose configuration and state it takes.
-        release: which program.
+        layout: its configuration and state are used.
+        release: its program is used.
         arguments: as after `station`.
         limit_s: as for `run`.
 
@@ -68,7 +68,7 @@ def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: floa
 
 
 def known_user() -> bool:
-    """Whether this system has the station's user."""
+    """Return whether this system has the station's user."""
     try:
         pwd.getpwnam(NAME)
     except KeyError:
@@ -77,13 +77,6 @@ def known_user() -> bool:
 
 
 def own(layout: Layout, path: Path, user: str, group: str) -> None:
-    """Give a path to a user and a group; nothing is done in a scratch root, by another user than root, or without them.
-
-    Args:
-        layout: whose path it is.
-        path: a file or folder.
-        user: a name.
-        group: likewise.
-    """
+    """Change a path's owner; does nothing in a scratch root, as another user than root, or without that user."""
     if layout.is_system and os.geteuid() == 0 and known_user():
         shutil.chown(path, user, group)

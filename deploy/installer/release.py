@@ -1,4 +1,4 @@
-"""A release: the program in a folder of its own, which nothing changes once it is complete."""
+"""A release: the program in a folder of its own, unchanged once it is complete."""
 
 import hashlib
 import shutil
@@ -34,17 +34,17 @@ class Source:
 
     @cached_property
     def version(self) -> str:
-        """As `pyproject.toml` says."""
+        """Version in `pyproject.toml`."""
         return tomllib.loads((self.folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 
     @property
     def name(self) -> str:
-        """The release's: the version, and eight digits of what it is made of."""
+        """The release's name: the version, and eight digits of the fingerprint."""
         return f"{self.version}+{self.fingerprint[:8]}"
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hash over all that is installed from here."""
+        """Hash of all that is installed from here."""
         digest = hashlib.sha256()
         for file in self._files():
             digest.update(f"{file.relative_to(self.folder)}\0".encode())
@@ -52,10 +52,10 @@ class Source:
         return digest.hexdigest()
 
     def check(self) -> None:
-        """See that all is there.
+        """Check that all parts exist.
 
         Raises:
-            Refused: it is not.
+            Refused: one is missing.
         """
         wanted = ("pyproject.toml", "README.md", "LICENSE", *LOCKS, *PACKAGES, *COPIED)
         missing = [name for name in wanted if not (self.folder / name).exists()]
@@ -75,7 +75,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Packages:
-    """Where the packages that the locks list come from; the package index by default."""
+    """Source of the locked packages; the package index by default."""
 
     wheels: Path | None = None
     """A folder of wheels, for a machine without internet; their hashes are checked all the same."""
@@ -84,24 +84,20 @@ class Packages:
 
 
 def complete(release: Path) -> bool:
-    """Whether a release was made to its end.
-
-    Args:
-        release: its folder.
-    """
+    """Return whether a release is complete."""
     return bool(read_note(release / STAMP))
 
 
 def make(layout: Layout, source: Source, packages: Packages) -> Path:
-    """Make the release of a source, unless it is there. One that was not made to its end is made anew.
+    """Build the release of a source, unless it is there. An incomplete one is built again.
 
     Args:
-        layout: where.
-        source: of what.
-        packages: from where the packages come.
+        layout: the place.
+        source: the release's source.
+        packages: source of the packages.
 
     Raises:
-        Failed: pip could not; see its message. What was made so far is no release and does no harm.
+        Failed: pip failed; see its message. The incomplete build is no release and does no harm.
     """
     release = layout.releases / source.name
     if complete(release):
@@ -142,7 +138,7 @@ def _make_environment(venv: Path, source: Path, packages: Packages) -> None:
 
 
 def _open_to_all(release: Path) -> None:
-    """Let the station's user read what root has made, whatever root's umask is."""
+    """Let the station's user read root's files, whatever root's umask is."""
     for path in (release, *release.rglob("*")):
         if not path.is_symlink():
             mode = path.stat().st_mode & 0o7777

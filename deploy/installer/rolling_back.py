@@ -1,4 +1,4 @@
-"""Back to the release before the last upgrade, with what that release can read."""
+"""Rollback to the release before the last upgrade, with data that this release can read."""
 
 import shutil
 
@@ -12,13 +12,10 @@ from installer.words import Refused, say
 
 
 def check(layout: Layout) -> None:
-    """See that there is something to go back to.
-
-    Args:
-        layout: where.
+    """Check that there is a release to roll back to.
 
     Raises:
-        Refused: there is not.
+        Refused: there is none.
     """
     old, note = target(layout.previous), read_note(layout.upgrade)
     if old is None or not complete(old) or not note:
@@ -26,19 +23,14 @@ def check(layout: Layout) -> None:
 
 
 def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> None:
-    """Take the last upgrade back. Ended in between, it is done again by another call.
+    """Roll the last upgrade back. An interrupted rollback is completed by another call.
 
-    The configuration is put back where the upgrade had changed it; the records only where the old release cannot read
-    them, and what was inspected since is then in their folder `aside`.
-
-    Args:
-        layout: where.
-        services: of the system there.
-        limit_s: how long the station may take to be well.
+    The configuration is restored if the upgrade had changed it; the records only if the old release cannot read them,
+    and the inspections since the upgrade are then in their folder `aside`.
 
     Raises:
-        Refused: there is no upgrade to take back.
-        Failed: a step did not come to its end.
+        Refused: there is no upgrade to roll back.
+        Failed: a step failed.
     """
     check(layout)
     old, note = target(layout.previous), read_note(layout.upgrade)

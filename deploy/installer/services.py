@@ -1,6 +1,6 @@
-"""The system's services: systemd, or the files that tell it what to do in a scratch root."""
+"""System services: systemd, or the unit files of a scratch root."""
 
-# ruff: noqa: D102 (the protocol tells what each method does)
+# ruff: noqa: D102 (the protocol documents each method)
 
 import os
 import shutil
@@ -16,38 +16,38 @@ STOP_LIMIT_S = 200.0
 
 
 class Services(Protocol):
-    """What an installation asks of the system."""
+    """Operations on the system."""
 
     def make_user(self) -> None:
-        """Make the station's user, unless there is one."""
+        """Create the station's user. Idempotent."""
         ...
 
     def remove_user(self) -> None:
-        """Remove it, if it is there."""
+        """Remove the station's user. Idempotent."""
         ...
 
     def enable(self) -> None:
-        """Have the station and its backups started at each boot."""
+        """Enable the station and its backups at each boot."""
         ...
 
     def disable(self) -> None:
-        """Take that back; they are stopped already."""
+        """Disable them; they are stopped already."""
         ...
 
     def reload(self) -> None:
-        """Take in units and device rules that were changed."""
+        """Reload changed units and device rules."""
         ...
 
     def running(self) -> bool:
-        """Whether the station runs, or is about to."""
+        """Return whether the station runs, or is about to."""
         ...
 
     def stop(self) -> None:
-        """End the station in order. Idempotent."""
+        """Stop the station in order. Idempotent."""
         ...
 
     def start(self) -> bool:
-        """Start it; returns whether it can be: False in a scratch root.
+        """Start it; returns False in a scratch root, where nothing can be started.
 
         Raises:
             Failed: it did not become ready.
@@ -56,15 +56,11 @@ class Services(Protocol):
 
 
 class Systemd:
-    """The running system's.
-
-    Args:
-        layout: of `/`.
-    """
+    """The running system's services."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        # In a container or a chroot systemd is not there to be asked; its files are still put in place.
+        # In a container or a chroot systemd does not answer; its files are still put in place.
         self._booted = Path("/run/systemd/system").is_dir()
 
     def make_user(self) -> None:
@@ -114,11 +110,7 @@ class Systemd:
 
 
 class ScratchRoot:
-    """A folder that stands for a system which does not run: links and users are made in it, nothing is started.
-
-    Args:
-        layout: of the folder.
-    """
+    """A folder that represents a system which does not run: links and users are made in it, nothing is started."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
@@ -156,7 +148,7 @@ class ScratchRoot:
 
 
 def _remove_user(layout: Layout, *options: str) -> None:
-    """Remove the user and the group of that name; the group goes with the user only where login.defs says so."""
+    """Remove the user and the group of that name; the group goes with the user only if login.defs has it so."""
     for file, program in (("/etc/passwd", "userdel"), ("/etc/group", "groupdel")):
         listed = layout.place(file)
         if listed.exists() and any(line.startswith(f"{NAME}:") for line in listed.read_text("utf-8").splitlines()):

@@ -1,4 +1,4 @@
-"""What lies outside the releases and is the installer's: units, rules, users, folders, the command."""
+"""Installed files outside the releases: units, rules, users, folders, the command."""
 
 import hashlib
 import shutil
@@ -25,11 +25,7 @@ SAVED = ".saved"
 
 
 def wanted(release: Path) -> dict[str, Path]:
-    """The files of a release by the paths that the system knows them under.
-
-    Args:
-        release: its folder.
-    """
+    """Return the files of a release by their installed paths."""
     deploy = release / "deploy"
     found = {
         f"{place}/{file.name}": file
@@ -41,13 +37,9 @@ def wanted(release: Path) -> dict[str, Path]:
 
 
 def put(layout: Layout, release: Path) -> None:
-    """Put a release's files where they belong, and take away those of another release. Doing so again changes nothing.
+    """Install a release's files, and remove those of another release. Idempotent.
 
-    A file that a person has changed since is kept beside, as `NAME.saved`; drop-ins are for that.
-
-    Args:
-        layout: where.
-        release: whose.
+    A file that a person has changed is retained as `NAME.saved`; use drop-ins for changes.
     """
     known = dict(read_note(layout.manifest).get("files", {}))
     files = wanted(release)
@@ -57,7 +49,7 @@ def put(layout: Layout, release: Path) -> None:
         file, content = layout.place(path), source.read_bytes()
         _keep_changed(file, known.get(path), content)
         make_folder(layout, file.parent)
-        # Noted first: what is put and not noted would outlive an undoing.
+        # Noted first: a file that is put and not noted would outlive an uninstall.
         known[path] = hashlib.sha256(content).hexdigest()
         write_note(layout.manifest, {**read_note(layout.manifest), "files": known})
         new = file.with_name(f".{file.name}.new")
@@ -67,11 +59,7 @@ def put(layout: Layout, release: Path) -> None:
 
 
 def make_folders(layout: Layout) -> None:
-    """Make the folders of configuration, state and copies, and the configuration's file where there is none.
-
-    Args:
-        layout: where.
-    """
+    """Create the folders of configuration, state and backups, and a missing configuration file."""
     for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
         make_folder(layout, path)
         path.chmod(0o750)
@@ -84,7 +72,7 @@ def make_folders(layout: Layout) -> None:
 
 
 def make_folder(layout: Layout, folder: Path) -> None:
-    """Make a folder with those around it, and note which were not there.
+    """Create a folder with its parents, and note the new ones.
 
     Args:
         layout: with the note.
@@ -102,22 +90,18 @@ def make_folder(layout: Layout, folder: Path) -> None:
 
 
 def take_away(layout: Layout) -> None:
-    """Take away every file that was put.
-
-    Args:
-        layout: where.
-    """
+    """Remove every installed file."""
     note = read_note(layout.manifest)
     for path, digest in note.get("files", {}).items():
         _take_away(layout, path, digest)
 
 
 def take_away_folders(layout: Layout, folders: list[str]) -> None:
-    """Take away folders that were made and hold nothing.
+    """Remove created folders that are empty.
 
     Args:
         layout: where.
-        folders: as the manifest had them.
+        folders: as in the manifest.
     """
     for path in sorted(set(folders), key=len, reverse=True):
         folder = layout.place(path)
@@ -126,7 +110,7 @@ def take_away_folders(layout: Layout, folders: list[str]) -> None:
 
 
 def _keep_changed(file: Path, digest: str | None, content: bytes) -> None:
-    """Put aside what a person has changed; also what was there before the first installation."""
+    """Rename a file that a person has changed, or that existed before the first installation."""
     if not file.is_file():
         return
     there = file.read_bytes()

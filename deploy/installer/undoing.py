@@ -1,4 +1,4 @@
-"""Take the installation away again."""
+"""Uninstall."""
 
 import shutil
 
@@ -9,21 +9,17 @@ from installer.words import say
 
 
 def installed(layout: Layout) -> bool:
-    """Whether there is anything of an installation.
-
-    Args:
-        layout: where.
-    """
+    """Return whether any part of an installation exists."""
     return layout.program.exists()
 
 
 def undo(layout: Layout, services: Services, *, purge: bool) -> None:
-    """Stop the station and take away all that the installer has put there. Doing so again changes nothing.
+    """Stop the station and remove all that the installer has put there. Idempotent.
 
     Args:
-        layout: where.
-        services: of the system there.
-        purge: take away configuration, records, copies and the user as well; they are kept otherwise.
+        layout: the installation.
+        services: of the same system.
+        purge: also remove configuration, records, backups and the user.
     """
     note = read_note(layout.manifest)
     if installed(layout) and note.get("files"):

@@ -1,4 +1,4 @@
-"""The page Alarms: what stands, what to do about it, who has seen it, what is hidden and what was."""
+"""Alarms page: active and shelved alarms, their procedures, acknowledgement, and the history."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -48,20 +48,20 @@ PARTS = {"alarms.standing": Part("alarms_standing.html.j2", _alarms, _alarms_val
 
 @router.get("/alarms")
 async def alarms(request: Request) -> Response:
-    """What stands and what is shelved."""
+    """Show active and shelved alarms."""
     return show(request, "alarms.html.j2")
 
 
 @router.get("/alarms/history")
 async def history(request: Request, hmi: HmiNow) -> Response:
-    """What alarms did lately."""
+    """Show recent changes of alarms."""
     found = await hmi.gateway.ask(AskAlarmHistory(most=_LAST), AlarmHistory)
     return show(request, "alarms_history.html.j2", changes=found.changes)
 
 
 @router.get("/alarms/{alarm}")
 async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
-    """One alarm: what it is, what it does, what to do."""
+    """Show one alarm: its meaning, its effect, the remedy."""
     found = (
         next((each for each in hmi.gateway.state.alarms if each.alarm == alarm), None) if hmi.gateway.state else None
     )
@@ -80,7 +80,7 @@ async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
 
 @router.post("/alarms/{alarm}/acknowledge")
 async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
-    """A person has seen it."""
+    """Acknowledge an alarm."""
     await _done(hmi.gateway, AcknowledgeAlarm(alarm=alarm, who=caller.name, role=caller.role))
     return go_to("/alarms")
 
@@ -93,7 +93,7 @@ async def shelve(
     for_s: Annotated[int, Form(gt=0, le=SHELVES_S[-1])],
     reason: Annotated[str, Form(max_length=200)],
 ) -> Response:
-    """Hide it for a time, with a reason."""
+    """Shelve an alarm for a time, with a reason."""
     reason = {"being_mended": "it is being mended", "known": "known", "nuisance": "nuisance"}.get(reason, reason)
     request = ShelveAlarm(alarm=alarm, who=caller.name, role=caller.role, reason=reason, for_s=for_s)
     await _done(hmi.gateway, request)
@@ -102,7 +102,7 @@ async def shelve(
 
 @router.post("/alarms/{alarm}/unshelve")
 async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
-    """Show it again."""
+    """Unshelve an alarm."""
     await _done(hmi.gateway, UnshelveAlarm(alarm=alarm, who=caller.name, role=caller.role))
     return go_to("/alarms")
 
@@ -114,11 +114,7 @@ async def _done(gateway: Gateway, request: Message) -> None:
 
 
 def place(alarm: str) -> str:
-    """Where to look, for the drawing of the station: the part of it that an alarm is about.
-
-    Args:
-        alarm: its id.
-    """
+    """Return the part of the station that an alarm is about, for the drawing of the station."""
     places = {
         "arm": ("emergency_stop", "protective_stop", "safety_fault", "arm_link_lost", "arm_not_remote"),
         "gripper": ("fruit_held", "gripper_link_lost", "gripper_fault", "gripper_jam"),

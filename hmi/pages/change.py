@@ -1,4 +1,4 @@
-"""The page Change fruit: choose, see what changes, confirm, and watch it take effect between fruits."""
+"""Change fruit page: select, review the differences, confirm, and follow the change between fruits."""
 
 import json
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ ORDER_DEADLINE_S = 5.0
 
 
 class Change(NamedTuple):
-    """One line of what changes."""
+    """One difference."""
 
     key: str
     """`change.field.KEY` of the catalogue."""
@@ -54,14 +54,14 @@ PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
 
 @router.get("/change")
 async def change(request: Request, hmi: HmiNow) -> Response:
-    """The fruit to choose from."""
+    """Show the fruit to select from."""
     found = await hmi.gateway.ask(AskRecipes(), Recipes)
     return show(request, "change.html.j2", recipes=found.recipes, active=found.active, problems=found.problems)
 
 
 @router.get("/change/progress")
 async def progress(request: Request) -> Response:
-    """How the change goes."""
+    """Show the progress of the change."""
     return show(request, "change_progress.html.j2")
 
 
@@ -69,7 +69,7 @@ async def progress(request: Request) -> Response:
 async def confirm(
     request: Request, hmi: HmiNow, wording: WordingNow, number: Annotated[int, Path(ge=1, le=65_535)]
 ) -> Response:
-    """What will change against now."""
+    """Show the differences from the active recipe."""
     found = await hmi.gateway.ask(AskRecipes(), Recipes)
     chosen = next((each for each in found.recipes if each.number == number), None)
     if chosen is None:
@@ -89,18 +89,18 @@ async def carry_out(
     caller: Annotated[Caller, Depends(orders(Right.CHANGE_FRUIT))],
     number: Annotated[int, Form(ge=1, le=65_535)],
 ) -> Response:
-    """Change the fruit, by the way that the PLC's command takes."""
+    """Change the fruit in the same way as the PLC's command."""
     request = PanelOrder(person=actor_of(caller), order=OrderName.CHOOSE_RECIPE, argument=str(number))
     await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
     return go_to("/change/progress")
 
 
 def changes(now: RecipeShown | None, then: RecipeShown, wording: Wording) -> list[Change]:
-    """What differs for a person at the line; all values, where nothing is active now.
+    """Return the differences that matter at the line; all values if no recipe is active.
 
     Args:
-        now: what is active.
-        then: what is chosen.
+        now: the active recipe.
+        then: the selected recipe.
         wording: for numbers.
     """
     before, after = {} if now is None else _told(now, wording), _told(then, wording)

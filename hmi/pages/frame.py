@@ -1,4 +1,4 @@
-"""What every page has around it: the alarm line, the station's state, the stream of what changes, the language."""
+"""Common layout of all pages: alarm line, station state, live stream, language."""
 
 from collections.abc import AsyncIterator, Mapping
 from typing import Annotated, Any
@@ -48,7 +48,7 @@ PARTS = {
 async def live(
     request: Request, hmi: HmiNow, wording: WordingNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
 ) -> Response:
-    """Server-sent events with a page's parts; see `hmi.live`."""
+    """Send server-sent events with a page's parts; see `hmi.live`."""
     if hmi.live.unknown(part):
         raise Problem(404, "problem.not_found")
     if hmi.live.open >= MOST_STREAMS:
@@ -70,7 +70,7 @@ async def live(
 
 @router.post("/here")
 async def here(request: Request, hmi: HmiNow) -> Response:
-    """A person has touched the page; all that it does is that the idle time begins anew."""
+    """Restart the idle time: a person has touched the page."""
     hmi.sessions.touch(caller_of(request).session)
     return Response(status_code=204)
 
@@ -82,7 +82,7 @@ async def language(
     language: Annotated[str, Form(max_length=8)],
     back: Annotated[str, Form(max_length=200)] = "/",
 ) -> Response:
-    """Choose the language of this browser."""
+    """Set the language of this browser."""
     if language not in hmi.settings.languages:
         raise Problem(400, "problem.bad_form")
     answer = go_to(back if back.startswith("/") and not back.startswith(("//", "/\\")) else "/")

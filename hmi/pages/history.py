@@ -1,4 +1,4 @@
-"""History: inspections found, one opened with every step's images and stages, files of many, the audit trail."""
+"""History page: search, one inspection with all images and stages, exports and reports, the audit trail."""
 
 from collections import OrderedDict
 from datetime import datetime
@@ -42,7 +42,7 @@ DEADLINE_S = 20.0
 PAGE = 20
 _KEPT_STAGES = 3
 _BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
-"""What a number as 4,711 may be written with."""
+"""Separators of a number such as 4,711."""
 _FOR_EVER = {"cache-control": "private, max-age=31536000, immutable"}
 
 Words = Annotated[str, Query(max_length=64)]
@@ -51,17 +51,7 @@ Words = Annotated[str, Query(max_length=64)]
 def search_of(
     lot: str, grower: str, fruit: str, outcome: str, reason: str, begun_from: str, begun_to: str
 ) -> Search | None:
-    """A search as it was typed; None where a value is none.
-
-    Args:
-        lot: its name; empty for all, as with the others.
-        grower: whose.
-        fruit: the recipe's name.
-        outcome: PASS, FAIL or NO_RESULT.
-        reason: as `station.vocabulary.Reason` has it.
-        begun_from: local date and time, as a browser gives it.
-        begun_to: likewise.
-    """
+    """Parse a search form; None if a value is invalid."""
     try:
         return Search(
             lot=lot or None,
@@ -90,7 +80,7 @@ async def search(
     number: Annotated[str, Query(max_length=16)] = "",
     below: Annotated[int | None, Query(ge=1, le=2**32)] = None,
 ) -> Response:
-    """A page of what is found; with a fruit's number, that fruit."""
+    """Show a page of the search's results; for a fruit's number, that fruit."""
     typed = number.translate(_BETWEEN_DIGITS)
     if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
         return go_to(f"/history/{int(typed)}")
@@ -130,7 +120,7 @@ async def export(
     begun_from: Annotated[str, Form(alias="from", max_length=32)] = "",
     begun_to: Annotated[str, Form(alias="to", max_length=32)] = "",
 ) -> Response:
-    """Write what the search finds as a table."""
+    """Export the search's results as a table."""
     wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     if wanted is None:
         raise Problem(400, "problem.bad_form")
@@ -146,7 +136,7 @@ async def report(
     lot: Annotated[str, Form(max_length=32)],
     form: Annotated[Literal["html", "pdf"], Form()],
 ) -> Response:
-    """Write a lot's report."""
+    """Start a lot's report."""
     asked = StartLotReport(lot=lot, form=form, actor=_actor(caller))
     job = await hmi.gateway.ask(asked, JobTold, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
@@ -154,7 +144,7 @@ async def report(
 
 @router.get("/audit")
 async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
-    """The last rows of the trail."""
+    """Show the latest rows of the audit trail."""
     asked = ReadAudit(limit=100, action=action, subject=subject)
     told = await hmi.gateway.ask(asked, AuditRows, deadline_s=DEADLINE_S)
     return show(request, "history_audit.html.j2", rows=told.rows, action=action, subject=subject)
@@ -162,14 +152,14 @@ async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Word
 
 @router.get("/image/{sha256}.png")
 async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
-    """A stored image; its address is its content, so that it is fetched once."""
+    """Send a stored image; its address is its content hash, so the browser fetches it once."""
     told = await hmi.gateway.ask(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
     return Response(told.data, media_type=told.media_type, headers=_FOR_EVER)
 
 
 @router.get("/{sequence}")
 async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
-    """One inspection whole."""
+    """Show one inspection in full."""
     told = await _inspection(hmi, sequence)
     return show(
         request,
@@ -183,7 +173,7 @@ async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
 
 @router.get("/{sequence}/step/{step}")
 async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Response:
-    """One step: its image, its mask, and the stages of its measurement."""
+    """Show one step: its image, its mask, and the stages of its measurement."""
     told = await _inspection(hmi, sequence)
     steps = _steps(told)
     found = next((each for each in steps if each["point"].step == step), None)
@@ -205,7 +195,7 @@ async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Respo
 
 @router.get("/{sequence}/step/{step}/stage/{place}.jpg")
 async def stage(hmi: HmiNow, sequence: int, step: int, place: int) -> Response:
-    """One stage's picture."""
+    """Send one stage's picture."""
     stages = await _stages(hmi, sequence, step)
     if not 0 <= place < len(stages.pictures):
         raise Problem(404, "problem.not_found")
@@ -214,7 +204,7 @@ async def stage(hmi: HmiNow, sequence: int, step: int, place: int) -> Response:
 
 
 _STAGES: OrderedDict[tuple[int, int], Stages] = OrderedDict()
-"""The last steps' stages: a page asks for their pictures one by one."""
+"""The last steps' stages: a page fetches their pictures one by one."""
 
 
 async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
@@ -237,7 +227,7 @@ async def _inspection(hmi: Hmi, sequence: int) -> InspectionTold:
 
 
 def _steps(told: InspectionTold) -> list[dict[str, Any]]:
-    """Every point of the curve, with its image and mask where they are kept."""
+    """Return every point of the curve, with its image and mask where these are stored."""
     kept = {(each.kind, each.step): each for each in told.images if each.there}
     return [
         {"point": point, "image": kept.get(("step", point.step)), "mask": kept.get(("mask", point.step))}
@@ -246,7 +236,7 @@ def _steps(told: InspectionTold) -> list[dict[str, Any]]:
 
 
 def _drawn(told: InspectionTold) -> dict[str, Any] | None:
-    """The curve with the limits of the recipe as it was."""
+    """Return the curve with the limits of the recipe at that time."""
     points = [
         (point.closing_mm, point.area_mm2)
         for point in told.curve
@@ -268,7 +258,7 @@ def _drawn(told: InspectionTold) -> dict[str, Any] | None:
 
 
 def _utc_ms(text: str) -> int | None:
-    """A browser's local date and time, in the machine's zone."""
+    """Convert a browser's local date and time, in the machine's zone."""
     return round(1000 * datetime.fromisoformat(text).astimezone().timestamp()) if text else None
 
 

@@ -1,4 +1,4 @@
-"""What takes long and is waited for: exports, reports and what-ifs, with their progress and their files."""
+"""Job pages: progress and files of exports, reports and what-ifs."""
 
 from collections.abc import AsyncIterator
 from typing import Annotated
@@ -24,21 +24,21 @@ Back = Annotated[str, Query(max_length=200, pattern=r"^/([A-Za-z0-9_][A-Za-z0-9_
 
 
 async def somebody(request: Request) -> None:
-    """Files are for those who are logged in: an export is all that the station knows."""
+    """Require a log-in for files: an export holds all data of the station."""
     if not caller_of(request).name:
         raise Problem(403, "problem.not_allowed", role="operator")
 
 
 @router.get("/{job}")
 async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
-    """How it does."""
+    """Show a job."""
     told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
     return show(request, "job.html.j2", job=told, back=back)
 
 
 @router.get("/{job}/part")
 async def part(hmi: HmiNow, wording: WordingNow, job: JobId) -> Response:
-    """The same as a part of the page, to be asked for again and again."""
+    """Render the same as a part of the page, for polling."""
     told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
     html = hmi.renderer.render("job_part.html.j2", wording, {"job": told})
     return Response(
@@ -48,7 +48,7 @@ async def part(hmi: HmiNow, wording: WordingNow, job: JobId) -> Response:
 
 @router.post("/{job}/end")
 async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
-    """Call it off."""
+    """Cancel a job."""
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role="operator")
     await hmi.gateway.ask(EndJob(job=job), JobTold, deadline_s=DEADLINE_S)
@@ -57,20 +57,20 @@ async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
 
 @router.get("/{job}/file/{name}", dependencies=[Depends(somebody)])
 async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
-    """One of its files, to be kept."""
+    """Send one of its files for download."""
     return await _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
 
 
 @router.get("/{job}/show/{name}", dependencies=[Depends(somebody)])
 async def shown(hmi: HmiNow, job: JobId, name: FileName) -> Response:
-    """One of its documents, to be looked at or printed."""
+    """Send one of its documents for display in the browser."""
     if not name.endswith((".html", ".pdf")):
         raise Problem(404, "problem.not_found")
     return await _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
 
 
 async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
-    """Piece by piece, each fetched when the one before was taken."""
+    """Send a file in pieces; each is fetched after the browser has taken the one before."""
     told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
     found = next((each for each in told.files if each.name == name), None)
     if found is None:

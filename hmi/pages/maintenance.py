@@ -1,4 +1,4 @@
-"""Maintenance: health, moving by hand, the live image, the ball, the PLC's registers, the log."""
+"""Maintenance page: health, manual control, live image, calibration, PLC registers, log."""
 
 import asyncio
 import re
@@ -60,13 +60,13 @@ Brightness = Annotated[int, Form(ge=0, le=15)]
 
 @router.get("")
 async def health(request: Request, hmi: HmiNow) -> Response:
-    """How everything does."""
+    """Show the health of every part."""
     return show(request, "maintenance.html.j2", tab="health", **await _health(hmi))
 
 
 @router.get("/health/part")
 async def health_part(hmi: HmiNow, wording: WordingNow) -> Response:
-    """The same, to be asked for again and again."""
+    """Render the same as a part, for polling."""
     return await _part(hmi, wording, "maintenance_health.html.j2", await _health(hmi))
 
 
@@ -78,7 +78,7 @@ async def hand(
     at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
     lit: Annotated[Literal["yes"] | None, Query()] = None,
 ) -> Response:
-    """Moving the fingers and setting the light by hand."""
+    """Show the manual control of fingers and light."""
     done = wording.text("maintenance.lit") if lit else ""
     if at_mm is not None:
         done = wording.text("maintenance.jogged", width=wording.number(at_mm, 1))
@@ -87,7 +87,7 @@ async def hand(
 
 @router.post("/mode")
 async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
-    """Set manual mode, in which no fruit is taken, or production again."""
+    """Set manual mode, in which no fruit is accepted, or production again."""
     asked = PanelOrder(person=actor_of(caller), order=OrderName.SET_MODE, argument=mode)
     shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
     until_s = time.monotonic() + MODE_S
@@ -107,7 +107,7 @@ async def jog(
     to: Annotated[Literal["open", "width", "stop"], Form()],
     width_mm: Annotated[str, Form(max_length=12)] = "",
 ) -> Response:
-    """Move the fingers, or stop them; the page says where they are then, or why they do not move."""
+    """Move the fingers, or stop them; the page shows their position, or why they do not move."""
     try:
         width = float(width_mm.replace(",", ".")) if to == "width" else None
         asked = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
@@ -127,19 +127,19 @@ async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightne
 
 @router.get("/image")
 async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
-    """The live image, at the browser's pace."""
+    """Show the live image, as fast as the browser takes it."""
     return show(request, "maintenance_image.html.j2", tab="image", contact=contact, **await _live(hmi, contact=contact))
 
 
 @router.get("/image/part")
 async def image_part(hmi: HmiNow, wording: WordingNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
-    """The next image with what is in it; asked for when the one before was taken."""
+    """Render the next image with its contact; requested after the one before was taken."""
     return await _part(hmi, wording, "maintenance_live.html.j2", await _live(hmi, contact=contact))
 
 
 @router.get("/image/{place}.jpg")
 async def frame(place: Annotated[str, StringConstraints(pattern=r"^\d{1,20}$")]) -> Response:
-    """An image that was told of a moment ago."""
+    """Send an image that `image_part` has named."""
     if place not in _FRAMES:
         raise Problem(404, "problem.not_found")
     return Response(_FRAMES[place].data, media_type=_FRAMES[place].media_type)
@@ -147,13 +147,13 @@ async def frame(place: Annotated[str, StringConstraints(pattern=r"^\d{1,20}$")])
 
 @router.get("/sensor")
 async def sensor(request: Request, hmi: HmiNow) -> Response:
-    """Calibration and verification, guided."""
+    """Show calibration and verification, guided."""
     return show(request, "maintenance_sensor.html.j2", tab="sensor", **await _calibration(hmi))
 
 
 @router.get("/sensor/part")
 async def sensor_part(hmi: HmiNow, wording: WordingNow) -> Response:
-    """How the run at the ball does."""
+    """Render the state of the calibration run."""
     told = await _calibration(hmi)
     run = told["now"].run
     over = run is None or run.state not in {"running", "waiting"}
@@ -167,7 +167,7 @@ async def sensor_picture(
     kind: Literal["calibration", "verification"],
     name: Literal["area.png", "field.png", "reference.png"],
 ) -> Response:
-    """A plot of what is in force."""
+    """Send a plot of the calibration in force."""
     told = await hmi.gateway.ask(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
     return Response(told.data, media_type=told.media_type)
 
@@ -179,7 +179,7 @@ async def begin(
     kind: Annotated[Literal["calibration", "verification"], Form()],
     places: Annotated[str, Form(max_length=200)] = "",
 ) -> Response:
-    """Begin a run; places are given a line each, as `4; 0`."""
+    """Begin a run; places are given one per line, as `4; 0`."""
     parsed = [_PLACE.match(line) for line in places.splitlines() if line.strip()]
     if len(parsed) > 6 or not all(parsed):
         raise Problem(400, "problem.bad_form")
@@ -191,39 +191,39 @@ async def begin(
 
 @router.post("/sensor/go-on")
 async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
-    """The ball lies there."""
+    """Confirm that the ball is in place."""
     await hmi.gateway.ask(GoOnBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/end")
 async def end(hmi: HmiNow, caller: Maintainer) -> Response:
-    """Call the run off."""
+    """Cancel the run."""
     await hmi.gateway.ask(EndBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=MOVE_DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.get("/registers")
 async def registers(request: Request, hmi: HmiNow) -> Response:
-    """The PLC's registers by their names."""
+    """Show the PLC's registers by name."""
     return show(request, "maintenance_registers.html.j2", tab="registers", told=await _registers(hmi))
 
 
 @router.get("/registers/part")
 async def registers_part(hmi: HmiNow, wording: WordingNow) -> Response:
-    """The same, to be asked for again and again."""
+    """Render the same as a part, for polling."""
     return await _part(hmi, wording, "maintenance_register_table.html.j2", {"told": await _registers(hmi)})
 
 
 @router.get("/log")
 async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
-    """The last lines of the station's log."""
+    """Show the last lines of the station's log."""
     told = await hmi.gateway.ask(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
     return show(request, "maintenance_log.html.j2", tab="log", lines=told.lines[::-1], level=level)
 
 
 _FRAMES: OrderedDict[str, Picture] = OrderedDict()
-"""The last live images: a page is told of one, and then fetches it."""
+"""The last live images: a page gets the address of one, and then fetches it."""
 
 
 async def _health(hmi: Hmi) -> dict[str, Any]:

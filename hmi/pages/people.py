@@ -1,4 +1,4 @@
-"""The page People: log in by PIN, the people and their roles, and the cleaning lock."""
+"""People page: log-in by PIN, users and their roles, and the cleaning lock."""
 
 import asyncio
 from typing import Annotated
@@ -30,13 +30,13 @@ _CHECKING = asyncio.Lock()
 
 @router.get("/people")
 async def people(request: Request, hmi: HmiNow, back: Annotated[str, Query(max_length=200)] = "/") -> Response:
-    """The page."""
+    """Show the page."""
     return _page(request, hmi, back)
 
 
 @router.post("/people/begin")
 async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin: Pin, again: Pin) -> Response:
-    """The first start: choose the administrator's PIN, at the machine itself."""
+    """Set the administrator's PIN at the first start, at the machine itself."""
     if not _address(request).startswith(LOOPBACK):
         raise Problem(403, "people.only_here")
     if pin != again:
@@ -54,7 +54,7 @@ async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin
 async def log_in(
     request: Request, hmi: HmiNow, caller: GenuineCaller, name: Name, pin: Pin, back: Back = "/"
 ) -> Response:
-    """Log in; after a few wrong PINs each further try has to wait."""
+    """Log in; after several wrong PINs each further try is delayed."""
     keys = (f"name {name if name in hmi.people.names() else ''}", f"address {_address(request)}")
     if (wait_s := hmi.pins.wait_s(*keys)) > 0:
         return _page(request, hmi, back, "people.wait", str(int(wait_s) + 1), status=429, chosen=name)
@@ -72,7 +72,7 @@ async def log_in(
 
 @router.post("/people/log-out")
 async def log_out(hmi: HmiNow, caller: GenuineCaller) -> Response:
-    """Log out; the page goes on as a viewer's."""
+    """Log out; the page continues as a viewer's."""
     hmi.sessions.log_out(caller.session)
     if caller.name:
         await _note(hmi, caller, "logged_out")
@@ -81,7 +81,7 @@ async def log_out(hmi: HmiNow, caller: GenuineCaller) -> Response:
 
 @router.post("/people/own-pin")
 async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin, pin: Pin) -> Response:
-    """Choose another PIN for oneself."""
+    """Change one's own PIN."""
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)
     key = f"name {caller.name}"
@@ -104,7 +104,7 @@ async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin
 async def put(
     request: Request, hmi: HmiNow, caller: Admin, name: Name, role: Annotated[Role, Form()], pin: Pin = ""
 ) -> Response:
-    """Add a person, or give one another role or PIN; who was logged in so far is logged out."""
+    """Add a user, or change a user's role or PIN; that user is logged out."""
     known = name in hmi.people.names()
     try:
         async with _CHECKING:
@@ -119,7 +119,7 @@ async def put(
 
 @router.post("/people/remove")
 async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Response:
-    """Remove a person."""
+    """Remove a user."""
     try:
         await asyncio.to_thread(hmi.people.remove, name)
     except PeopleError as error:
@@ -131,7 +131,7 @@ async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Re
 
 @router.post("/people/clean")
 async def clean(hmi: HmiNow, caller: GenuineCaller) -> Response:
-    """The screen is locked for cleaning, by the page itself; it unlocks itself."""
+    """Record the cleaning lock, which the page sets and releases by itself."""
     await _note(hmi, caller, "cleaning", f"{hmi.settings.cleaning_s:g} s")
     return Response(status_code=204)
 
@@ -162,7 +162,7 @@ def _logged_in(request: Request, hmi: Hmi, name: str, role: Role, back: str) -> 
 
 
 def _is_ours(address: str) -> bool:
-    """Whether an address to go back to is a page of ours, and not one that a foreign page has slipped in."""
+    """Return whether the address to go back to is a page of ours, and not inserted by a foreign page."""
     return address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
 
 

@@ -1,4 +1,4 @@
-"""Recipes: how they stand, edited as drafts with every limit drawn on past curves, approved by another person."""
+"""Recipes page: state, editing as drafts with every limit drawn on past curves, approval by another person."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -60,13 +60,13 @@ Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
 
 @router.get("")
 async def recipes(request: Request, hmi: HmiNow) -> Response:
-    """How all recipes stand."""
+    """Show the state of all recipes."""
     return show(request, "recipes.html.j2", told=await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S))
 
 
 @router.get("/{name}")
 async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
-    """One recipe: what is in force, what waits, what differs, and what can be done."""
+    """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
     standing = await _row(hmi, name)
     changes: tuple[Change, ...] = ()
     if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
@@ -79,14 +79,14 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
 
 @router.get("/{name}/edit")
 async def edit(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
-    """The form."""
+    """Show the form."""
     told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
     return await _form(request, hmi, wording, told, {}, "")
 
 
 @router.get("/{name}/chart")
 async def chart(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
-    """The chart alone, with the limits as they are typed; a field that is no number yet is left as it was."""
+    """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
     told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
     typed: dict[str, Any] = {}
     for path, text in _typed(request.query_params).items():
@@ -103,7 +103,7 @@ async def chart(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) 
 async def save(
     request: Request, hmi: HmiNow, wording: WordingNow, name: Name, caller: Editor, reason: Reason
 ) -> Response:
-    """Save what was typed as a draft; what is wrong is said beside the form, which keeps what was typed."""
+    """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
     told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
@@ -126,7 +126,7 @@ async def save(
 
 @router.post("/{name}/submit")
 async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Response:
-    """Record the file, as somebody edited it, as a draft."""
+    """Record the edited file as a draft."""
     return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=actor_of(caller)))
 
 
@@ -134,7 +134,7 @@ async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Res
 async def approve(
     hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
 ) -> Response:
-    """Put a draft in force."""
+    """Approve a draft."""
     return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
@@ -154,7 +154,7 @@ async def revert(
     reason: Reason,
     revision: Annotated[int | None, Form(ge=1, le=2**31)] = None,
 ) -> Response:
-    """Put a revision's text back into the file."""
+    """Restore a revision's text in the file."""
     return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
@@ -162,7 +162,7 @@ async def revert(
 async def history(
     request: Request, hmi: HmiNow, name: Name, below: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
-    """Who wrote, approved and retired its revisions, and what changed."""
+    """Show the revisions: author, approver, dates, differences."""
     asked = GetRecipeHistory(name=name, below=below)
     told = await hmi.gateway.ask(asked, RecipeHistory, deadline_s=DEADLINE_S)
     return show(request, "recipe_history.html.j2", row=await _row(hmi, name), told=told, tab="history")
@@ -172,14 +172,14 @@ async def history(
 async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
-    """The file as it is written, comments and all."""
+    """Show the file's text, with its comments."""
     told = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeTold, deadline_s=DEADLINE_S)
     return show(request, "recipe_text.html.j2", row=told.row, text=told.text, revision=revision, tab="text")
 
 
 @router.get("/{name}/export")
 async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
-    """The file, to be edited elsewhere and imported again."""
+    """Send the file, to be edited elsewhere and imported again."""
     told = await hmi.gateway.ask(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
     headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
     return Response(told.text, media_type="application/yaml", headers=headers)
@@ -187,7 +187,7 @@ async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(
 
 @router.post("/import")
 async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotated[UploadFile, File()]) -> Response:
-    """Put a whole recipe in the place of its file, and record it as a draft."""
+    """Replace the file by a whole recipe, and record it as a draft."""
     data = await file.read(LARGEST_TEXT + 1)
     try:
         text = data.decode("utf-8-sig")
@@ -206,7 +206,7 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
 async def whatif(
     hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
 ) -> Response:
-    """Judge the last fruit again by the file as it is."""
+    """Judge the latest fruit again by the file as it is."""
     job = await hmi.gateway.ask(
         StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobTold, deadline_s=DEADLINE_S
     )
@@ -250,7 +250,7 @@ async def _form(
 
 
 def _sorted(made: list[Group]) -> list[tuple[Group, bool]]:
-    """What is changed often first and open; what is set once after it, folded."""
+    """Sort the groups: frequently changed ones first and open; the others follow, folded."""
     often = ("damage", "early_stop", "expected_width", "steps")
     order = [each for start in often for each in made if each.path.startswith(start)]
     return [*((each, True) for each in order), *((each, False) for each in made if each not in order)]
@@ -273,7 +273,7 @@ async def _row(hmi: Hmi, name: str) -> RecipeRow:
 
 
 async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
-    """Of the draft that waits, else of what is in force; None where neither can be read."""
+    """Return the values of the pending draft, else those in force; None if neither can be read."""
     revision = row.waiting or row.in_force
     if revision is None:
         return None
@@ -282,7 +282,7 @@ async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
 
 
 async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The limits on past curves; none of these where nothing was inspected yet."""
+    """Return the limits on past curves; an empty result before the first inspection."""
     try:
         past = (await hmi.gateway.ask(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
     except RefusedError:  # there is no good file, or there are no records yet

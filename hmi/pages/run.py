@@ -1,4 +1,4 @@
-"""The page Run: what the station does, what to do next, and the last fruit."""
+"""Run page: the station's activity, the operator's next action, and the latest fruit."""
 
 import base64
 from collections import Counter
@@ -102,24 +102,19 @@ PARTS = {
 
 
 def fruit_values(fruit: Fruit | None, wording: Wording) -> Mapping[str, Any]:
-    """What `run_fruit.html.j2` needs to show a fruit.
-
-    Args:
-        fruit: None for none.
-        wording: the language.
-    """
+    """Return the values that `run_fruit.html.j2` needs for a fruit."""
     return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, wording)}
 
 
 @router.get("/")
 async def run(request: Request) -> Response:
-    """The page."""
+    """Show the page."""
     return show(request, "run.html.j2")
 
 
 @router.get("/fruit/{sequence}")
 async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Sequence) -> Response:
-    """One of the last fruit; an older one is in the history."""
+    """Show one of the latest fruit; an older one is in the history."""
     try:
         found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
     except RefusedError:
@@ -129,7 +124,7 @@ async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Se
 
 @router.get("/fruit/{sequence}/picture.svg")
 async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
-    """A fruit's picture with the contact's outline, as one file: it never changes, so a browser takes it once."""
+    """Send a fruit's picture with the contact's outline; it never changes, so a browser fetches it once."""
     found = await hmi.gateway.ask(AskPicture(sequence=sequence), Picture)
     base64.b64decode(found.jpeg, validate=True)
     corners = " ".join(f"{x},{y}" for x, y in found.outline)
@@ -155,7 +150,7 @@ async def order(
     argument: Annotated[str, Form(max_length=64)] = "",
     grower: Annotated[str, Form(max_length=64)] = "",
 ) -> Response:
-    """Start, stop, call off, recover, or begin and end a lot; the page shows what comes of it."""
+    """Start, stop, cancel, recover, or begin and end a lot; the page shows the result."""
     if order not in _ORDERS:
         raise Problem(400, "problem.bad_form")
     request = PanelOrder(person=actor_of(caller), order=order, argument=argument, grower=grower)
@@ -165,5 +160,5 @@ async def order(
 
 @router.get("/lot")
 async def lot(request: Request) -> Response:
-    """Where a lot is started and ended, if the PLC names none."""
+    """Show the form that begins and ends a lot, if the PLC names none."""
     return show(request, "lot.html.j2")

@@ -1,4 +1,4 @@
-"""What a node is asked and told over SDO before it may work: identity, errors, configuration, PDO mapping.
+"""Configuration of a CANopen node over SDO before it is operational: identity, errors, objects, PDO mapping.
 
 Every function waits for the node and is called from a worker thread. Objects: CiA 301, CiA 401 and CiA 406.
 """
@@ -23,7 +23,7 @@ _ERROR_PART = 0xFFFF
 
 
 class Node(NamedTuple):
-    """One of the two nodes, as canopen sees it."""
+    """One of the two nodes, as canopen represents it."""
 
     remote: canopen.RemoteNode
     number: int
@@ -34,7 +34,7 @@ class Node(NamedTuple):
 
 
 class Pdo(NamedTuple):
-    """A PDO as it has to be configured; what it carries is in the data sheet."""
+    """Required configuration of a PDO; its content is defined in the data sheet."""
 
     map: PdoMap
     cob_id: int
@@ -42,12 +42,12 @@ class Pdo(NamedTuple):
 
 
 def make_gate(network: canopen.Network, settings: CanSettings) -> Node:
-    """The reject gate on this network, in the place of one made before."""
+    """Make the reject gate's node on this network; replaces an earlier one."""
     return _make(network, settings, "gate_node", "the reject gate", str(GATE_EDS))
 
 
 def make_encoder(network: canopen.Network, settings: CanSettings) -> Node:
-    """The line encoder on this network, in the place of one made before."""
+    """Make the line encoder's node on this network; replaces an earlier one."""
     return _make(network, settings, "encoder_node", "the line encoder", str(ENCODER_EDS))
 
 
@@ -59,7 +59,7 @@ def _make(network: canopen.Network, settings: CanSettings, setting: str, name: s
 
 
 def no_heartbeat(node: Node, settings: CanSettings) -> str:
-    """What to say of a node that is not heard."""
+    """Describe a node without heartbeat."""
     return (
         f"no heartbeat of {node.name} on {settings.interface} {settings.channel}; look at its power, cable, bit rate "
         f"and node id ({node.setting})"
@@ -67,10 +67,10 @@ def no_heartbeat(node: Node, settings: CanSettings) -> str:
 
 
 def verify_identity(node: Node) -> str:
-    """Read who the node is and compare it with the data sheet.
+    """Read a node's identity and compare it with the data sheet.
 
     Returns:
-        Product and revision in words.
+        Product and revision as text.
 
     Raises:
         BringUpError: it is another device, or does not answer.
@@ -92,7 +92,7 @@ def verify_identity(node: Node) -> str:
 
 
 def standing_error(node: Node) -> tuple[int, int] | None:
-    """The node's latest error that stands, as code and error register; None where it has none.
+    """Return the node's latest active error as code and error register; None if it has none.
 
     Raises:
         BringUpError: it does not answer.
@@ -104,10 +104,10 @@ def standing_error(node: Node) -> tuple[int, int] | None:
 
 
 def configure_gate(node: Node, settings: CanSettings) -> None:
-    """Write what the gate does without the station, what it listens to, and its PDOs; each is read back.
+    """Write the gate's safe behaviour, its heartbeat consumer and its PDOs; each value is read back.
 
     Raises:
-        BringUpError: it refuses, keeps something else, or does not answer.
+        BringUpError: it refuses, stores another value, or does not answer.
     """
     _put(node, 0x1017, 0, _ms(settings.heartbeat_s))
     _put(node, 0x6206, 1, 0xFF)
@@ -118,10 +118,10 @@ def configure_gate(node: Node, settings: CanSettings) -> None:
 
 
 def configure_encoder(node: Node, settings: CanSettings) -> None:
-    """Write how often the encoder speaks, and its PDO; each is read back.
+    """Write the encoder's transmission period and its PDO; each value is read back.
 
     Raises:
-        BringUpError: it refuses, keeps something else, does not count through 32 bits, or does not answer.
+        BringUpError: it refuses, stores another value, does not count through 32 bits, or does not answer.
     """
     _put(node, 0x1017, 0, _ms(settings.heartbeat_s))
     _put(node, 0x6002, 0, 0xFFFF_FFFF)
@@ -129,7 +129,7 @@ def configure_encoder(node: Node, settings: CanSettings) -> None:
 
 
 def gate_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
-    """The gate's PDOs: it takes orders and the encoder's count, and reports."""
+    """Return the gate's PDOs: it receives orders and the encoder's count, and sends reports."""
     remote = node.remote
     return {
         "RPDO 1": Pdo(remote.rpdo[1], 0x200 + node.number, 0),
@@ -139,12 +139,12 @@ def gate_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
 
 
 def encoder_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
-    """The encoder's PDO: its count."""
+    """Return the encoder's PDO: its count."""
     return {"TPDO 1": Pdo(node.remote.tpdo[1], 0x180 + node.number, _ms(settings.encoder_period_s))}
 
 
 def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
-    """The first PDO that the node holds otherwise than asked for, in words; empty where all agree.
+    """Describe the first PDO whose mapping differs from the required one; empty if all agree.
 
     Raises:
         BringUpError: it does not answer.
@@ -168,7 +168,7 @@ def _write_pdos(node: Node, pdos: dict[str, Pdo]) -> None:
 
 
 def _wanted(pdo: Pdo) -> str:
-    """Prepare a map as it has to be written, and describe it."""
+    """Prepare a PDO map for writing, and describe it."""
     pdo.map.read(from_od=True)
     pdo.map.cob_id, pdo.map.event_timer, pdo.map.enabled = pdo.cob_id, pdo.event_timer_ms, True
     return _layout(pdo.map)
@@ -226,7 +226,7 @@ def _put(node: Node, index: int, subindex: int, value: int) -> None:
 
 
 def read_position(node: Node) -> int:
-    """The encoder's count, asked for.
+    """Read the encoder's count.
 
     Raises:
         BringUpError: it does not answer.

@@ -1,4 +1,4 @@
-"""`station plc check-can`: is the bus there, and are the nodes the right ones?"""
+"""`station plc check-can`: check of the CAN bus and its nodes."""
 
 import time
 from collections import Counter
@@ -21,10 +21,10 @@ _POLL_S = 0.02
 @click.command("check-can")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 def check_can(config: Path | None) -> None:
-    """Ask the CAN nodes who they are; nothing is moved or written. Not while the station runs: one master at a time.
+    """Read the identity of the CAN nodes; nothing is moved or written. Only while the station is stopped.
 
-    Says for the interface and for each node what was found, a verdict, and what to do. The exit code is 1 where
-    anything is faulty.
+    For the interface and for each node it prints the result and what to do. The exit code is 1 if anything is faulty.
+    The station has to be stopped because a bus has one master at a time.
     """
     settings = load_configuration(config).can
     if not settings.enabled:
@@ -64,7 +64,7 @@ def _look(
     settings: CanSettings,
     pdos: Callable[[bring_up.Node, CanSettings], dict[str, bring_up.Pdo]],
 ) -> str:
-    """Heartbeat, identity and mapping in words.
+    """Return heartbeat, identity and mapping as text.
 
     Raises:
         LineIoError: no heartbeat, another device, or no answer.

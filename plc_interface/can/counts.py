@@ -1,4 +1,4 @@
-"""Encoder counts, which go through 32 bits and begin again at 0."""
+"""Arithmetic of encoder counts, which wrap round at 32 bits."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ RANGE = 2**32
 
 
 class Count(NamedTuple):
-    """What the encoder said last."""
+    """The encoder's last count."""
 
     value: int
     """0 to 2**32 - 1."""
@@ -14,20 +14,20 @@ class Count(NamedTuple):
 
 
 def further(count: int, by: int) -> int:
-    """The count that lies so many counts further on.
+    """Add counts, modulo 2**32.
 
     Args:
         count: 0 to 2**32 - 1.
-        by: counts, also negative.
+        by: counts, may be negative.
     """
     return (count + by) % RANGE
 
 
 def ahead(of: int, count: int) -> int:
-    """How far a count lies ahead of another, -2**31 to 2**31 - 1; at 3000 counts/s half the range takes eight days.
+    """Return the distance between two counts, -2**31 to 2**31 - 1; at 3000 counts/s half the range takes eight days.
 
     Args:
-        of: where the belt is.
-        count: where it shall be.
+        of: the belt's count.
+        count: the target.
     """
     return (count - of + RANGE // 2) % RANGE - RANGE // 2

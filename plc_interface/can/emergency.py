@@ -1,4 +1,4 @@
-"""The names of CANopen's emergency codes (CiA 301, table of emergency error codes; CiA 401, emergency)."""
+"""Emergency codes of CANopen (CiA 301, table of emergency error codes; CiA 401, emergency)."""
 
 _NAMES = {
     0x2310: ("the current at an output is too high", "look for what blocks the flap, and at its valve"),
@@ -29,16 +29,12 @@ _CLASSES = {
 
 
 def is_reset(code: int) -> bool:
-    """Whether a code says that no error is left (CiA 301: 00xx).
-
-    Args:
-        code: the emergency error code.
-    """
+    """Return whether a code reports that no error is left (CiA 301: 00xx)."""
     return code & 0xFF00 == 0
 
 
 def in_words(code: int, register: int) -> str:
-    """What an emergency says, with the remedy.
+    """Describe an emergency, with the remedy.
 
     Args:
         code: the emergency error code.

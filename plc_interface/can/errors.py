@@ -1,10 +1,10 @@
-"""What can go wrong on the line's CAN, each in one sentence with its remedy."""
+"""Errors of the line's CAN, each one sentence with its remedy."""
 
 from station.errors import StationError
 
 
 class LineIoError(StationError):
-    """Something about the bus, its nodes or a shot."""
+    """Base of all errors of the bus, its nodes and reject actuations."""
 
 
 class InterfaceError(LineIoError):
@@ -20,15 +20,15 @@ class BringUpError(LineIoError):
 
 
 class NodeLostError(LineIoError):
-    """A node that was operational is so no longer."""
+    """A node that was operational is lost."""
 
 
 class NotReadyError(LineIoError):
-    """No shot can be ordered now."""
+    """No reject actuation can be ordered now."""
 
 
 class ShotError(LineIoError):
-    """A shot that was asked for did not happen, or nobody knows whether it did."""
+    """A reject actuation that did not happen, or whose result is unknown."""
 
     def __init__(self, sequence: int, what: str) -> None:
         super().__init__(f"shot {sequence}: {what}")
@@ -36,15 +36,15 @@ class ShotError(LineIoError):
 
 
 class LateShotError(ShotError):
-    """The count at which the flap had to open is past; nothing was fired."""
+    """The count at which the flap had to open is past; the gate did not actuate."""
 
 
 class ShotRefusedError(ShotError):
-    """The order cannot be carried out; nothing was fired."""
+    """The order cannot be carried out; the gate did not actuate."""
 
 
 class EchoMissingError(ShotError):
-    """The gate did not confirm or report in time; whether it fired is unknown."""
+    """The gate did not confirm or report in time; whether it actuated is unknown."""
 
 
 class EchoWrongError(ShotError):
@@ -52,4 +52,4 @@ class EchoWrongError(ShotError):
 
 
 class ShotLostError(ShotError):
-    """The gate was lost while the shot was ordered; whether it fired is unknown."""
+    """The gate was lost with the order pending; whether it actuated is unknown."""

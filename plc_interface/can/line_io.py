@@ -1,7 +1,7 @@
-"""The line's I/O by CAN: keeps the bus up, diverts fruit at an encoder count, and says what is wrong.
+"""Line I/O by CAN: brings up the bus, diverts fruit at an encoder count, and reports faults.
 
-Nothing here moves by itself: the gate fires at a count that it was told before, and without the station's heartbeat it
-puts out its safe output. Unverified on hardware.
+The station moves nothing directly: the gate actuates at a count that it got in advance, and without the station's
+heartbeat it sets its safe output. Unverified on hardware.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ log = logging.getLogger(__name__)
 
 
 class _HealthEndedError(LineIoError):
-    """The station's lease is over: no failure of the bus."""
+    """The station's health has expired: no failure of the bus."""
 
 
 class LineIo:
@@ -63,7 +63,7 @@ class LineIo:
         self._worker: ThreadPoolExecutor | None = None
 
     async def start(self) -> None:
-        """Begin to bring the bus up, and keep it up; returns at once. Idempotent."""
+        """Start bringing up the bus, and restore it whenever it is lost; returns at once. Idempotent."""
         if not self._tasks:
             self._worker = ThreadPoolExecutor(1, "CAN worker")
             self._tasks = [
@@ -72,7 +72,7 @@ class LineIo:
             ]
 
     async def stop(self) -> None:
-        """End the heartbeat and close the bus: the gate puts out its safe output. Idempotent."""
+        """End the heartbeat and close the bus: the gate sets its safe output. Idempotent."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -82,17 +82,17 @@ class LineIo:
             self._worker = None
 
     def renew_health(self, lease_s: float) -> None:
-        """Say that the station is healthy for so many seconds; when they are over, its heartbeat stops."""
+        """Declare the station healthy for so many seconds; after these its heartbeat stops."""
         self._healthy_until_s = time.monotonic() + lease_s
 
     @property
     def ready(self) -> bool:
-        """Whether a shot can be ordered now."""
+        """True if a reject actuation can be ordered now."""
         return not self.why_not_ready
 
     @property
     def why_not_ready(self) -> str:
-        """One sentence with the remedy; empty where ready."""
+        """Return the reason as one sentence with the remedy; empty if ready."""
         if not self._tasks:
             return "the CAN driver is not started"
         if not self._healthy:
@@ -105,25 +105,25 @@ class LineIo:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with the bus, its nodes and recent shots, one sentence each."""
+        """Return the faults of the bus, its nodes and recent reject actuations, one sentence each."""
         trouble = (self._trouble,) if self._trouble else ()
         return (*trouble, *self._emergencies.values(), *self._shots.faults)
 
     def give_up(self, error: ShotError) -> None:
-        """Count a shot that is not ordered at all, and keep it as a fault."""
+        """Count a reject actuation that is not ordered at all, and store it as a fault."""
         self._shots.blame(error)
 
     def acknowledge_faults(self) -> None:
-        """Forget the faults of shots; those of the bus and its nodes go when their cause goes."""
+        """Clear the faults of reject actuations; those of the bus and its nodes end with their cause."""
         self._shots.faults.clear()
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """What happened since the start, by name; docs/plc/can.md lists them."""
+        """Return the counters since the start, by name; docs/plc/can.md lists them."""
         return dict(self._counters)
 
     def encoder_count(self) -> Count | None:
-        """What the encoder said last, and how long ago; None where that is stale or nothing was heard."""
+        """Return the encoder's last count and its age; None if it is stale or there is none."""
         if self._link is None or self._link.count is None:
             return None
         value, at_s = self._link.count
@@ -131,7 +131,7 @@ class LineIo:
         return Count(value, age_s) if age_s <= self._settings.count_stale_s else None
 
     def count_at_gate(self, count_at_nest: int) -> int:
-        """The count at which a fruit reaches the gate.
+        """Return the count at which a fruit reaches the gate.
 
         Args:
             count_at_nest: the encoder's count when the fruit was at the nest.
@@ -139,9 +139,9 @@ class LineIo:
         return further(count_at_nest, self._settings.distance_counts)
 
     async def divert(self, sequence: int, lane: int, at_count: int) -> DivertEcho:
-        """Have the flap of a lane opened when the belt reaches a count; returns when the gate has reported it.
+        """Open the flap of a lane when the belt reaches a count; returns when the gate has reported it.
 
-        Several shots may be under way. The gate keeps an order when the caller is cancelled.
+        Several orders may be pending. The gate retains an order when the caller is cancelled.
 
         Args:
             sequence: the inspection's, 1 to 2**32 - 1; the gate sees its lower 16 bits.
@@ -150,9 +150,9 @@ class LineIo:
 
         Raises:
             NotReadyError: nothing was ordered.
-            LateShotError, ShotRefusedError: nothing was or will be fired.
+            LateShotError, ShotRefusedError: the gate does not actuate.
             InterfaceError: the order did not leave.
-            EchoMissingError, EchoWrongError, ShotLostError: what was fired, if anything, is not what was ordered.
+            EchoMissingError, EchoWrongError, ShotLostError: the gate's action, if any, is not the ordered one.
         """
         if not 1 <= sequence < RANGE or not 1 <= lane <= _LANES or not 0 <= at_count < RANGE:
             raise ShotRefusedError(
@@ -196,7 +196,7 @@ class LineIo:
             ) from None
 
     async def _fired(self, shot: PendingShot, began_s: float) -> Report:
-        """Wait for the belt to reach the count, however slowly, and then for the report."""
+        """Wait until the belt reaches the count, however slowly, and then for the report."""
         at = shot.order.at_count
         passed_s: float | None = None
         while True:
@@ -220,7 +220,7 @@ class LineIo:
         return time.monotonic() < self._healthy_until_s
 
     async def _beat(self) -> None:
-        """Send the station's heartbeat from this loop: one that hangs is silent, as it has to be."""
+        """Send the station's heartbeat from this loop: if the loop hangs, the heartbeat stops, as it has to."""
         while True:
             if self._healthy and self._link:
                 try:
@@ -257,10 +257,10 @@ class LineIo:
         self._trouble = why
 
     async def _session(self) -> None:
-        """Open the bus, bring both nodes up and watch them until that ends.
+        """Open the bus, bring both nodes up and monitor them until the session ends.
 
         Raises:
-            LineIoError: the bus or a node cannot be had or was lost, or the station is no longer healthy.
+            LineIoError: the bus or a node is not available or was lost, or the station is no longer healthy.
         """
         loop = asyncio.get_running_loop()
         link = CanLink(
@@ -303,7 +303,7 @@ class LineIo:
             await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
 
     async def _order(self, link: CanLink, node: bring_up.Node, name: str, state: int) -> None:
-        """Command a state and wait until the node's heartbeat says it."""
+        """Command a state and wait until the node's heartbeat reports it."""
         sent_s = time.monotonic()
         try:
             node.remote.nmt.state = name
@@ -357,5 +357,5 @@ class LineIo:
         self._emergencies[node, code] = f"{name} (node {node}): {in_words(code, register)}"
 
     def _in_worker(self, work: Callable[[], Result]) -> Awaitable[Result]:
-        """Have the one worker thread do what waits."""
+        """Run a blocking function in the one worker thread."""
         return asyncio.get_running_loop().run_in_executor(self._worker, work)

@@ -1,6 +1,6 @@
-"""An open CAN bus with canopen's network on it, and the thread that receives.
+"""An open CAN bus with canopen's network on it, and the receiving thread.
 
-python-can's own Notifier is not used: its thread ends at the first exception, and nobody is told (decision 0014).
+python-can's own Notifier is not used: its thread ends at the first exception without a report (decision 0014).
 """
 
 import errno
@@ -38,7 +38,7 @@ ORDER = struct.Struct("<HBBI")
 
 log = logging.getLogger(__name__)
 for _library in ("can", "canopen"):
-    logging.getLogger(_library).addHandler(logging.NullHandler())  # what they report is raised here in words
+    logging.getLogger(_library).addHandler(logging.NullHandler())  # their reports are raised here as text
 
 
 class Beat(NamedTuple):
@@ -51,7 +51,7 @@ class Beat(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What the gate says of a shot."""
+    """The gate's report of a reject actuation."""
 
     sequence: int
     """The lower 16 bits of the ordered one."""
@@ -73,7 +73,7 @@ def open_bus(settings: CanSettings) -> can.BusABC:
     """Open the interface. `socketcan` is unverified on hardware.
 
     Raises:
-        InterfaceError: it is not there, or this machine cannot have it.
+        InterfaceError: it does not exist, or cannot be opened on this machine.
     """
     options = {"port": settings.port, "hop_limit": 0, "fd": False} if settings.interface == "udp_multicast" else {}
     try:
@@ -85,7 +85,7 @@ def open_bus(settings: CanSettings) -> can.BusABC:
 
 
 def described(settings: CanSettings) -> str:
-    """The interface in words."""
+    """Describe the interface."""
     port = f" port {settings.port}" if settings.interface == "udp_multicast" else ""
     return f"the CAN interface {settings.interface} {settings.channel}{port}"
 
@@ -107,7 +107,7 @@ def _remedy(settings: CanSettings, error: Exception) -> str:
 
 
 class CanLink:
-    """The bus while it is open. What it hears can be read from any thread."""
+    """The bus while it is open. Its received data can be read from any thread."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class CanLink:
 
         Args:
             settings: the bus and the node ids.
-            counters: what was heard is counted here, by the receiving thread alone.
+            counters: receptions are counted here, by the receiving thread alone.
             on_report: called by the receiving thread.
             on_emergency: called by the receiving thread.
 
@@ -145,10 +145,10 @@ class CanLink:
         self._thread.start()
 
     def check(self) -> None:
-        """Look whether the bus still works.
+        """Check that the bus still works.
 
         Raises:
-            InterfaceError: it was left by the controller, fails, or nobody receives any more.
+            InterfaceError: the controller is bus-off, the interface fails, or the receiving thread has ended.
         """
         if self._failure:
             raise self._failure
@@ -163,7 +163,7 @@ class CanLink:
             data: at most 8 bytes.
 
         Raises:
-            InterfaceError: the bus is closed or does not take it.
+            InterfaceError: the bus is closed or does not accept it.
         """
         if self._ended.is_set():
             raise InterfaceError(f"{described(self._settings)} is closed")
@@ -175,7 +175,7 @@ class CanLink:
             ) from error
 
     def abort(self) -> None:
-        """Hear and send nothing more, so that whoever waits for a node stops soon."""
+        """Stop receiving and sending, so that a thread that waits for a node ends soon."""
         self._ended.set()
 
     def close(self) -> None:
@@ -216,7 +216,7 @@ class CanLink:
         self._counters["frames_received"] += 1
         try:
             self.network.notify(message.arbitration_id, message.data, message.timestamp)
-        except Exception:  # whatever a frame does to its readers, the next one is heard
+        except Exception:  # an error in a reader must not stop reception
             self._counters["frames_malformed"] += 1
             log.debug("a frame 0x%X could not be read", message.arbitration_id, exc_info=True)
 

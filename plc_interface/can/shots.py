@@ -1,4 +1,4 @@
-"""Shots that were ordered, and what the gate reported of them. Lives on the loop; no bus, no clock."""
+"""Pending rejects: ordered reject actuations and the gate's reports of them. Lives on the loop; no bus, no clock."""
 
 import asyncio
 from collections import Counter, deque
@@ -23,7 +23,7 @@ _WIRE = 0xFFFF
 
 
 class Fired(IntEnum):
-    """The gate's word on a shot, object 2001:02 of its data sheet."""
+    """The gate's report of a reject actuation, object 2001:02 of its data sheet."""
 
     ARMED = 0
     FIRED = 1
@@ -33,7 +33,7 @@ class Fired(IntEnum):
 
 
 class Order(NamedTuple):
-    """One shot."""
+    """One ordered reject actuation."""
 
     sequence: int
     lane: int
@@ -41,12 +41,12 @@ class Order(NamedTuple):
 
     @property
     def on_wire(self) -> int:
-        """The sequence as the gate knows it: the lower 16 bits."""
+        """The sequence that the gate gets: the lower 16 bits."""
         return self.sequence & _WIRE
 
 
 class DivertEcho(NamedTuple):
-    """A shot that the gate has fired as ordered."""
+    """A reject actuation that the gate has carried out as ordered."""
 
     sequence: int
     lane: int
@@ -58,7 +58,7 @@ class DivertEcho(NamedTuple):
 
 
 class PendingShot:
-    """An order under way."""
+    """A pending reject."""
 
     def __init__(self, order: Order, tolerance_counts: int) -> None:
         self.order = order
@@ -66,10 +66,10 @@ class PendingShot:
         self.reports: asyncio.Queue[Report | ShotError] = asyncio.Queue()
 
     async def next(self) -> Report:
-        """The gate's next word, if it is that of a shot that goes as ordered.
+        """Return the gate's next report, if it is that of an order which proceeds as it should.
 
         Raises:
-            ShotError: it was refused, came otherwise than ordered, or the gate is lost.
+            ShotError: it was refused, differs from the order, or the gate is lost.
         """
         report = await self.reports.get()
         if isinstance(report, ShotError):
@@ -102,7 +102,7 @@ class PendingShot:
 
 
 class Shots:
-    """All orders under way, by the sequence on the wire."""
+    """All pending rejects, by the sequence on the wire."""
 
     def __init__(self, counters: Counter[str], tolerance_counts: int) -> None:
         self._counters = counters
@@ -110,14 +110,14 @@ class Shots:
         self._pending: dict[int, PendingShot] = {}
         self._ended: deque[int] = deque(maxlen=_REMEMBERED)
         self.faults: deque[str] = deque(maxlen=_KEPT_FAULTS)
-        """What went wrong with shots since the last acknowledgement, one sentence each."""
+        """Failed reject actuations since the last acknowledgement, one sentence each."""
 
     @contextmanager
     def under_way(self, order: Order) -> Iterator[PendingShot]:
-        """Expect reports of this order; what goes wrong with it is counted and kept as a fault.
+        """Expect reports of this order; a failure is counted and stored as a fault.
 
         Raises:
-            ShotRefusedError: an order with this sequence is under way.
+            ShotRefusedError: an order with this sequence is pending.
         """
         if order.on_wire in self._pending:
             raise ShotRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
@@ -132,12 +132,12 @@ class Shots:
             self._ended.append(order.on_wire)
 
     def blame(self, error: ShotError) -> None:
-        """Count a shot that went wrong, and keep it as a fault."""
+        """Count a failed reject actuation, and store it as a fault."""
         self._counters["shots_failed"] += 1
         self.faults.append(str(error))
 
     def on_report(self, report: Report) -> None:
-        """Take the gate's word to the shot that it is about."""
+        """Assign a report of the gate to its order."""
         if shot := self._pending.get(report.sequence):
             shot.reports.put_nowait(report)
         elif report.sequence in self._ended:
@@ -149,7 +149,7 @@ class Shots:
             )
 
     def lose(self, why: str) -> None:
-        """End all orders: the gate is gone, and nobody knows what it did."""
+        """End all orders: the gate is lost, and its actions are unknown."""
         for shot in self._pending.values():
             lost = ShotLostError(
                 shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"

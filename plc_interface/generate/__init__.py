@@ -1,1 +1,1 @@
-"""What is made from the register map: documents, import files for other tools, PLC code."""
+"""Generator of documents, import files for other tools and PLC code from the register map."""

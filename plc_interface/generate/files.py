@@ -1,4 +1,4 @@
-"""Which files are made from the map, and whether those on disk still are what would be made."""
+"""Generated files: content, writing, and comparison with those on disk."""
 
 from pathlib import Path
 
@@ -10,11 +10,11 @@ from plc_interface.generate.tia import tia
 from station.errors import BadInputError
 
 DOCUMENTS = Path(__file__).resolve().parents[2] / "docs" / "plc"
-"""Where the repository keeps them."""
+"""Their folder in the repository."""
 
 
 def made_files() -> dict[str, str]:
-    """The content of every file made, by its path below the folder."""
+    """Return the content of every generated file by its path below the folder."""
     return {
         "register-map.md": reference.markdown(),
         "register-map.csv": reference.table(),
@@ -30,13 +30,13 @@ def made_files() -> dict[str, str]:
 
 
 def write_files(folder: Path) -> list[Path]:
-    """Write all files; give those that are new or were different.
+    """Write all files; return those that are new or were different.
 
     Args:
-        folder: made where it is missing.
+        folder: created if it is missing.
 
     Raises:
-        BadInputError: the folder cannot be written, or is not there in an installation without the repository.
+        BadInputError: the folder cannot be written, or does not exist in an installation without the repository.
     """
     if folder == DOCUMENTS and not DOCUMENTS.parent.is_dir():
         raise BadInputError("this installation has no folder of documents: give a folder with --out")
@@ -52,7 +52,7 @@ def write_files(folder: Path) -> list[Path]:
 
 
 def drifted_files(folder: Path) -> list[Path]:
-    """The files below a folder that are missing or are not what would be made now."""
+    """Return the files below a folder that are missing or differ from the generated ones."""
     return [folder / name for name, content in made_files().items() if _read(folder / name) != content]
 
 

@@ -1,4 +1,4 @@
-"""The map as a document and as a table for a spreadsheet."""
+"""Register map as a document and as a table for a spreadsheet."""
 
 import csv
 import io

@@ -25,12 +25,12 @@ _WITHOUT_NAMES = {"alarms"}
 
 
 def field_name(register: Register) -> str:
-    """The member's name in its data type."""
+    """Return the member's name in its data type."""
     return register.name.removeprefix("result_")
 
 
 def bit_fields(register: Register) -> list[tuple[str, int, str]]:
-    """Name, number and meaning of each flag that becomes a member of its own."""
+    """Return name, number and meaning of each flag that becomes a member of its own."""
     if register.name in _WITHOUT_NAMES:
         return []
     prefix = _PREFIXES.get(register.name, "")
@@ -38,7 +38,7 @@ def bit_fields(register: Register) -> list[tuple[str, int, str]]:
 
 
 def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
-    """Name, type and comment of each member. Floats are left out: the value in hundredths says the same."""
+    """Return name, type and comment of each member, without floats: the hundredths hold the same value."""
     for register in registers:
         comment = (register.meaning + (f", {register.unit}" if register.unit else "")).replace("²", "2")
         name = field_name(register)
@@ -110,7 +110,7 @@ def _decoding() -> Iterator[str]:
 
 
 def _decode(register: Register, variable: str) -> Iterator[str]:
-    """Statements that fill the members of one register."""
+    """Return statements that fill the members of one register."""
     target, place = f"{variable}.{field_name(register)}", register.address - STATUS.address
     match register.kind:
         case Kind.U16 | Kind.I16:
@@ -135,5 +135,5 @@ def _decode(register: Register, variable: str) -> Iterator[str]:
 
 
 def _join(high: str, low: str) -> str:
-    """Two registers as one DWORD; `one` and `three` are 0 where the high word comes first."""
+    """Return two registers as one DWORD; `one` and `three` are 0 if the high word comes first."""
     return f"SHL(WORD_TO_DWORD(station[{high}]), 16) OR WORD_TO_DWORD(station[{low}])"

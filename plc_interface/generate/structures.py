@@ -1,7 +1,7 @@
 """Structures in memory order for little-endian controllers: Studio 5000 (L5X) and CODESYS (PLCopen XML).
 
-Words that such a controller has read can be copied onto the structure where the station is configured for the low
-word first, for its numbers lie aligned in each block. Texts then have their characters swapped in pairs.
+Words that such a controller has read can be copied onto the structure if the station is configured for the low word
+first, because its numbers are aligned in each block. Texts then have their characters swapped in pairs.
 """
 
 from xml.etree import ElementTree as ET
@@ -37,7 +37,7 @@ CODESYS = {
 PLCOPEN = "http://www.plcopen.org/xml/tc6_0200"
 XHTML = "http://www.w3.org/1999/xhtml"
 _WHEN = "2026-01-01T00:00:00"
-"""The schema asks for a time; a fixed one, so that the file changes only with the map."""
+"""The schema requires a time; a fixed one, so that the file changes only with the map."""
 
 
 def studio_5000() -> str:

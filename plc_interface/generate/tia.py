@@ -1,8 +1,8 @@
 """TIA Portal: data types and data blocks as an external source in SCL.
 
-A data block with standard access lies in memory as it is declared, the high byte first (Siemens, "Programming
+A data block with standard access has the memory layout of its declaration, the high byte first (Siemens, "Programming
 Guideline for S7-1200/S7-1500", standard and optimized blocks), so MB_CLIENT can copy registers straight onto it. 64-bit
-numbers become two, for the S7-1200 has none.
+numbers become two, because the S7-1200 has none.
 """
 
 from collections.abc import Iterator

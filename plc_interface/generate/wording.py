@@ -1,4 +1,4 @@
-"""Sentences that stand in every file made."""
+"""Sentences common to all generated files."""
 
 MADE_BY = "Made by `station plc docs` from the register map: do not edit, run it again."
 UNTESTED = "Untested against the vendor's tool."

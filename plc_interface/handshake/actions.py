@@ -1,4 +1,4 @@
-"""What the handshake asks its surroundings to do, in the order given."""
+"""Actions of the handshake on its surroundings, in the order given."""
 
 from dataclasses import dataclass
 
@@ -53,14 +53,14 @@ class AskCommand:
 
 @dataclass(frozen=True, slots=True)
 class TellPublished:
-    """Send `Published` after what was told before; answer with OutcomeNoted or RequestFailed."""
+    """Send `Published` after earlier notes; answer with OutcomeNoted or RequestFailed."""
 
     outcome: Outcome
 
 
 @dataclass(frozen=True, slots=True)
 class TellAcknowledged:
-    """Send `Acknowledged` after what was told before; a failure is answered with RequestFailed."""
+    """Send `Acknowledged` after earlier notes; a failure is answered with RequestFailed."""
 
     sequence: int
 
@@ -74,7 +74,7 @@ class PassOn:
 
 @dataclass(frozen=True, slots=True)
 class ClearFaults:
-    """Have the line's outputs forget their faults."""
+    """Clear the faults of the line's outputs."""
 
 
 @dataclass(frozen=True, slots=True)

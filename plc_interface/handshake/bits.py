@@ -1,4 +1,4 @@
-"""The bits that need no answer of the station: enable, offline, lot latch, clear error, reset counters."""
+"""Bits that need no answer of the station: enable, offline, lot latch, clear error, reset counters."""
 
 from plc_interface.handshake.actions import ClearFaults
 from plc_interface.handshake.modes import Arming, Lot, Service, Signal
@@ -17,7 +17,7 @@ def writer_lost(work: Work) -> None:
 
 
 def count_loss(work: Work) -> None:
-    """Count it."""
+    """Count the loss of communication."""
     work.count("count_communication")
 
 
@@ -27,7 +27,7 @@ def lot_is_good(work: Work) -> bool:
 
 
 def latch(work: Work) -> None:
-    """Take the lot id, start the latch bit's time-out."""
+    """Accept the lot id, start the latch bit's time-out."""
     work.keep(lot=work.state.inputs.lot or "")
     work.start(Signal.LATCH_TIMEOUT, work.settings.handshake_timeout_s)
 
@@ -43,7 +43,7 @@ def bad_lot(work: Work) -> None:
 
 
 def latch_forgotten(work: Work) -> None:
-    """Fault: forgotten latch."""
+    """Fault: latch bit not reset in time."""
     work.fault(Fault.LATCH_FORGOTTEN)
 
 

@@ -1,4 +1,4 @@
-"""docs/plc/handshake.md: the state table as it is, drawn and printed. `python -m plc_interface.handshake.document`."""
+"""docs/plc/handshake.md: the state table, drawn and printed. `python -m plc_interface.handshake.document`."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ END = "<!-- end of table -->\n"
 
 
 def document(around: str) -> str:
-    """The document with the table as it is now.
+    """Return the document with the present table.
 
     Args:
-        around: the document, whose text outside the marks stays.
+        around: the document; its text outside the marks is unchanged.
     """
     before, rest = around.split(BEGIN)
     _, after = rest.split(END)
@@ -23,7 +23,7 @@ def document(around: str) -> str:
 
 
 def tables() -> str:
-    """A heading, a diagram and a table for each region."""
+    """Return a heading, a diagram and a table for each region."""
     return "".join(_region(region, rows) for region, rows in REGIONS.items())
 
 
@@ -34,7 +34,7 @@ def _region(region: type[Mode], rows: tuple[Row, ...]) -> str:
 
 
 def _diagram(rows: tuple[Row, ...]) -> list[str]:
-    """Mermaid, by what changes the mode; the first row's mode is where it starts."""
+    """Return a Mermaid diagram of the mode changes; the first row's mode is the initial one."""
     changes: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         if row.mode is not row.next:
@@ -60,7 +60,7 @@ def _node(mode: Mode) -> str:
 
 
 def _words(docstring: str | None) -> str:
-    """A docstring's sentence as a part of one; capitals as in PLC and `Begin` stay."""
+    """Return a docstring's sentence as a part of one; capitals as in PLC and `Begin` are unchanged."""
     words = (docstring or "").removesuffix(".")
     return words if words[1:2].isupper() else words[:1].lower() + words[1:]
 

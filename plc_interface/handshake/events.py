@@ -1,4 +1,4 @@
-"""What reaches the handshake from outside. Every event carries its time."""
+"""Events that reach the handshake from outside. Every event carries its time."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Moment(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """What the PLC has written, decoded: the control block of the register map."""
+    """The PLC's decoded values: the control block of the register map."""
 
     control: frozenset[str] = frozenset()
     """The names of the control bits that are set."""
@@ -36,7 +36,7 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True)
 class PlcWrote:
-    """The writer wrote into the control block; the registers named hold new values, or the same once more."""
+    """The writer wrote into the control block; the named registers hold new values, or the same again."""
 
     at: Moment
     inputs: Inputs
@@ -52,14 +52,14 @@ class WriterCame:
 
 @dataclass(frozen=True, slots=True)
 class WriterWent:
-    """The client with the right to write closed, died, or gave it back."""
+    """The client with the right to write closed, died, or released it."""
 
     at: Moment
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """Nothing but time."""
+    """Only time has passed."""
 
     at: Moment
 
@@ -74,7 +74,7 @@ class Beat:
 
 @dataclass(frozen=True, slots=True)
 class OutputTold:
-    """Whether the line's output can divert a fruit now."""
+    """The line's output can, or cannot, divert a fruit now."""
 
     at: Moment
     ready: bool
@@ -107,7 +107,7 @@ class OutcomeCame:
 
 @dataclass(frozen=True, slots=True)
 class OutcomeFailed:
-    """`AskOutcome` got no answer, or none that can be used."""
+    """`AskOutcome` got no answer, or an unusable one."""
 
     at: Moment
     sequence: int
@@ -117,14 +117,14 @@ class OutcomeFailed:
 
 @dataclass(frozen=True, slots=True)
 class Leaving:
-    """This process ends: the PLC is told that the station is offline, and nothing is begun any more."""
+    """This process ends: it reports offline to the PLC, and begins nothing any more."""
 
     at: Moment
 
 
 @dataclass(frozen=True, slots=True)
 class RequestFailed:
-    """Another request got no answer, or none that can be used."""
+    """Another request got no answer, or an unusable one."""
 
     at: Moment
     what: str
@@ -142,7 +142,7 @@ class OpenTold:
 
 @dataclass(frozen=True, slots=True)
 class OutcomeNoted:
-    """The station has durably what the PLC was told under this sequence."""
+    """The station has durably stored the outcome published under this sequence."""
 
     at: Moment
     sequence: int

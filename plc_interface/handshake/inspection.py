@@ -1,4 +1,4 @@
-"""The one inspection that can be under way, from the question to the station to the outcome that stands."""
+"""The one inspection that can be in progress, from the request to the station to its final outcome."""
 
 from collections.abc import Callable
 
@@ -41,7 +41,7 @@ def accept(work: Work) -> None:
 
 
 def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
-    """Take an inspection as running, with the interface's own deadline behind the station's."""
+    """Register an inspection as running, with the interface's own deadline behind the station's."""
     state, station = work.state, work.state.station
     within_s = deadline_s + work.settings.result_margin_s
     state.asked = None
@@ -64,7 +64,7 @@ def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
 
 
 def unknown_run(asked: Asked, sequence: int, at: Moment) -> Running:
-    """An inspection of which nothing is known but its sequence and trigger id."""
+    """Make an inspection of which only sequence and trigger id are known."""
     return Running(
         sequence=sequence,
         trigger_id=asked.trigger_id,
@@ -90,7 +90,7 @@ def refuse_as_told(work: Work) -> None:
 
 
 def refuse_asked(work: Work, reason: Refusal) -> None:
-    """Refuse the trigger that the station was asked about."""
+    """Refuse the trigger of the pending `Begin`."""
     asked, work.state.asked = work.state.asked, None
     if asked is not None:
         note_refusal(work, reason, asked.trigger_id)
@@ -98,13 +98,13 @@ def refuse_asked(work: Work, reason: Refusal) -> None:
 
 
 def refuse_used(work: Work) -> None:
-    """Refuse as not ready: the station gave a sequence twice."""
+    """Refuse as not ready: the station used a sequence twice."""
     work.say("the station gave a sequence again, or a lower one: its records were changed; the trigger is refused")
     refuse_asked(work, Refusal.NOT_READY)
 
 
 def disown(work: Work) -> None:
-    """Refuse as station lost; should it have begun, it is never shown."""
+    """Refuse as station lost; if the station began it, its result is never published."""
     asked = work.state.asked
     if asked is not None:
         work.keep(disowned=(*work.state.journal.disowned, asked.trigger_id)[-8:])
@@ -120,14 +120,14 @@ def is_its_outcome(work: Work) -> bool:
 
 
 def end_run(work: Work) -> Running | None:
-    """No inspection is under way any more."""
+    """End the running inspection, and return it."""
     running, work.state.running = work.state.running, None
     work.stop(Signal.RESULT_DEADLINE)
     return running
 
 
 def publish(work: Work) -> None:
-    """The station's outcome stands, `Published`."""
+    """The station's outcome is final, `Published`."""
     end_run(work)
     if work.found is not None:
         queue(work, work.found)
@@ -150,7 +150,7 @@ unsound = _ending("NO_RESULT (internal fault) stands, `Published`.", Reason.INTE
 
 
 def drop(work: Work) -> None:
-    """Drop it; `Published` where another one stands under its sequence."""
+    """Drop it; `Published` if another one is final under its sequence."""
     if work.found is not None:
         tell_if_other(work, work.found)
 

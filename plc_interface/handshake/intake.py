@@ -1,4 +1,4 @@
-"""From what came in to the signals of the table."""
+"""Inputs: conversion of events to the signals of the table."""
 
 from collections.abc import Callable
 from typing import Any
@@ -36,7 +36,7 @@ EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
 
 
 def take_in(work: Work) -> None:
-    """Note the event's data in the state and put its signals in line."""
+    """Store the event's data in the state and queue its signals."""
     _TAKERS[type(work.event)](work, work.event)
 
 
@@ -131,10 +131,10 @@ _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execu
 
 
 def _take_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
-    """Note a size that was written, and let a trigger use it up, accepted or refused.
+    """Store a written size; a trigger uses it up, accepted or refused.
 
-    A register that keeps its value without being written again gives the next fruit none. So a PLC may write the size
-    before the trigger or with it, and one that stops writing it never has a fruit judged by the size of another.
+    A size is valid for one trigger after it was written. So a PLC may write the size before the trigger or with it, and
+    if it stops writing it, no fruit is judged by the size of another.
     """
     written = {name: getattr(event.inputs, name) for name in Size._fields if name in event.written}
     size = work.state.size._replace(**written)
@@ -142,15 +142,15 @@ def _take_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
 
 
 def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
-    """Whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
+    """Return whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
     asked = work.state.asked
     return trigger_id != 0 and trigger_id == (asked.trigger_id if asked else work.state.journal.accepted_id)
 
 
 def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed: bool, left_high: bool) -> None:
-    """An acknowledgement is the shown result's sequence, written or confirmed by the bit; the bit alone is none.
+    """Return whether the shown result's sequence was written, or confirmed by the bit; the bit alone is not enough.
 
-    A PLC that writes the sequence first and raises its bit then waits for result_valid to fall all the same.
+    A PLC that writes the sequence first and sets its bit then waits for result_valid to fall all the same.
     """
     state, sequence = work.state, event.inputs.acknowledged_sequence
     by_bit, written = "acknowledge" in rose, "acknowledged_sequence" in event.written

@@ -1,4 +1,4 @@
-"""What must survive the end of this process, so that the PLC never hears two things of one inspection."""
+"""Journal: state that survives the end of this process, so that the PLC never reads two outcomes of one inspection."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -13,7 +13,7 @@ class _Kept(BaseModel):
 
 
 class Running(_Kept):
-    """The inspection under way."""
+    """The inspection in progress."""
 
     sequence: int = Field(ge=1, lt=2**32)
     trigger_id: int = Field(ge=1, le=65_535)
@@ -32,7 +32,7 @@ class Running(_Kept):
 
 
 class Journal(_Kept):
-    """The kept part of the state."""
+    """The persistent part of the state."""
 
     boots: int = Field(default=0, ge=0, lt=2**16)
     """Starts of the interface."""
@@ -50,13 +50,13 @@ class Journal(_Kept):
     command_result: int = Field(default=0, ge=0, le=65_535)
     """As in the register map."""
     asked_id: int | None = Field(default=None, ge=1, le=65_535)
-    """The id of the trigger that the station is asked to begin."""
+    """The id of the trigger whose `Begin` is pending."""
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence."""
     verdicts: tuple[Outcome, ...] = ()
     """Outcomes that the interface itself gave and that the station has not noted yet."""
     disowned: tuple[int, ...] = ()
-    """Ids of triggers that were refused although the station may have begun them, under sequences after `highest`."""
+    """Ids of refused triggers that the station may have accepted, under sequences after `highest`."""
     hidden: tuple[int, ...] = ()
-    """Sequences of such triggers, once the station told them; never shown."""
+    """Sequences of such triggers, once the station has reported them; never published."""

@@ -1,4 +1,4 @@
-"""The station over the channel: heard, lost, and settled with."""
+"""Link to the station over the channel: its state, its loss, its resynchronisation."""
 
 from plc_interface.handshake.actions import AskOpen
 from plc_interface.handshake.events import Beat
@@ -8,12 +8,12 @@ from plc_interface.handshake.work import Work, row
 
 
 def none_is_asked(work: Work) -> bool:
-    """`Resume` is not under way."""
+    """`Resume` is not pending."""
     return work.state.open_asked is None
 
 
 def hear(work: Work) -> None:
-    """Note the station's state, wait for the next beat."""
+    """Store the station's state, wait for the next beat."""
     if not isinstance(work.event, Beat):
         return
     state, station = work.state, work.event.station
@@ -37,12 +37,12 @@ def ask_open(work: Work) -> None:
 
 
 def forget_question(work: Work) -> None:
-    """Ask anew at the next beat."""
+    """Send `Resume` again at the next beat."""
     work.state.open_asked = None
 
 
 def forget_station(work: Work) -> None:
-    """What the station said is not used any more."""
+    """Clear the station's state."""
     work.state.station = None
     work.state.open_asked = None
     work.say("the station does not answer: triggers are refused until it does")

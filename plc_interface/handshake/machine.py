@@ -1,4 +1,4 @@
-"""One step of the handshake: a state and an event in, the next state and what to do out."""
+"""One step of the handshake: from state and event to the next state and the actions."""
 
 import copy
 
@@ -13,13 +13,13 @@ from station.settings.plc import HandshakeSettings
 
 
 def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[State, tuple[Action, ...]]:
-    """The state after an event, and the actions to carry out in their order.
+    """Return the state after an event, and the actions in their order.
 
-    Timers that ran out before the event come first, then the event. `before` is not changed.
+    Timers that ran out before the event are handled first, then the event. `before` is not changed.
 
     Args:
         before: the state so far.
-        event: what happened, with its time, which never goes back.
+        event: with its time, which never goes back.
         settings: time-outs and deadlines.
     """
     work = Work(copy.copy(before), event.at, event, settings)
@@ -40,7 +40,7 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
 
 
 def next_due_s(state: State) -> float | None:
-    """When the next timer runs out, on the monotonic clock; None where none runs. Step with a `Tick` then."""
+    """Return when the next timer runs out, on the monotonic clock; None if none runs. Step with a `Tick` then."""
     return min(state.timers.values(), default=None)
 
 

@@ -1,10 +1,10 @@
-"""The regions of the handshake, the modes of each, and the signals that move them."""
+"""Regions of the handshake, their modes, and the signals that change these."""
 
 from enum import StrEnum
 
 
 class Link(StrEnum):
-    """The station, as seen over the channel."""
+    """The link to the station over the channel."""
 
     LOST = "lost"
     """It does not answer in time."""
@@ -37,17 +37,17 @@ class Trigger(StrEnum):
     ASKED = "asked"
     """The bit is high, the station has still to accept or refuse."""
     PULSED = "pulsed"
-    """As asked, but the PLC has taken its bit back already."""
+    """As ASKED, but the PLC has reset its bit already."""
     ANSWERED = "answered"
     """Acknowledged; the PLC's bit has to fall."""
     HELD = "held"
-    """Acknowledged after the bit had fallen; shown for the handshake's time-out."""
+    """Acknowledged after the bit had fallen; published for the handshake's time-out."""
     STUCK = "stuck"
     """The PLC forgot its bit; it has to fall before it can rise."""
 
 
 class Inspection(StrEnum):
-    """The one inspection that can be under way."""
+    """The one inspection that can be in progress."""
 
     NONE = "none"
     BEGINNING = "beginning"
@@ -60,7 +60,7 @@ class Result(StrEnum):
     EMPTY = "empty"
     SHOWN = "shown"
     TAKEN = "taken"
-    """Acknowledged; the PLC's bit has to fall before the next result is shown."""
+    """Acknowledged; the PLC's bit has to fall before the next result is published."""
 
 
 class Order(StrEnum):
@@ -83,7 +83,7 @@ Mode = Link | Arming | Service | Trigger | Inspection | Result | Order | Lot
 
 
 class Signal(StrEnum):
-    """What happened, seen from the table."""
+    """Inputs of the table."""
 
     # the PLC's bits and registers
     ENABLE_ON = "enable on"

@@ -12,22 +12,22 @@ _CODES = BY_NAME["command_code"].codes
 
 
 def is_repeated(work: Work) -> bool:
-    """The sequence is the last command's."""
+    """The sequence is that of the last command."""
     return work.state.inputs.command_sequence == work.state.journal.command_sequence
 
 
 def is_done_already(work: Work) -> bool:
-    """The sequence is the last command's, which is done."""
+    """The sequence is that of the last command, which is done."""
     return is_repeated(work) and work.state.journal.command_result == COMMAND_RESULT.code("done")
 
 
 def is_no_command(work: Work) -> bool:
-    """There is no such command."""
+    """The command code is unknown."""
     return work.state.inputs.command_code not in _CODES or work.state.inputs.command_code == 0
 
 
 def station_is_lost(work: Work) -> bool:
-    """The station is not there."""
+    """The station is lost."""
     return work.state.link is not Link.UP
 
 
@@ -51,7 +51,7 @@ def ask(work: Work) -> None:
 
 
 def result(name: str) -> Effect:
-    """An effect: this is how the command went."""
+    """Make an effect that sets the command's result."""
 
     def note(work: Work) -> None:
         work.keep(command_result=COMMAND_RESULT.code(name))
@@ -73,12 +73,12 @@ def end_watch(work: Work) -> None:
 
 
 def forgotten(work: Work) -> None:
-    """Fault: forgotten execute."""
+    """Fault: execute bit not reset in time."""
     work.fault(Fault.EXECUTE_FORGOTTEN)
 
 
 def busy(work: Work) -> None:
-    """Fault: command while another is carried out."""
+    """Fault: command while another one is executed."""
     work.fault(Fault.COMMAND_BUSY)
 
 
@@ -95,7 +95,7 @@ ANSWERS: tuple[tuple[Signal, str, Order], ...] = (
 
 
 def _at_rest(mode: Order) -> tuple[Row, ...]:
-    """The rows of the modes in which nothing is carried out."""
+    """Return the rows of the modes in which no command is executed."""
     on = Signal.EXECUTE_ON
     return (
         row(mode, on, watch, to=DONE, when=is_done_already),

@@ -28,7 +28,7 @@ def show(work: Work) -> None:
 
 
 def take(work: Work) -> None:
-    """Take it from the queue, `Acknowledged`."""
+    """Remove it from the queue, `Acknowledged`."""
     taken, *rest = work.state.queue
     work.state.queue = tuple(rest)
     work.state.unconfirmed = 0 if bit_is_high(work) else taken.sequence
@@ -47,12 +47,12 @@ def end_watch(work: Work) -> None:
 
 
 def unstick(work: Work) -> None:
-    """The bit counts again."""
+    """The bit is evaluated again."""
     work.state.acknowledge_stuck = False
 
 
 def forgotten(work: Work) -> None:
-    """Fault: forgotten acknowledge; the bit does not count until it falls."""
+    """Fault: acknowledge bit not reset in time; the bit is ignored until it falls."""
     work.state.acknowledge_stuck = True
     work.fault(Fault.ACKNOWLEDGE_FORGOTTEN)
 

@@ -1,4 +1,4 @@
-"""After a start or a lost connection: bring together what the station holds open and what the PLC was told."""
+"""Resynchronisation after a start or a lost connection: the station's open inspections against the PLC's."""
 
 from plc_interface.handshake.actions import AskOutcome, TellPublished
 from plc_interface.handshake.events import OpenTold
@@ -23,7 +23,7 @@ RESUMED_DEADLINE_S = 60.0
 
 
 def settle(work: Work) -> None:
-    """Continue with what is the PLC's, call off what is not, tell what stands."""
+    """Continue the PLC's inspections, cancel the others, publish final outcomes."""
     if not isinstance(work.event, OpenTold):
         return
     state, opened = work.state, work.event.opened
@@ -83,14 +83,14 @@ def _settle_running(work: Work, sequence: int, trigger_id: int, *, known: bool) 
 
 
 def _may_be_asked_for(work: Work, sequence: int) -> bool:
-    """Whether it may be the inspection that `Begin` is under way for, whose answer decides."""
+    """Return whether it may be the inspection of the pending `Begin`, whose answer decides."""
     return work.state.asked is not None and sequence > work.state.journal.highest
 
 
 def _is_the_plcs(work: Work, sequence: int, trigger_id: int) -> bool:
-    """Whether an unknown inspection was accepted before this interface's start, and its journal was lost since.
+    """Return whether an unknown inspection was accepted before this start, and its journal was lost since.
 
-    Later on every accepted sequence is known, so that an unknown one was begun for a trigger that was refused.
+    After resynchronisation every accepted sequence is known, so an unknown one belongs to a refused trigger.
     """
     state, journal = work.state, work.state.journal
     return not state.adopted and sequence > journal.highest and trigger_id not in journal.disowned

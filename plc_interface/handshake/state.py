@@ -1,4 +1,4 @@
-"""All that the handshake remembers."""
+"""State of the handshake."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from station.channel.line import Outcome, Refusal, StationState
 
 
 class Fault(StrEnum):
-    """What went wrong on the line, as one sentence with the remedy; latched until clear_error."""
+    """A fault of the line, as one sentence with the remedy; latched until clear_error."""
 
     PLC_SILENT = "the PLC's heartbeat stood still: check the PLC, then give enable anew"
     WRITER_LOST = "the writing PLC's connection was lost: connect, then give enable anew"
@@ -29,7 +29,7 @@ class Fault(StrEnum):
 
 
 class Size(NamedTuple):
-    """The fruit's size as the PLC wrote it, by the registers' names; 0 where it gave none."""
+    """The fruit's size from the PLC, by the registers' names; 0 for none."""
 
     fruit_length_mm_x10: int = 0
     size_class: int = 0
@@ -40,7 +40,7 @@ NO_SIZE = Size()
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A trigger that the station has still to accept."""
+    """A trigger whose acceptance by the station is pending."""
 
     number: int
     trigger_id: int
@@ -60,12 +60,12 @@ COUNTERS = (
     "count_overrun",
     "count_communication",
 )
-"""What the handshake counts, by the names of the register map; all wrap round at 2³²."""
+"""Counters, by the names of the register map; all wrap round at 2³²."""
 
 
 @dataclass(slots=True)
 class State:
-    """The modes of all regions and the data beside them. Only `machine.step` makes one from another."""
+    """The modes of all regions and their data. Only `machine.step` makes one from another."""
 
     link: Link = Link.LOST
     arming: Arming = Arming.DISARMED
@@ -89,7 +89,7 @@ class State:
     unconfirmed: int = 0
     """The sequence taken by its number alone; the bit may still follow."""
     size: Size = NO_SIZE
-    """What the writer wrote since the last trigger: a trigger uses it up, so that no fruit gets the one before's."""
+    """The size written since the last trigger: a trigger uses it up, so that no fruit gets the one before's."""
     acknowledge_stuck: bool = False
     """The PLC forgot its acknowledge bit, which counts as fallen until it is."""
     last_refusal: Refusal | None = None
@@ -104,21 +104,21 @@ class State:
     station_boots: int = 0
     heartbeat: int = 0
     adopted: bool = False
-    """The station has told once, since this interface started, what was open."""
+    """The station has answered `Resume` at least once since this interface started."""
     open_asked: int | None = None
     """The number of `AskOpen` that is not answered."""
 
     # the line
     diverts: bool = True
-    """Whether the line's output can divert a fruit; where it cannot, none is begun."""
+    """Whether the line's output can divert a fruit; if not, no inspection is started."""
 
     # inspections
     asked: Asked | None = None
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
-    """Not acknowledged, in order of sequence; the first is the one shown."""
+    """Not acknowledged, in order of sequence; the first one is published."""
     shown: int = 0
-    """The sequence of the last result shown."""
+    """The sequence of the last published result."""
     toggle: bool = False
 
     # commands
@@ -136,27 +136,27 @@ class State:
     journal: Journal = field(default_factory=Journal)
 
     def mode(self, region: type[Mode]) -> Mode:
-        """The mode of one region."""
+        """Return the mode of one region."""
         return getattr(self, region.__name__.lower())
 
     @property
     def places(self) -> int:
-        """Results that may wait in all."""
+        """Capacity of the result queue."""
         return QUEUE_PLACES if "buffer_results" in self.inputs.control else 1
 
     @property
     def watched(self) -> bool:
-        """The PLC's heartbeat has changed in time."""
+        """True while the PLC's heartbeat changes in time."""
         return Signal.PLC_SILENT in self.timers
 
 
 def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> State:
-    """The state in which the interface starts: disarmed, the station unheard, and what the journal holds.
+    """Return the state at a start: disarmed, no state of the station, and the journal's content.
 
-    A trigger that was not answered yet is refused.
+    A pending trigger is refused.
 
     Args:
-        journal: what the run before kept.
+        journal: of the run before.
         at: now; the counters start at 0.
         station_lost_after_s: how long an inspection that was running waits for the station.
     """

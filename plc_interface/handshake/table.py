@@ -1,4 +1,4 @@
-"""The one state table: every region's rows, and how the row for a pair is found."""
+"""The state table: rows of every region, and the selection of a row."""
 
 from collections import defaultdict
 
@@ -30,11 +30,11 @@ for _region, _rows in REGIONS.items():
 
 
 def apply(work: Work, signal: Signal) -> None:
-    """Let every region that knows the signal go through its row; a pair that is not listed changes nothing.
+    """Apply a signal to every region that has a row for it; a pair without a row changes nothing.
 
     Args:
-        work: the step under way.
-        signal: what happened.
+        work: the step in progress.
+        signal: the input.
     """
     for region in _CONCERNED[signal]:
         mode = work.state.mode(region)

@@ -7,7 +7,7 @@ from station.channel.line import Refusal
 
 
 def obstacle(state: State) -> Refusal | None:
-    """Why no trigger is accepted now, whatever its id; None where the station would be asked."""
+    """Return why no trigger is accepted now, whatever its id; None if the station would be asked."""
     waiting = len(state.queue)
     reasons: tuple[tuple[bool, Refusal], ...] = (
         (state.service is Service.OFFLINE, Refusal.OFFLINE),
@@ -22,9 +22,9 @@ def obstacle(state: State) -> Refusal | None:
 
 
 def refusal(state: State) -> Refusal | None:
-    """Why the trigger with the id now written is refused; None where the station is asked.
+    """Return why the trigger with the present id is refused; None if the station is asked.
 
-    A doubled id is told as such whatever else holds: no other refusal then names an id that was accepted.
+    A repeated id has precedence over all other reasons: no other refusal then names an id that was accepted.
     """
     if state.inputs.trigger_id in {0, state.journal.accepted_id, state.asked.trigger_id if state.asked else 0}:
         return Refusal.BAD_TRIGGER_ID
@@ -32,17 +32,17 @@ def refusal(state: State) -> Refusal | None:
 
 
 def may_be_asked(work: Work) -> bool:
-    """Nothing stands against the trigger."""
+    """Nothing blocks the trigger."""
     return refusal(work.state) is None
 
 
 def begin(work: Work) -> None:
-    """Ask for an inspection."""
+    """Request an inspection."""
     work.signals.append(Signal.BEGIN)
 
 
 def note_refusal(work: Work, reason: Refusal, trigger_id: int) -> None:
-    """Tell a refusal: counted, with its reason and its id."""
+    """Publish and count a refusal, with its reason and its id."""
     state = work.state
     state.last_refusal, state.last_refused_id, state.missed = reason, trigger_id, True
     work.count("count_triggers", "count_missed")
@@ -68,7 +68,7 @@ def end_watch(work: Work) -> None:
 
 
 def forgotten(work: Work) -> None:
-    """Fault: forgotten trigger."""
+    """Fault: trigger bit not reset in time."""
     work.fault(Fault.TRIGGER_FORGOTTEN)
 
 

@@ -1,4 +1,4 @@
-"""Outcomes that the interface itself gives, and how every outcome reaches the PLC."""
+"""Outcomes: those of the interface itself, and publication of every outcome to the PLC."""
 
 from plc_interface.handshake.actions import PassOn, TellAcknowledged, TellPublished
 from plc_interface.handshake.events import Moment
@@ -8,18 +8,18 @@ from plc_interface.handshake.work import Work
 from station.channel.line import Outcome, Reason
 
 KEPT_VERDICTS = 64
-"""So many of the interface's own outcomes are kept for a station that never notes them."""
+"""Maximum number of the interface's own outcomes that a station has not noted."""
 
 _COUNTED = {"PASS": "count_pass", "FAIL": "count_fail", "NO_RESULT": "count_no_result"}
 
 
 def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
-    """NO_RESULT for an inspection whose outcome the station did not give, or not in time.
+    """Make NO_RESULT for an inspection whose outcome the station did not give, or not in time.
 
     Args:
-        running: what is known of the inspection.
-        at: now, its end.
-        reasons: why; LATE makes it late.
+        running: the known data of the inspection.
+        at: the inspection's end.
+        reasons: LATE marks the outcome as late.
     """
     return Outcome(
         sequence=running.sequence,
@@ -46,20 +46,20 @@ def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
 
 
 def in_place_of(outcome: Outcome, reason: Reason) -> Outcome:
-    """NO_RESULT in the place of a station's outcome that must not stand."""
+    """Make NO_RESULT that replaces an unusable outcome of the station."""
     nothing = {"area_mm2": None, "area_px": None, "closing_mm": None, "confidence": None}
     return outcome.model_copy(update={"outcome": "NO_RESULT", "reasons": (reason,), "late": False, **nothing})
 
 
 def is_sound(outcome: Outcome) -> bool:
-    """Whether an outcome says one thing only: PASS without a reason and in time, everything else with a reason."""
+    """Return whether an outcome is consistent: PASS without a reason and in time, all others with a reason."""
     if outcome.outcome == "PASS":
         return not outcome.reasons and not outcome.late
     return bool(outcome.reasons)
 
 
 def queue(work: Work, outcome: Outcome) -> None:
-    """Let an outcome wait for the PLC, and tell everybody. From here on it stands."""
+    """Queue an outcome for the PLC and publish it. From here on it is final."""
     state = work.state
     state.queue = (*state.queue, outcome)
     work.count(_COUNTED[outcome.outcome], *(("count_late",) if outcome.late else ()))
@@ -68,13 +68,13 @@ def queue(work: Work, outcome: Outcome) -> None:
 
 
 def give(work: Work, outcome: Outcome) -> None:
-    """Let the interface's own outcome stand, over a restart too, until the station has noted it."""
+    """Publish the interface's own outcome; it survives a restart, until the station has noted it."""
     work.keep(verdicts=(*work.state.journal.verdicts, outcome)[-KEPT_VERDICTS:])
     queue(work, outcome)
 
 
 def hide(work: Work, outcome: Outcome) -> None:
-    """Settle an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
+    """Close an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
     journal = work.state.journal
     work.say(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
     work.keep(verdicts=(*journal.verdicts, outcome)[-KEPT_VERDICTS:], hidden=(*journal.hidden, outcome.sequence))
@@ -83,7 +83,7 @@ def hide(work: Work, outcome: Outcome) -> None:
 
 
 def pass_over_hidden(work: Work) -> None:
-    """Acknowledge hidden sequences as soon as nothing older waits for the PLC, which cannot do it."""
+    """Acknowledge hidden sequences as soon as nothing older waits for the PLC, which cannot acknowledge these."""
     state = work.state
     waiting = [outcome.sequence for outcome in state.queue] + ([state.running.sequence] if state.running else [])
     oldest = min(waiting, default=2**32)
@@ -95,14 +95,14 @@ def pass_over_hidden(work: Work) -> None:
 
 
 def acknowledge(work: Work, sequence: int) -> None:
-    """Note that everything up to here is done with, and tell the station."""
+    """Record that the PLC has taken everything up to here, and notify the station."""
     acknowledged = max(work.state.journal.acknowledged, sequence)
     work.keep(acknowledged=acknowledged)
     work.actions.append(TellAcknowledged(acknowledged))
 
 
 def tell_if_other(work: Work, theirs: Outcome) -> None:
-    """Tell the station what stands, where it holds another outcome of the same sequence."""
+    """Send the final outcome to the station, if it holds another one of the same sequence."""
     for ours in (*work.state.journal.verdicts, *work.state.queue):
         if ours.sequence == theirs.sequence:
             if ours != theirs:

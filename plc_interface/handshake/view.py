@@ -1,4 +1,4 @@
-"""What the PLC reads in a state: values by the names of the register map. And what the station is told of the line."""
+"""Register values of a state, by the names of the register map; and the line's state for the station."""
 
 import zlib
 from collections.abc import Mapping
@@ -19,22 +19,16 @@ _OUTCOMES, _REFUSALS = BY_NAME["result_outcome"], BY_NAME["last_refusal"]
 
 
 def view(state: State) -> dict[str, Value]:
-    """Every register that the handshake sets: status, result and counters.
+    """Return every register that the handshake sets: status, result and counters.
 
-    What the station said is not shown any more once it is lost.
+    The station's values are cleared once it is lost.
     """
     return {**_status(state), **_result(state), **state.counters, "counters_epoch": state.journal.epoch,
             "counters_reset_utc_ms": state.reset_utc_ms}  # fmt: skip
 
 
 def line(state: State, counters: Mapping[str, int], faults: tuple[str, ...]) -> Line:
-    """What the station is told with every beat.
-
-    Args:
-        state: of the handshake.
-        counters: those of the interface's other parts.
-        faults: the same.
-    """
+    """Return the line's state, sent to the station with every beat."""
     return Line(
         plc_connected=state.writer,
         plc_alive=state.watched,
@@ -108,7 +102,7 @@ def _result(state: State) -> dict[str, Value]:
 
 
 def result_values(outcome: Outcome) -> dict[str, Value]:
-    """The result block for an outcome; areas and closing beyond their registers' bounds are shown at the bound."""
+    """Return the result block of an outcome; areas and closing beyond their registers' bounds are set to the bound."""
     area = outcome.area_mm2
     flags = {
         "pass": outcome.outcome == "PASS",
@@ -168,7 +162,7 @@ _NO_RESULT: dict[str, Value] = {
 
 
 def lot_checksum(lot: str) -> int:
-    """CRC-32 of a lot id in ASCII, 0 for none."""
+    """Return the CRC-32 of a lot id in ASCII, 0 for none."""
     return zlib.crc32(lot.encode("ascii", "replace")) if lot else 0
 
 

@@ -1,4 +1,4 @@
-"""One step under way, and what a row of the table is."""
+"""One step in progress, and the definition of a row of the table."""
 
 from collections import deque
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from station.settings.plc import HandshakeSettings
 
 @dataclass(slots=True)
 class Work:
-    """A state that is being changed, by effects that know the event, its time and the settings."""
+    """A state during a step, for effects, with the event, its time and the settings."""
 
     state: State
     at: Moment
@@ -26,40 +26,40 @@ class Work:
     found: Outcome | None = None
     """The outcome that the signal OUTCOME or FOREIGN_OUTCOME is about."""
     size: Size = NO_SIZE
-    """What was given with the trigger that the signal TRIGGER_ON is about."""
+    """The fruit's size of the trigger of signal TRIGGER_ON."""
 
     def keep(self, **changes: Any) -> None:
-        """Change the journal; it is written before the PLC sees what follows from it."""
+        """Change the journal; it is written before the PLC reads the consequences."""
         self.state.journal = self.state.journal.model_copy(update=changes)
 
     def count(self, *names: str) -> None:
-        """Count; the counters wrap round at 2³²."""
+        """Increment counters; they wrap round at 2³²."""
         counters = dict(self.state.counters)
         for name in names:
             counters[name] = (counters[name] + 1) % 2**32
         self.state.counters = counters
 
     def fault(self, fault: Fault) -> None:
-        """Count a broken handshake, say it and latch it."""
+        """Count, log and latch a handshake fault."""
         self.count("count_communication")
         self.say(fault.value)
         if fault not in self.state.faults:
             self.state.faults = (*self.state.faults, fault)
 
     def say(self, text: str, *, warning: bool = True) -> None:
-        """One line for the log."""
+        """Write one line into the log."""
         self.actions.append(Say(text, warning))
 
     def start(self, timer: Signal, after_s: float) -> None:
-        """Start a timer, or start it anew."""
+        """Start or restart a timer."""
         self.state.timers = {**self.state.timers, timer: self.at.s + after_s}
 
     def stop(self, timer: Signal) -> None:
-        """Stop a timer; nothing where it does not run."""
+        """Stop a timer. Idempotent."""
         self.state.timers = {name: due_s for name, due_s in self.state.timers.items() if name != timer}
 
     def number(self) -> int:
-        """A new number for a request."""
+        """Return a new number for a request."""
         self.state.numbers += 1
         return self.state.numbers
 
@@ -71,7 +71,7 @@ Effect = Callable[[Work], None]
 
 
 class Row(NamedTuple):
-    """In this mode, on this signal and where the guard holds: the effects in their order, then the next mode.
+    """One rule: in this mode, on this signal, if the guard holds: the effects in order, then the next mode.
 
     Of several rows for one pair the first whose guard holds is taken.
     """
@@ -84,5 +84,5 @@ class Row(NamedTuple):
 
 
 def row(mode: Mode, signal: Signal, *effects: Effect, to: Mode | None = None, when: Guard | None = None) -> Row:
-    """A row; without `to` the mode stays."""
+    """Make a row; without `to` the mode is unchanged."""
     return Row(mode, signal, when, effects, mode if to is None else to)

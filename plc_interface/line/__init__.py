@@ -1,1 +1,1 @@
-"""The line's side of the interface: a simulated PLC, for the demonstration and for commissioning a real station."""
+"""PLC simulator, for the demonstration and for commissioning a real station."""

@@ -1,4 +1,4 @@
-"""`station line`: the line's PLC, simulated, against a station in the demonstration or on the floor."""
+"""`station line`: the PLC simulator, against a station in the demonstration or on the floor."""
 
 import asyncio
 import signal
@@ -99,7 +99,7 @@ def line(
     faults: tuple[str, ...],
     fault_every: int,
 ) -> None:  # fmt: skip
-    """Play the line's PLC: trigger, read and acknowledge inspections, and show what became of each fruit.
+    """Simulate the line's PLC: trigger, read and acknowledge inspections, and show the decision on each fruit.
 
     Takes the right to write, so no other PLC may hold it. Exits 0 when all fruits were decided, or when there was no
     number of them; 1 when it was ended before.

@@ -1,4 +1,4 @@
-"""What the line shows while it runs: a table that lives on a terminal, one line a fruit elsewhere."""
+"""Display of the PLC simulator: a live table on a terminal, one line per fruit elsewhere."""
 
 from collections import deque
 from collections.abc import Callable
@@ -24,12 +24,12 @@ Sketch = Callable[[int], str]
 
 
 class LineDisplay:
-    """Shows a line's fruits.
+    """Display of a line's fruit.
 
     Args:
-        console: where it is shown.
-        summary: of the line, as it grows.
-        sketch: draws each result's curve, where the caller can get at it.
+        console: the terminal.
+        summary: of the line, updated while it runs.
+        sketch: draws each result's curve, if the caller can read it.
     """
 
     def __init__(self, console: Console, summary: Summary, sketch: Sketch = lambda _: "") -> None:
@@ -53,8 +53,8 @@ class LineDisplay:
         """Show a decided fruit.
 
         Args:
-            passage: what the line decided.
-            fruit: what it was.
+            passage: the line's decision.
+            fruit: the fruit's true state.
         """
         row = _row(passage, fruit, self._sketch(passage.sequence) if passage.sequence else "")
         self._rows.append((row, _STYLES.get(passage.decision, _OTHERWISE)))
@@ -64,7 +64,7 @@ class LineDisplay:
             self._print(row)
 
     def doing(self, what: str) -> None:
-        """Show what the line is doing, where it changed.
+        """Show the line's activity when it changes.
 
         Args:
             what: one sentence, or the program's stage.
@@ -88,11 +88,7 @@ class LineDisplay:
 
 
 def summary_line(summary: Summary) -> str:
-    """A line's counts in one sentence.
-
-    Args:
-        summary: of the line.
-    """
+    """Return a line's counts in one sentence."""
     counts = ", ".join(f"{count} {decision}" for decision, count in summary.decided.items() if count)
     return (
         f"{summary.fruits} fruits: {counts or 'none decided'}; damaged and passed: {summary.damaged_passed}; "

@@ -1,11 +1,11 @@
-"""What a PLC's program may do wrong, to be played against the station."""
+"""Injected faults of a PLC's program, for tests of the station."""
 
 from collections.abc import Sequence
 from enum import StrEnum
 
 
 class LineFault(StrEnum):
-    """One misbehaviour, played while one fruit is in the nest."""
+    """One misbehaviour, injected while one fruit is in the nest."""
 
     LATE_ACKNOWLEDGE = "late_acknowledge"
     """The result is left waiting for a while."""
@@ -18,7 +18,7 @@ class LineFault(StrEnum):
     SKIPPED_ID = "skipped_id"
     """Ids are left out."""
     FROZEN_HEARTBEAT = "frozen_heartbeat"
-    """The PLC's heartbeat stands still until the station has noticed."""
+    """The PLC's heartbeat stops until the station has noticed."""
     SWAPPED_WORDS = "swapped_words"
     """The sequence is first acknowledged in the other word order."""
     RECONNECT = "reconnect"
@@ -26,10 +26,10 @@ class LineFault(StrEnum):
 
 
 class FaultPlan:
-    """Which fruit gets which fault: one in so many, in turn.
+    """Schedule of faults: every n-th fruit has one, in turn.
 
     Args:
-        faults: what is played, in this order; none at all where empty.
+        faults: in this order; none if empty.
         every: one fruit in so many has a fault.
     """
 
@@ -37,7 +37,7 @@ class FaultPlan:
         self._faults, self._every = tuple(faults), every
 
     def of_fruit(self, number: int) -> LineFault | None:
-        """The fault of a fruit.
+        """Return the fault of a fruit.
 
         Args:
             number: counted from 1.

@@ -1,4 +1,4 @@
-"""Where the fruit lies while it is inspected, and how it gets there."""
+"""Nest: the place of the fruit during its inspection, and the supply of fruit."""
 
 import asyncio
 import json
@@ -12,7 +12,7 @@ from station.errors import StationError
 GRADER_ERROR_MM = 1.0
 """Largest error of a length; an estimate of what an optical sizer resolves on soft fruit, no source found."""
 SEVERITIES = ("severe", "mild", "patch")
-"""How the twin's damaged fruit may be damaged, as its console names it."""
+"""Severities of damage, by the names of the twin's console."""
 _ANSWER_LIMIT_S = 5.0
 _LOOPBACK = "127.0.0.1"
 _SEEDS = 2**31
@@ -20,12 +20,12 @@ _SEEDS = 2**31
 
 @dataclass(frozen=True, slots=True)
 class LaidFruit:
-    """What lies in the nest, as far as it is known."""
+    """The fruit in the nest, as far as it is known."""
 
     kind: str
-    """Empty where nobody knows."""
+    """Empty if it is unknown."""
     damaged: bool | None
-    """The truth, None where nobody knows."""
+    """The truth, None if it is unknown."""
     recipe: int
     """The number of its recipe; 0 for the active one."""
     length_mm_x10: int = 0
@@ -33,7 +33,7 @@ class LaidFruit:
 
 
 class Grader:
-    """The grader upstream: measures the length of every fruit, with an error drawn evenly from its bounds.
+    """Upstream grader: measures the length of every fruit, with an error drawn evenly from its bounds.
 
     Args:
         seed: the same gives the same errors.
@@ -43,7 +43,7 @@ class Grader:
         self._random = random.Random(seed)  # noqa: S311 (a simulation)
 
     def length_mm_x10(self, true_mm: float) -> int:
-        """A fruit's length as it tells the PLC, tenths of a millimetre.
+        """Return the measured length, tenths of a millimetre.
 
         Args:
             true_mm: the fruit's length.
@@ -64,25 +64,25 @@ class Nest(Protocol):
 
 
 class RealNest:
-    """A nest that people or a line fill: nothing is known of its fruit."""
+    """Nest that people or a line fill: nothing is known of its fruit."""
 
     async def arrive(self) -> LaidFruit:
         """Take for granted that a fruit is there."""
         return LaidFruit("", None, 0)
 
     async def leave(self) -> None:
-        """Do nothing: whoever laid the fruit takes it away."""
+        """Do nothing: people or the line take the fruit away."""
 
 
 class TwinNest:
-    """The nest of the simulated world, filled through its console.
+    """Nest of the simulated world, filled through its console.
 
     Args:
         console_port: of the twin, on the loopback.
         recipes: the recipe's number of each kind of fruit, which is drawn from at random.
         damaged_share: of the fruit, from 0 to 1.
         seed: the same gives the same fruits.
-        graded: whether a grader upstream tells their length.
+        graded: whether an upstream grader measures their length.
         severity: of the damage, one of `SEVERITIES`.
     """
 

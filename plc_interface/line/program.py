@@ -1,6 +1,6 @@
-"""The PLC's program, scan by scan: the handshake as docs/plc tells an integrator to write it.
+"""The PLC's program, scan by scan: the handshake as docs/plc describes it for an integrator.
 
-Pure: a scan's inputs and the time go in, the outputs come out, and each fruit's passage is noted when it is decided.
+Pure: a scan's inputs and the time go in, the outputs come out, and each fruit's passage is recorded when it is decided.
 """
 
 import zlib
@@ -19,7 +19,7 @@ Outputs = dict[str, int | str]
 """The control block's registers by name."""
 
 HEARTBEAT_LIMIT_S = 2.0
-"""A station whose heartbeat stands still for longer is lost."""
+"""A station whose heartbeat stops for longer is lost."""
 ANSWER_LIMIT_S = 10.0
 """A trigger or command that is answered later is given up."""
 RESULT_MARGIN_S = 2.0
@@ -34,10 +34,10 @@ _SKIPPED_IDS = 3
 
 
 class Stage(StrEnum):
-    """Where the program is."""
+    """Stage of the program."""
 
     CLAIMING = "claiming"
-    """Not armed: the right to write is asked for, and results of an earlier run are taken away."""
+    """Not armed: the right to write is claimed, and results of an earlier run are acknowledged."""
     WAITING_FOR_FRUIT = "waiting for fruit"
     CHANGING_RECIPE = "changing the recipe"
     TRIGGERING = "triggering"
@@ -47,7 +47,7 @@ class Stage(StrEnum):
 
 
 class Decision(StrEnum):
-    """What the line knows of a fruit."""
+    """The line's decision on a fruit."""
 
     PASS = "PASS"  # noqa: S105 (no password)
     FAIL = "FAIL"
@@ -60,7 +60,7 @@ class Decision(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One fruit's way through the station, as the PLC knows it."""
+    """One fruit's passage through the station, as the PLC records it."""
 
     number: int
     trigger_id: int
@@ -76,17 +76,17 @@ class Passage:
     fruit_length_mm_x10: int
     """The size that the result was found with, as it says itself; 0 for none."""
     fault: LineFault | None
-    """What the PLC itself did wrong meanwhile."""
+    """The PLC's own injected fault, if any."""
 
     @property
     def diverted(self) -> bool:
-        """Whatever is not surely good leaves the line."""
+        """True for every decision but PASS."""
         return self.decision is not Decision.PASS
 
 
 @dataclass(slots=True)
 class Counters:
-    """What the PLC counts, to be compared with the station's own."""
+    """The PLC's counters, for comparison with the station's own."""
 
     decided: dict[Decision, int] = field(default_factory=lambda: dict.fromkeys(Decision, 0))
     stale: int = 0
@@ -113,8 +113,8 @@ class LineProgram:
     """A PLC's program for one station.
 
     Args:
-        plan: the faults to play.
-        lot: latched before the first fruit where it is not empty; at most 32 ASCII characters.
+        plan: the faults to inject.
+        lot: latched before the first fruit if it is not empty; at most 32 ASCII characters.
     """
 
     def __init__(self, plan: FaultPlan | None = None, lot: str = "") -> None:
@@ -137,15 +137,15 @@ class LineProgram:
         self._playing_after: LineFault | None = None
         self._passages: list[Passage] = []
         self.cut_wanted = False
-        """Whether the connection is to be cut now, as a fault to play; reading it does not clear it."""
+        """Whether the connection is to be cut now, as an injected fault; reading it does not clear it."""
 
     @property
     def free(self) -> bool:
-        """Whether the next fruit may enter the nest: the one before is decided, and the jaws are open."""
+        """True if the next fruit may enter the nest: the one before is decided, and the jaws are open."""
         return self.stage is Stage.WAITING_FOR_FRUIT and self._fruit is None and self._jaws_open
 
     def take_passages(self) -> list[Passage]:
-        """The fruits decided since the last call."""
+        """Return the fruits decided since the last call."""
         passages, self._passages = self._passages, []
         return passages
 
@@ -159,12 +159,12 @@ class LineProgram:
         encoder: int = 0,
         fruit_length_mm_x10: int = 0,
     ) -> Outputs:
-        """One scan.
+        """Run one scan.
 
         Args:
-            inputs: status and result block as read in the scan before; None where nothing could be read.
+            inputs: status and result block as read in the scan before; None if the read failed.
             now_s: monotonic.
-            fruit_in_nest: a fruit lies in the nest and has not been decided yet.
+            fruit_in_nest: a fruit is in the nest and not decided yet.
             recipe: the number of the fruit's recipe; 0 to take the active one.
             encoder: the line's count.
             fruit_length_mm_x10: of the fruit in the nest, as a grader upstream measured it; 0 where none did.
@@ -298,7 +298,7 @@ class LineProgram:
         return waits and self.stage is Stage.WAITING_FOR_RESULT and now_s - self._since_s < _FROZEN_S
 
     def _leaves_waiting(self, inputs: Values, now_s: float) -> bool:
-        """Play the late acknowledgement, from when the fruit's own result is first seen."""
+        """Inject the late acknowledgement, after the fruit's own result was first read."""
         fruit = self._fruit
         if fruit is None or fruit.fault is not LineFault.LATE_ACKNOWLEDGE or not self._shows(inputs, fruit):
             return False
@@ -414,7 +414,7 @@ class LineProgram:
 
 
 def _valid(inputs: Values | None, name: str) -> float | None:
-    """A value of the result, None where it says that there is none."""
+    """Return a value of the result; None if the register reports none."""
     if inputs is None or is_invalid(BY_NAME[name], inputs[name]):
         return None
     return float(inputs[name])

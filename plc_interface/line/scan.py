@@ -1,4 +1,4 @@
-"""The scan loop: every few milliseconds one Modbus exchange, as a PLC's Modbus block does it."""
+"""Scan loop: one Modbus exchange every few milliseconds, as a PLC's Modbus block does it."""
 
 import asyncio
 import logging
@@ -13,13 +13,13 @@ from plc_interface.register import Register
 from plc_interface.register_map import CONTROL, GROUP_BY_NAME, RESULT, STATUS
 
 ANSWER_LIMIT_S = 1.0
-logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it has to say is said by `trouble`
+logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # `trouble` holds its errors
 _READ = (*STATUS, *RESULT)
 _FIRST = GROUP_BY_NAME["status"].address
 
 
 class Scanner:
-    """One connection to the station; it is made again where it is lost.
+    """One connection to the station, re-established after a loss.
 
     Args:
         host: of the station.
@@ -34,7 +34,7 @@ class Scanner:
         self._one_round_trip = one_round_trip
         self._client: AsyncModbusTcpClient | None = None
         self.trouble = ""
-        """Why the last exchange failed, in words; empty where it did not."""
+        """Error of the last exchange; empty for none."""
 
     async def __aenter__(self) -> Self:
         return self
@@ -43,7 +43,7 @@ class Scanner:
         self.cut()
 
     def cut(self) -> None:
-        """Close the connection; the next exchange makes another. Idempotent."""
+        """Close the connection; the next exchange opens another. Idempotent."""
         if self._client is not None:
             self._client.close()
             self._client = None
@@ -55,7 +55,7 @@ class Scanner:
             outputs: every register of the control block, by name.
 
         Returns:
-            What was read, by name; None where the exchange failed, see `trouble`.
+            The values read, by name; None if the exchange failed, see `trouble`.
         """
         try:
             try:

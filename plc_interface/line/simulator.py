@@ -1,4 +1,4 @@
-"""The line: fruit arriving at the nest, the PLC's program scanning, and what became of each fruit."""
+"""Line simulation: fruit arriving at the nest, the PLC's program scanning, and the decision on each fruit."""
 
 import asyncio
 import time
@@ -12,7 +12,7 @@ from plc_interface.line.scan import Scanner
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast the line runs."""
+    """Timing of the line."""
 
     scan_s: float = 0.01
     every_s: float = 0.0
@@ -22,7 +22,7 @@ class Pace:
 
 @dataclass(slots=True)
 class Summary:
-    """What the line saw, and where the truth is known, how right it was."""
+    """Counts of the line, and of right decisions where the truth is known."""
 
     decided: dict[Decision, int] = field(default_factory=lambda: dict.fromkeys(Decision, 0))
     damaged_passed: int = 0
@@ -30,15 +30,15 @@ class Summary:
 
     @property
     def fruits(self) -> int:
-        """How many were decided."""
+        """Number of decided fruit."""
         return sum(self.decided.values())
 
     def add(self, passage: Passage, fruit: LaidFruit) -> None:
         """Count one fruit.
 
         Args:
-            passage: what the line decided.
-            fruit: what it was.
+            passage: the line's decision.
+            fruit: the fruit's true state.
         """
         self.decided[passage.decision] += 1
         self.damaged_passed += fruit.damaged is True and not passage.diverted
@@ -46,21 +46,14 @@ class Summary:
 
 
 class LineSimulator:
-    """Runs a line against a station.
-
-    Args:
-        program: the PLC's.
-        scanner: its connection.
-        nest: where the fruit lies.
-        pace: how fast it runs.
-    """
+    """Simulation of a line against a station."""
 
     def __init__(self, program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace) -> None:
         self._program, self._scanner, self._nest, self._pace = program, scanner, nest, pace
         self.on_passage: Callable[[Passage, LaidFruit], None] = lambda _passage, _fruit: None
         """Gets each fruit when it is decided."""
         self.on_scan: Callable[[str], None] = lambda _doing: None
-        """Gets after each scan what the line is doing, or what keeps it from it."""
+        """Receives after each scan the line's activity, or its obstacle."""
         self.summary = Summary()
 
     async def run(self, count: int | None) -> Summary:

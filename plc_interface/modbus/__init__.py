@@ -1,1 +1,1 @@
-"""The line PLC's view of the station over Modbus TCP."""
+"""Modbus TCP server: registers for the line's PLC."""

@@ -40,7 +40,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         """Since when the client does not take its responses."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Ask whether this client may come in, and part from it where not."""
+        """Admit the client, or close the connection."""
         super().connection_made(transport)
         self.heard_s = self._hub.now_s()
         self.peer = self._hub.admit(self, cast("asyncio.Transport", transport))
@@ -48,15 +48,15 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
             self.drop()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The client has gone, or was parted from."""
+        """Handle the end of the connection."""
         super().connection_lost(exc)
         self._end(f"its connection was lost: {exc}" if exc else "it has disconnected")
 
     def drop(self, trouble: Trouble | None = None, why: str = "") -> None:
-        """Part from the client at once.
+        """Close the connection at once.
 
         Args:
-            trouble: what to count it as, if anything.
+            trouble: its counter, if any.
             why: one sentence for the log.
         """
         if self._ended:
@@ -65,14 +65,14 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
             self._hub.note(trouble, self.peer, f"{why}: its connection is closed")
         self._end("")
         transport = cast("asyncio.Transport | None", self.transport)
-        # asked before it is closed: a TLS transport that is closed twice has forgotten its buffer
+        # read before it is closed: a TLS transport that is closed twice has lost its buffer
         stuck = transport is not None and (transport.is_closing() or transport.get_write_buffer_size() > 0)
         self.close()
         if transport is not None and stuck:
             transport.abort()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Where the next bytes go."""
+        """Return the buffer for the next bytes."""
         return self._view[self._filled :]
 
     def buffer_updated(self, nbytes: int) -> None:
@@ -111,7 +111,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
             self.unfinished_since_s = self._hub.now_s()
 
     def eof_received(self) -> None:
-        """The client sends no more: nothing is left to be answered, so the connection closes."""
+        """Close the connection after the client's last byte: no request is left."""
 
     def pause_writing(self) -> None:
         """Read no more requests while the client does not take its responses."""

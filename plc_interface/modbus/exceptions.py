@@ -1,4 +1,4 @@
-"""How a request goes wrong, and under which heading it is counted."""
+"""Failed requests: exception codes, and their counters."""
 
 from enum import IntEnum, StrEnum
 
@@ -17,7 +17,7 @@ class ExceptionCode(IntEnum):
 
 
 class Trouble(StrEnum):
-    """What the server counts and logs, each by itself."""
+    """Counters and log categories of the server."""
 
     MALFORMED_FRAME = "malformed frames"
     ILLEGAL_FUNCTION = "unknown functions"
@@ -50,7 +50,7 @@ class RequestError(Exception):
 
 
 class MalformedFrameError(Exception):
-    """Bytes that are no Modbus TCP: where the next request begins is not known, so the connection has to end."""
+    """Bytes that are no Modbus TCP: the start of the next request is unknown, so the connection has to end."""
 
 
 def illegal_function(why: str) -> RequestError:

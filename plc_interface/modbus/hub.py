@@ -1,4 +1,4 @@
-"""What all connections share: who may come in, who writes, what is counted and logged, and who has to leave."""
+"""Connection manager: admission, the exclusive writer, counters, log, and time-outs of all connections."""
 
 import asyncio
 import logging
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 class Member(Protocol):
-    """What the hub needs of a connection."""
+    """The connection manager's view of a connection."""
 
     peer: Peer | None
     heard_s: float
@@ -31,11 +31,11 @@ class Member(Protocol):
     stalled_since_s: float | None
 
     def drop(self, trouble: Trouble | None = None, why: str = "") -> None:
-        """Part from the client at once."""
+        """Close the connection at once."""
 
 
 class Hub:
-    """Lives on the event loop; nothing in it waits."""
+    """Manages all connections. Belongs to the event loop; nothing in it waits."""
 
     def __init__(self, settings: ModbusSettings, image: RegisterImage, on_write: OnWrite, on_writer: OnWriter) -> None:
         self._settings, self._on_writer = settings, on_writer
@@ -51,15 +51,15 @@ class Hub:
 
     @property
     def connections(self) -> int:
-        """How many clients are connected."""
+        """Number of connected clients."""
         return len(self._members)
 
     def open(self) -> None:
-        """Begin to look for who has to leave."""
+        """Start the checks for connections that have to end."""
         self._sweeping = self._loop.call_later(SWEEP_S, self._sweep)
 
     def close(self) -> None:
-        """Part from everybody. Idempotent."""
+        """Close all connections. Idempotent."""
         if self._sweeping is not None:
             self._sweeping.cancel()
         for member in tuple(self._members.values()):
@@ -67,7 +67,7 @@ class Hub:
         self._log.sum_up(self.now_s(), last=True)
 
     def admit(self, member: Member, transport: asyncio.Transport) -> Peer | None:
-        """Whom the connection is from, or None where it may not come in."""
+        """Return the connection's peer, or None if it is refused."""
         name = transport.get_extra_info("peername")
         if not name:
             return None
@@ -90,11 +90,11 @@ class Hub:
         return peer
 
     def gone(self, peer: Peer | None, why: str) -> None:
-        """Forget a client.
+        """Remove a client.
 
         Args:
-            peer: who it was, or None where it never came in.
-            why: one sentence for the log; empty where the log has it already.
+            peer: the client, or None if it was refused.
+            why: one sentence for the log; empty if the log has it already.
         """
         if peer is None or self._members.pop(peer, None) is None:
             return
@@ -103,7 +103,7 @@ class Hub:
         self.lease.disconnected(peer)
 
     def answer(self, peer: Peer, unit: int, message: bytes) -> bytes:
-        """The response to a request, from its function code on; an exception response where it is a bad one."""
+        """Return the response to a request, from its function code on; an exception response to a bad one."""
         self.statistics.requests += 1
         try:
             return self._responder.respond(peer, unit, message)

@@ -1,4 +1,4 @@
-"""Who made this, as function code 43/14 tells it (MODBUS Application Protocol Specification V1.1b3, section 6.21)."""
+"""Device identification, function code 43/14 (MODBUS Application Protocol Specification V1.1b3, section 6.21)."""
 
 from importlib.metadata import version
 
@@ -22,13 +22,13 @@ OBJECTS = {
 
 
 def identify(message: bytes) -> bytes:
-    """The response to a request for the identification.
+    """Return the response to a request for the identification.
 
     Args:
         message: from the function code on.
 
     Raises:
-        RequestError: 01 for another interface than 14, 02 for an object that there is not, 03 for a malformed one.
+        RequestError: 01 for another interface than 14, 02 for an unknown object, 03 for a malformed one.
     """
     if len(message) < 2 or message[1] != READ_DEVICE_IDENTIFICATION:
         raise illegal_function("of function 43 only 14, the identification, is served")

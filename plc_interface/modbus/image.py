@@ -1,4 +1,4 @@
-"""The registers as they are read, and what a write to them means."""
+"""Register image: the registers' content, and the decoding of writes."""
 
 import struct
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _AT = {register.address: register for register in REGISTERS}
 
 
 def _addresses(*, of: Access | None = None, kind: Kind | None = None) -> bytes:
-    """One byte an address: 1 where a register of this access and kind lies."""
+    """Return one byte per address: 1 for a register of this access and kind."""
     marks = bytearray(_END)
     for register in REGISTERS:
         if of in {None, register.access} and kind in {None, register.kind}:
@@ -34,7 +34,7 @@ class RegisterImage:
     """
 
     def __init__(self, order: WordOrder = WordOrder.HIGH_FIRST) -> None:
-        """Start with zeros and empty texts, but for the reference values and what the map says of itself.
+        """Start with zeros and empty texts, except the reference values and the map's own version.
 
         Args:
             order: of the words of 32- and 64-bit values.
@@ -57,7 +57,7 @@ class RegisterImage:
         """Set registers by name, all at once or none.
 
         Args:
-            values: names of the map and what they take; None for a register's own "there is none".
+            values: by the map's names; None for a register's own "there is none".
 
         Raises:
             KeyError: a name that the map does not have.
@@ -69,14 +69,14 @@ class RegisterImage:
         self._values.update(values)
 
     def value(self, name: str) -> Value:
-        """What a register was last set to; KeyError for a name that the map does not have."""
+        """Return a register's present value; KeyError for a name that the map does not have."""
         return self._values[name]
 
     def registers(self, address: int, count: int) -> bytes:
-        """Registers as they go on the wire, two bytes each.
+        """Return registers as on the wire, two bytes each.
 
         Raises:
-            RequestError: 02 where one of them is not in the map.
+            RequestError: 02 if one of them is not in the map.
         """
         end = address + count
         if end > _END or _MAPPED.find(0, address, end) >= 0:
@@ -84,14 +84,14 @@ class RegisterImage:
         return bytes(self._wire[2 * address : 2 * end])
 
     def bits(self, address: int, count: int) -> bytes:
-        """Flags as they go on the wire: eight a byte, the first in the lowest bit.
+        """Return flags as on the wire: eight a byte, the first in the lowest bit.
 
         Args:
             address: a register's address times 16 + the bit's number.
             count: how many.
 
         Raises:
-            RequestError: 02 where one of them is not in a register of 16 flags.
+            RequestError: 02 if one of them is not in a register of 16 flags.
         """
         first, last = address // 16, (address + count - 1) // 16
         if last >= _END or _FLAGS.find(0, first, last + 1) >= 0:
@@ -101,15 +101,15 @@ class RegisterImage:
         return (every >> address % 16 & (1 << count) - 1).to_bytes((count + 7) // 8, "little")
 
     def written(self, address: int, raw: bytes) -> dict[str, int | float | str]:
-        """The fields that a write to registers means; nothing is changed.
+        """Return the fields of a write to registers; nothing is changed.
 
         Args:
             address: of the first register.
             raw: two bytes a register.
 
         Raises:
-            RequestError: 02 where a register is read-only or not in the map, 03 where a field would be half written
-                or takes no such value.
+            RequestError: 02 if a register is read-only or not in the map, 03 if a field would be half written or does
+                not accept the value.
         """
         words = struct.unpack(f">{len(raw) // 2}H", raw)
         end = address + len(words)
@@ -125,7 +125,7 @@ class RegisterImage:
         return values
 
     def written_bits(self, address: int, count: int, bits: int) -> dict[str, int | float | str]:
-        """The fields that a write to flags means, the other flags as they are; nothing is changed.
+        """Return the fields of a write to flags, the other flags unchanged; nothing is changed.
 
         Args:
             address: a register's address times 16 + the bit's number.
@@ -145,10 +145,10 @@ class RegisterImage:
         return self.written(first, struct.pack(f">{len(changed)}H", *changed))
 
     def word(self, address: int) -> int:
-        """One register's content.
+        """Return one register's content.
 
         Raises:
-            RequestError: 02 where it is not in the map.
+            RequestError: 02 if it is not in the map.
         """
         return int.from_bytes(self.registers(address, 1), "big")
 

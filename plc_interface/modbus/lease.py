@@ -1,4 +1,4 @@
-"""The right to write, which one connection has at a time."""
+"""Exclusive owner of the right to write."""
 
 from collections.abc import Callable
 from enum import StrEnum
@@ -6,12 +6,12 @@ from enum import StrEnum
 from plc_interface.modbus.peer import Peer
 
 SILENCE_S = 1.0
-"""A writer that asked nothing for this time may have lost its connection without our knowing: the same client, come
-back on another connection, takes over. A PLC gives a connection up only after a longer wait for a reply."""
+"""A writer without a request for this time may have lost its connection unnoticed: the same client,
+on another connection, takes over. A PLC gives a connection up only after a longer wait for a reply."""
 
 
 class WriterChange(StrEnum):
-    """Why the right to write changed hands."""
+    """Reason of a change of the exclusive owner."""
 
     CLAIMED = "claimed"
     TAKEN_OVER = "taken over by another connection of the same client"
@@ -21,11 +21,11 @@ class WriterChange(StrEnum):
 
 
 OnWriter = Callable[[Peer | None, WriterChange], None]
-"""Told the writer, or None where there is none any more, and why."""
+"""Called with the writer, or None, and the reason."""
 
 
 class WriterLease:
-    """Gives the right to write to the first that asks, and takes it back when that one is gone."""
+    """Grants the right to write to the first client that claims it, and withdraws it when that one is gone."""
 
     def __init__(self, lease_s: float, on_writer: OnWriter) -> None:
         self._lease_s, self._on_writer = lease_s, on_writer
@@ -35,12 +35,12 @@ class WriterLease:
         """Of the client that wrote last; empty until one did."""
 
     def claim(self, peer: Peer, now_s: float, holder_heard_s: float) -> bool:
-        """Take or renew the right to write; False where another has it.
+        """Claim or renew the right to write; False if another client has it.
 
         Args:
-            peer: who wants to write.
+            peer: the claimant.
             now_s: monotonic time.
-            holder_heard_s: when the present holder last asked anything.
+            holder_heard_s: time of the present owner's last request.
         """
         if self.holder is not peer:
             if self.holder is None:
@@ -55,17 +55,17 @@ class WriterLease:
         return True
 
     def expire(self, now_s: float) -> None:
-        """Take the right back where the holder did not write in time."""
+        """Withdraw the right if the owner did not write in time."""
         if self.holder is not None and now_s > self._expires_s:
             self._free(WriterChange.TIMED_OUT)
 
     def disconnected(self, peer: Peer) -> None:
-        """Take the right back if it was this connection's."""
+        """Withdraw the right if it was this connection's."""
         if self.holder is peer:
             self._free(WriterChange.DISCONNECTED)
 
     def release(self) -> None:
-        """Take the right back, whoever has it."""
+        """Withdraw the right from any owner."""
         if self.holder is not None:
             self._free(WriterChange.RELEASED)
 

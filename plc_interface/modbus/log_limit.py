@@ -1,4 +1,4 @@
-"""A log that a flood cannot fill."""
+"""Rate-limited log: a flood of requests cannot fill it."""
 
 import logging
 from collections import Counter
@@ -9,7 +9,7 @@ BURST = 20
 REFILL_S = 5.0
 """One more line of a kind after this time."""
 SUMMARY_S = 10.0
-"""How often the lines left out are summed up."""
+"""Period of the summary of omitted lines."""
 
 
 @dataclass(slots=True)
@@ -19,7 +19,7 @@ class _Allowance:
 
 
 class LimitedLog:
-    """Writes lines of each kind up to an allowance that refills, and says how many were left out."""
+    """Writes lines of each kind up to an allowance that refills, and reports the number of omitted lines."""
 
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
@@ -28,14 +28,14 @@ class LimitedLog:
         self._summed_up_s = float("-inf")
 
     def write(self, kind: str, now_s: float, level: int, message: str, *arguments: object) -> None:
-        """Write a line, or count it as left out.
+        """Write a line, or count it as omitted.
 
         Args:
-            kind: what is limited together, in the plural, as the summary says it.
+            kind: category with its own limit, in the plural, as the summary prints it.
             now_s: monotonic time.
             level: of `logging`.
             message: with the arguments' places, as `logging` takes it.
-            arguments: what goes there; formatted only where the line is written.
+            arguments: formatted only if the line is written.
         """
         allowance = self._allowances.get(kind)
         if allowance is None:
@@ -49,11 +49,11 @@ class LimitedLog:
         self._log.log(level, message, *arguments)
 
     def sum_up(self, now_s: float, *, last: bool = False) -> None:
-        """Say how many lines were left out, if any and if the last time is long enough ago.
+        """Log the number of omitted lines, if any and if the last summary is long enough ago.
 
         Args:
             now_s: monotonic time.
-            last: say it in any case.
+            last: log it in any case.
         """
         if self._left_out and (last or now_s - self._summed_up_s >= SUMMARY_S):
             counts = ", ".join(f"{count} of {kind}" for kind, count in sorted(self._left_out.items()))

@@ -1,4 +1,4 @@
-"""Where one Modbus TCP message ends and the next begins.
+"""ADU framing of Modbus TCP: the MBAP header.
 
 Source: MODBUS Messaging on TCP/IP Implementation Guide V1.0b, section 3.1.3: transaction, protocol 0, length of what
 follows, unit; then the message itself, at most 253 bytes.
@@ -20,10 +20,10 @@ Frame = tuple[int, int, bytes]
 
 
 def frames(received: bytearray | bytes, size: int) -> Iterator[tuple[Frame, int]]:
-    """Every complete frame, each with the number of bytes up to its end.
+    """Yield every complete ADU, each with the number of bytes up to its end.
 
     Args:
-        received: what came, from the beginning of a frame on.
+        received: the bytes from the beginning of an ADU on.
         size: how many bytes of it are valid.
 
     Raises:
@@ -44,11 +44,11 @@ def frames(received: bytearray | bytes, size: int) -> Iterator[tuple[Frame, int]
 
 
 def framed(transaction: int, unit: int, message: bytes) -> bytes:
-    """A message with its header.
+    """Return a PDU with its header.
 
     Args:
         transaction: of the request, 0 to 65535.
         unit: of the request.
-        message: from the function code on.
+        message: the PDU, from the function code on.
     """
     return _HEADER.pack(transaction, 0, 1 + len(message), unit) + message

@@ -19,8 +19,8 @@ def read_registers(image: RegisterImage, message: bytes) -> bytes:
     """Function codes 3 and 4.
 
     Args:
-        image: what is read.
-        message: from the function code on.
+        image: the registers.
+        message: the PDU, from the function code on.
 
     Raises:
         RequestError: 02 or 03.
@@ -44,12 +44,12 @@ def read_bits(image: RegisterImage, message: bytes) -> bytes:
 
 
 def checked_registers(image: RegisterImage, address: int, count: int) -> bytes:
-    """Registers on the wire, where the count is one that a response can hold; RequestError 02 or 03 elsewhere."""
+    """Return registers on the wire, if a response can hold the count; else RequestError 02 or 03."""
     if not 1 <= count <= MOST_REGISTERS:
         raise illegal_value(f"{count} registers were asked for: ask for 1 to {MOST_REGISTERS}")
     return image.registers(address, count)
 
 
 def refuse_length(message: bytes) -> NoReturn:
-    """Raise for a message that is not as long as its function code and its own counts say."""
+    """Raise for a PDU whose length differs from its function code and its own counts."""
     raise illegal_value(f"a message of {len(message)} bytes is not what function {message[0]} takes")

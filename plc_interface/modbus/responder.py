@@ -1,6 +1,6 @@
-"""From a request to its response: every check, then the handshake, then the registers.
+"""Request handler: from a request to its response, by all checks, the handshake and the registers.
 
-All of it is synchronous: between two requests, and between a request and its response, nothing else runs.
+Synchronous: between two requests, and between a request and its response, nothing else runs.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,7 +13,7 @@ from plc_interface.modbus.peer import Peer
 from plc_interface.register_bits import WRITE_KEY
 
 OnWrite = Callable[[Peer, Mapping[str, int | float | str]], ExceptionCode | None]
-"""Told the writer's whole fields after every check and before they are in the image; may refuse them."""
+"""Called with the writer's whole fields after every check and before they are in the image; may refuse them."""
 
 Claim = Callable[[Peer], bool]
 """Takes or renews the right to write; False where another client has it."""
@@ -30,7 +30,7 @@ _KEY = "write_key"
 
 
 class Responder:
-    """Answers messages of one unit."""
+    """Handles the requests to one unit."""
 
     def __init__(
         self, unit: int, image: RegisterImage, on_write: OnWrite, claim: Claim, release: Callable[[], None]
@@ -38,11 +38,11 @@ class Responder:
         """Answer from an image.
 
         Args:
-            unit: the only unit identifier that there is.
-            image: what is read, and written after `on_write` agreed.
+            unit: the only valid unit identifier.
+            image: read, and written after `on_write` agreed.
             on_write: see `OnWrite`.
             claim: see `Claim`.
-            release: called after the writer has given the key back.
+            release: called after the writer has released the right to write.
         """
         self._unit, self._image = unit, image
         self._on_write, self._claim, self._release = on_write, claim, release
@@ -55,12 +55,12 @@ class Responder:
         }
 
     def respond(self, peer: Peer, unit: int, message: bytes) -> bytes:
-        """The response, from its function code on.
+        """Return the response, from its function code on.
 
         Args:
-            peer: who asks.
-            unit: whom it asks.
-            message: what, from the function code on; at least that one byte.
+            peer: the client.
+            unit: the addressed unit identifier.
+            message: the PDU, from the function code on; at least that one byte.
 
         Raises:
             RequestError: the request is answered with an exception.

@@ -31,13 +31,13 @@ class ModbusServerError(StationError):
 
 
 class Listener(ModbusTcpServer):
-    """Takes connections on one port."""
+    """Accepts connections on one port."""
 
     def __init__(self, hub: Hub, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None) -> None:
         self._hub = hub
         if context is not None:
             self.tls_setup = CommParams(comm_name="modbus over TLS", comm_type=CommType.TLS, sslctx=context)
-        nothing = SimDevice(0, [SimData(0, datatype=DataType.REGISTERS)])  # the image is asked instead
+        nothing = SimDevice(0, [SimData(0, datatype=DataType.REGISTERS)])  # the image is read instead
         super().__init__(nothing, framer=FramerType.SOCKET, address=(host, port))
         times = {"ssl_handshake_timeout": handshake_s, "ssl_shutdown_timeout": handshake_s} if context else {}
         self._listen = partial(
@@ -45,12 +45,12 @@ class Listener(ModbusTcpServer):
         )
 
     async def open(self) -> None:
-        """Listen; OSError where it cannot."""
+        """Listen; OSError if it cannot."""
         self.is_listener = True
-        self.transport = await self._listen()  # type: ignore[assignment]  # pymodbus keeps its listener there too
+        self.transport = await self._listen()  # type: ignore[assignment]  # pymodbus stores its listener there too
 
     def _connection(self) -> Connection:
-        """One that pymodbus does not register: it would keep those that fail in the TLS handshake for ever."""
+        """Make a connection that pymodbus does not register: it would retain those that fail in the TLS handshake."""
         return Connection(self, self._hub)
 
 
@@ -61,11 +61,11 @@ class ModbusServer:
         """Nothing is served before `start`. Made, started and stopped on one event loop.
 
         Args:
-            settings: where, for whom and with which limits.
-            image: what is read and written; commit to it on this event loop alone.
-            on_write: called with whole fields, after every check and before they are in the image; may refuse them
-                with an exception code. It runs between request and response and must not wait.
-            on_writer: called where the right to write is taken or lost.
+            settings: addresses, clients and limits.
+            image: the registers; commit to it on this event loop alone.
+            on_write: called with whole fields, after every check and before they are in the image; may refuse them with
+                an exception code. It runs between request and response and must not wait.
+            on_writer: called when the right to write is granted or withdrawn.
         """
         self._settings = settings
         self._hub = Hub(settings, image, on_write, on_writer)
@@ -73,17 +73,17 @@ class ModbusServer:
 
     @property
     def statistics(self) -> Statistics:
-        """What was counted since the server was made."""
+        """Counters since the server was made."""
         return self._hub.statistics
 
     @property
     def connections(self) -> int:
-        """How many clients are connected."""
+        """Number of connected clients."""
         return self._hub.connections
 
     @property
     def writer(self) -> Peer | None:
-        """Who has the right to write, if anybody."""
+        """The client with the right to write, if any."""
         return self._hub.lease.holder
 
     async def start(self) -> None:
@@ -122,14 +122,7 @@ class ModbusServer:
 
 
 def why_not(section: str, host: str, port: int, error: OSError) -> str:
-    """What keeps a port from being served, and what to do.
-
-    Args:
-        section: of the settings that name the port.
-        host: where it should be served.
-        port: the same.
-        error: of the attempt to listen.
-    """
+    """Describe why a port cannot be served, and what to do."""
     place = f"Modbus TCP cannot be served on {host}, port {port}"
     if error.errno == errno.EADDRINUSE:
         return f"{place}: another program listens there: stop it (ss -ltnp names it), or set {section}.port"

@@ -1,4 +1,4 @@
-"""What the server counts, since it was made."""
+"""Counters of the server, since it was made."""
 
 from collections import Counter
 
@@ -10,7 +10,7 @@ class Statistics:
 
     def __init__(self) -> None:
         self.requests = 0
-        """Complete frames, whatever their answer was."""
+        """Complete ADUs, with any answer."""
         self.connections = 0
         """Connections that were taken."""
         self.troubles: Counter[Trouble] = Counter()

@@ -1,4 +1,4 @@
-"""TLS for Modbus: our certificate, the clients' authority, and what a client's certificate lets it do.
+"""TLS for Modbus: our certificate, the clients' authority, and a client's rights from its certificate.
 
 Source: Modbus/TCP Security Protocol Specification v2.1: mutual TLS, and the role in the extension
 1.3.6.1.4.1.50316.802.1, an ASN.1 UTF8String. TLS 1.2, which the specification allows, is refused.
@@ -20,7 +20,7 @@ _LONGEST_ROLE = 127
 
 
 class Right(Enum):
-    """What a client may do."""
+    """Rights of a client."""
 
     NONE = "none"
     READ = "reader"
@@ -32,14 +32,14 @@ class TlsError(StationError):
 
 
 def server_context(settings: ModbusTlsSettings) -> ssl.SSLContext:
-    """What a TLS server needs: TLS 1.3 with client certificates.
+    """Make a TLS server context: TLS 1.3 with client certificates.
 
     Args:
         settings: with the three files named.
 
     Raises:
-        TlsError: a file that is missing, unreadable or no PEM, a key that is not the certificate's, a certificate
-            that is not valid now.
+        TlsError: a file that is missing, unreadable or no PEM, a key that is not the certificate's, a certificate that
+            is not valid now.
     """
     paths = (settings.certificate, settings.key, settings.client_authority)
     names = ("certificate", "key", "client_authority")
@@ -68,7 +68,7 @@ def server_context(settings: ModbusTlsSettings) -> ssl.SSLContext:
 
 
 def identity_of(connection: ssl.SSLObject | None) -> tuple[str, Right]:
-    """The subject of a client's certificate and what its role lets it do; without TLS no name and the right to write.
+    """Return a client certificate's subject and its role's right; without TLS no name and the right to write.
 
     Args:
         connection: of a finished handshake, or None without TLS.
@@ -84,7 +84,7 @@ def identity_of(connection: ssl.SSLObject | None) -> tuple[str, Right]:
 
 
 def _right_of(certificate: x509.Certificate) -> Right:
-    """By the role; one that is missing, malformed or unknown lets a client do nothing."""
+    """Return the right by the role; none for a role that is missing, malformed or unknown."""
     try:
         extension = certificate.extensions.get_extension_for_oid(ROLE_EXTENSION).value
     except (x509.ExtensionNotFound, x509.DuplicateExtension, ValueError):
@@ -121,5 +121,5 @@ def _valid_now(path: Path) -> None:
 
 
 def _no_passphrase() -> str:
-    """Instead of OpenSSL's question on the terminal, which nobody would answer."""
+    """Replace OpenSSL's prompt on the terminal, which blocks without a user."""
     raise TlsError("the key has a passphrase")

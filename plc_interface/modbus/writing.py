@@ -1,4 +1,4 @@
-"""Function codes that write: 5, 6, 15, 16, 22, 23, as what they mean and what answers them.
+"""Function codes that write: 5, 6, 15, 16, 22, 23, as field values and responses.
 
 Source: MODBUS Application Protocol Specification V1.1b3, sections 6.5, 6.6, 6.11, 6.12, 6.16, 6.17.
 """
@@ -18,7 +18,7 @@ _COIL = {0x0000: 0, 0xFF00: 1}
 
 
 class Write(NamedTuple):
-    """A write that was checked, and not carried out yet."""
+    """A checked write, not carried out yet."""
 
     values: dict[str, int | float | str]
     """By the names of whole fields."""
@@ -69,7 +69,7 @@ def mask_write_register(image: RegisterImage, message: bytes) -> Write:
 
 
 def read_write_registers(image: RegisterImage, message: bytes) -> Write:
-    """Function code 23: what is read is as it stands after the write."""
+    """Function code 23: the read follows the write."""
     _, read_address, read_count, write_address, write_count = _unpack(">BHHHH", message[:9])
     raw = _registers(message, 9, write_count, MOST_REGISTERS_BESIDE_A_READ)
     checked_registers(image, read_address, read_count)
@@ -93,7 +93,7 @@ def _registers(message: bytes, at: int, count: int, most: int) -> bytes:
 
 
 def _counted(message: bytes, at: int, size: int) -> bytes:
-    """The data behind its own count of bytes, which has to be the one that the message says."""
+    """Return the data behind its own count of bytes, which has to match the PDU."""
     if len(message) != at + 1 + size or message[at] != size:
         refuse_length(message)
     return message[at + 1 :]

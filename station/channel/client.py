@@ -1,4 +1,4 @@
-"""The asking side of a channel."""
+"""Client of a channel."""
 
 import asyncio
 import itertools
@@ -24,14 +24,14 @@ RECONNECT_MS = 10
 
 
 class ChannelClient:
-    """Asks one server; many requests may be under way at once. Belongs to the event loop that it was made in."""
+    """Client of one server; many requests may be pending at once. Belongs to the event loop that it was made in."""
 
     def __init__(self, endpoint: str, peer: str) -> None:
-        """Begin to connect; a server that is not there yet is waited for by each request within its deadline.
+        """Start connecting; until a server is there each request waits for it within its deadline.
 
         Args:
             endpoint: `ipc://PATH` or `tcp://127.…:PORT`.
-            peer: what messages call the other side, such as `the arm's process`.
+            peer: name of the server in messages, such as `the arm's process`.
 
         Raises:
             BadInputError: the endpoint is not a local one.
@@ -54,16 +54,16 @@ class ChannelClient:
         await self.close()
 
     async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
-        """Send a request and wait for its reply.
+        """Send a request and return its reply.
 
         Args:
-            request: what to ask; a server that finds it older than the deadline does not begin it.
-            reply: the type that the answer must have.
+            request: a server that receives it later than the deadline ignores it.
+            reply: the type of the answer.
             deadline_s: how long to wait in all.
 
         Raises:
             DeadlineError: no answer came in time.
-            RefusedError: the peer refused or failed; its words are the message.
+            RefusedError: the server refused or failed; the message is the server's.
             ChannelError: the answer is not of the reply's type.
         """
         number = next(self._numbers)
@@ -92,7 +92,7 @@ class ChannelClient:
             ) from error
 
     async def close(self) -> None:
-        """Let the socket go; requests that are under way end with a ChannelError. Closing twice does nothing."""
+        """Close the socket; pending requests end with a ChannelError. Idempotent."""
         self._receiving.cancel()
         await asyncio.gather(self._receiving, return_exceptions=True)
         self._socket.close(linger=0)

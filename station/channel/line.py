@@ -1,8 +1,8 @@
-"""What the PLC interface asks the station. The interface is the client; the station answers.
+"""Messages from the PLC interface, which is the client, to the station, which answers.
 
 The life of one trigger: `Begin` (durable when it is answered, so that an accepted trigger survives a crash of either
-side) → `AwaitOutcome` → the PLC sees it → `Published` → the PLC acknowledges → `Acknowledged`. After a restart of
-either side `Resume` tells the interface what was begun and not yet acknowledged.
+side) → `AwaitOutcome` → the PLC reads it → `Published` → the PLC acknowledges → `Acknowledged`. After a restart of
+either side `Resume` returns the inspections that are accepted and not yet acknowledged.
 """
 
 from enum import StrEnum
@@ -15,7 +15,7 @@ from station.vocabulary import OutcomeName, PackmlState, Reason, Refusal
 
 
 class CommandName(StrEnum):
-    """What the PLC may order. The order is the codes' order in the register map, from 1."""
+    """Commands of the PLC, in the order of the codes in the register map, from 1."""
 
     CHANGE_RECIPE = "change_recipe"
     """Argument: the recipe's PLC number. Takes effect between fruits."""
@@ -33,7 +33,7 @@ class Outcome(Message):
     """The one outcome of an accepted trigger."""
 
     sequence: int = Field(ge=1, lt=2**32)
-    """The inspection's number, given at `Begun`; never given twice, also over restarts and new databases."""
+    """The inspection's number, from `Begun`; never used twice, also over restarts and new databases."""
     trigger_id: int = Field(ge=1, le=65_535)
     outcome: OutcomeName
     reasons: tuple[Reason, ...]
@@ -47,7 +47,7 @@ class Outcome(Message):
     """The contact area that decided, or at the last closing with a result; None where nothing valid was measured."""
     area_px: int | None = Field(ge=0)
     closing_mm: float | None = Field(allow_inf_nan=False)
-    """Where that area was measured."""
+    """Closing at which that area was measured."""
     confidence: float | None = Field(ge=0, le=1)
     recipe_number: int = Field(ge=0, le=65_535)
     recipe_checksum: int = Field(ge=0, lt=2**32)
@@ -79,7 +79,7 @@ class Begin(Message):
 
 
 class Begun(Message):
-    """The trigger is accepted, or refused and nothing was begun."""
+    """The trigger is accepted, or it is refused and nothing was started."""
 
     sequence: int | None = Field(default=None, ge=1, lt=2**32)
     """None where refused."""
@@ -89,14 +89,14 @@ class Begun(Message):
 
 
 class AwaitOutcome(Message):
-    """Wait for the outcome of a begun inspection."""
+    """Wait for the outcome of an accepted inspection."""
 
     asked: ClassVar[str] = "for an inspection's outcome"
     sequence: int = Field(ge=1, lt=2**32)
 
 
 class Published(Message):
-    """The PLC can read this outcome now. It stands, also against another one that the station holds."""
+    """The PLC can read this outcome now. It is final, also against another one that the station holds."""
 
     asked: ClassVar[str] = "to note what the PLC was told"
     outcome: Outcome
@@ -110,13 +110,13 @@ class Acknowledged(Message):
 
 
 class Resume(Message):
-    """Ask what is open, after a start or a lost connection."""
+    """Query the open inspections, after a start or a lost connection."""
 
     asked: ClassVar[str] = "what is open"
 
 
 class Open(Message):
-    """What was begun and not acknowledged."""
+    """Inspections that are accepted and not acknowledged."""
 
     running: tuple[int, int] | None
     """Sequence and trigger id of the inspection under way."""
@@ -125,7 +125,7 @@ class Open(Message):
 
 
 class RegisterTold(Message):
-    """One register of the PLC's by its name, for a person."""
+    """One register of the PLC's by its name, as text."""
 
     name: str
     address: int
@@ -138,7 +138,7 @@ class RegisterTold(Message):
 
 
 class Line(Message):
-    """The line as the interface sees it, told with every beat, for the station's alarms, metrics and pages."""
+    """State of the line at the interface, sent with every beat, for the station's alarms, metrics and pages."""
 
     asked: ClassVar[str] = "for the station's state"
     plc_connected: bool
@@ -152,7 +152,7 @@ class Line(Message):
     faults: tuple[str, ...]
     """Of the interface and the CAN node, one sentence each."""
     registers: tuple[RegisterTold, ...] = ()
-    """In the order of their addresses; only where the station asked for them, once."""
+    """In the order of their addresses; only if requested by the station, once."""
 
 
 PACKML_STATE_NUMBERS = {state: number for number, state in enumerate(PackmlState, start=1)}
@@ -186,7 +186,7 @@ class StationState(Message):
 
 
 class Command(Message):
-    """Carry out an order of the PLC; answered when it is done."""
+    """Execute a command of the PLC; answered when it is done."""
 
     asked: ClassVar[str] = "to carry out a command"
     command: CommandName
@@ -194,7 +194,7 @@ class Command(Message):
 
 
 class CommandDone(Message):
-    """How it went."""
+    """Result of a command."""
 
     done: bool
     why: str
@@ -202,4 +202,4 @@ class CommandDone(Message):
 
 
 class Noted(Message):
-    """The station has it, durably."""
+    """The station has stored it durably."""

@@ -1,4 +1,4 @@
-"""What goes over a channel, and what can go wrong with it."""
+"""Base of all messages on a channel, and the channel's errors."""
 
 import struct
 from typing import ClassVar
@@ -18,11 +18,11 @@ class Message(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     asked: ClassVar[str] = ""
-    """The request in an operator's words, to go on after "when asked"; empty for the class name."""
+    """The request as an operator reads it, continuing "when asked"; empty for the class name."""
 
 
 class ChannelError(StationError):
-    """A request that was not answered as it had to be."""
+    """A request without a valid answer."""
 
 
 class DeadlineError(ChannelError):
@@ -30,11 +30,11 @@ class DeadlineError(ChannelError):
 
 
 class RefusedError(ChannelError):
-    """The peer answered that it did not carry the request out."""
+    """The server answered that it did not carry the request out."""
 
 
 def check_endpoint(endpoint: str) -> str:
-    """Let only addresses pass that cannot be reached from another machine.
+    """Refuse an address that another machine can reach.
 
     Raises:
         BadInputError: the endpoint is neither `ipc://PATH` nor `tcp://127.…:PORT`.

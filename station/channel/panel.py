@@ -1,4 +1,4 @@
-"""What a person at the cell asks the station, beside what the line's PLC does."""
+"""Requests of a person at the cell: recovery and alarms."""
 
 from typing import ClassVar, Literal
 
@@ -10,16 +10,16 @@ RecoveryName = Literal["protective-stop", "power", "program"]
 
 
 class Actor(Message):
-    """Who asks, as the pages have made sure of it; for the audit trail."""
+    """Author of a request, authenticated by the pages; for the audit trail."""
 
     who: str = Field(min_length=1, max_length=64)
     role: str = Field(min_length=1, max_length=64)
 
 
 class Recover(Message):
-    """Bring the arm back after a stop: a person has looked at the cell. Answered with `CommandDone`.
+    """Recover the arm after a stop, when a person has inspected the cell. Answered with `CommandDone`.
 
-    It makes the arm able to move, and moves nothing; the station goes on only after a reset.
+    It enables the arm, and moves nothing; the station continues only after a reset.
     """
 
     asked: ClassVar[str] = "to bring the arm back"
@@ -27,13 +27,13 @@ class Recover(Message):
 
 
 class ListAlarms(Message):
-    """Ask which alarms are not in their normal state. Answered with `AlarmList`."""
+    """Query the alarms that are not in their normal state. Answered with `AlarmList`."""
 
     asked: ClassVar[str] = "for its alarms"
 
 
 class ListedAlarm(Message):
-    """One alarm, with what docs/alarms.md says of it. Times are UTC, ms since 1970."""
+    """One alarm, with its text in docs/alarms.md. Times are UTC, ms since 1970."""
 
     alarm: str
     """Its id, as `disk_low`."""
@@ -44,24 +44,24 @@ class ListedAlarm(Message):
     active: bool
     """Its cause is there, or it is latched, and it is not shelved."""
     latched: bool
-    """It stands until a person has reset it, and is never shelved."""
+    """Active until a person has reset it, and never shelved."""
     detail: str
-    """What was seen when it was last raised."""
+    """The observation when it was last raised."""
     since_utc_ms: int = Field(ge=0)
     raised: int = Field(ge=0)
-    """How often; more than once for one that comes and goes."""
+    """Number of activations; more than one for a chattering alarm."""
     cause: str
     consequence: str
     action: str
     document: str
-    """Where it is explained, as `docs/alarms.md#disk-low`."""
+    """Its document, as `docs/alarms.md#disk-low`."""
     shelved_until_utc_ms: int | None
     shelved_by: str
     """Empty where it is not shelved."""
 
 
 class AlarmList(Message):
-    """Most urgent first; those that are shelved are among them."""
+    """Alarms, most urgent first; shelved ones are included."""
 
     alarms: tuple[ListedAlarm, ...]
     longest_shelved_s: float
@@ -69,7 +69,7 @@ class AlarmList(Message):
 
 
 class OfAlarm(Message):
-    """What a person does with one alarm; answered with `CommandDone`, and told to the audit trail."""
+    """Action of a person on one alarm; answered with `CommandDone`, and written to the audit trail."""
 
     alarm: str = Field(max_length=64)
     """Its id."""
@@ -80,22 +80,22 @@ class OfAlarm(Message):
 
 
 class AcknowledgeAlarm(OfAlarm):
-    """A person has seen it. Idempotent."""
+    """Acknowledge an alarm. Idempotent."""
 
     asked: ClassVar[str] = "to acknowledge an alarm"
 
 
 class ShelveAlarm(OfAlarm):
-    """Hide it for a time, from the list and from the PLC; refused for a latched one and for one that is shelved."""
+    """Shelve an alarm, in the list and for the PLC; refused for a latched one and for one that is shelved."""
 
     asked: ClassVar[str] = "to shelve an alarm"
     reason: str = Field(max_length=1000)
-    """Why; never empty."""
+    """The reason; never empty."""
     for_s: float = Field(gt=0, allow_inf_nan=False)
-    """How long, `AlarmList.longest_shelved_s` at most."""
+    """Duration, `AlarmList.longest_shelved_s` at most."""
 
 
 class UnshelveAlarm(OfAlarm):
-    """Show it again before its time is over. Idempotent."""
+    """Unshelve an alarm before its time is over. Idempotent."""
 
     asked: ClassVar[str] = "to show a shelved alarm again"

@@ -1,6 +1,6 @@
-"""What the HMI's pages show of the running station, and what a person orders there.
+"""Messages of the operators' pages on the running station: its state, its latest fruit, operator commands.
 
-Every order says who gives it and in what role, for the audit trail.
+Every command names its author and role, for the audit trail.
 """
 
 from enum import StrEnum
@@ -17,12 +17,12 @@ LONGEST_LOT = 32
 
 
 class OrderName(StrEnum):
-    """What a person at the panel may order."""
+    """Operator commands."""
 
     CHOOSE_RECIPE = "choose_recipe"
     """Argument: the recipe's PLC number. Takes effect between fruits."""
     START = "start"
-    """Make a stopped station ready, and confirm that the cell is safe where a stop stands: the PLC's reset."""
+    """Make a stopped station ready, and confirm that the cell is safe if a stop is latched: the PLC's reset."""
     STOP = "stop"
     """Take no more triggers; the fruit under way becomes NO_RESULT unless its images are all taken."""
     CALL_OFF = "call_off"
@@ -34,14 +34,14 @@ class OrderName(StrEnum):
     START_LOT = "start_lot"
     """Argument: its name, for fruit of which the PLC names no lot."""
     END_LOT = "end_lot"
-    """What comes next belongs to another lot, and gets the recipe that is then in force."""
+    """The next fruit belongs to another lot, and gets the recipe that is then in force."""
 
 
 class PanelOrder(Message):
-    """Carry out an order of a person's. Answered with `OrderShown`.
+    """Execute an operator command. Answered with `OrderShown`.
 
-    That is its end where it comes at once, else its state so far; `PanelState` goes on telling it. Not idempotent,
-    except that an order that is under way already is not begun twice.
+    The answer holds the result, or for a command in progress its state so far; `PanelState` reports the rest. Not
+    idempotent, except that a command in progress is not started twice.
     """
 
     asked: ClassVar[str] = "to carry out an order"
@@ -53,7 +53,7 @@ class PanelOrder(Message):
 
 
 class OrderShown(Message):
-    """An order, on its way or ended."""
+    """An operator command, in progress or ended."""
 
     ticket: int
     """Rises by one with each order of this start of the station."""
@@ -61,14 +61,14 @@ class OrderShown(Message):
     argument: str
     state: Literal["executing", "done", "failed"]
     why: str
-    """Why it failed; else empty."""
+    """The error; else empty."""
     who: str
     began_utc_ms: int
     ended_utc_ms: int | None
 
 
 class PersonNoted(Message):
-    """Something happened with a person's right to be here; the trail is to have it. Answered with `line.Noted`."""
+    """An event of a person's log-in or rights, for the audit trail. Answered with `line.Noted`."""
 
     asked: ClassVar[str] = "to note who is at the panel"
     person: Actor
@@ -79,13 +79,13 @@ class PersonNoted(Message):
 
 
 class AskPanel(Message):
-    """What an operator sees at a glance. Answered with `PanelState`."""
+    """Query the operator's summary. Answered with `PanelState`."""
 
     asked: ClassVar[str] = "for its state"
 
 
 class RecipeNamed(Message):
-    """A recipe by its names."""
+    """Names of a recipe."""
 
     number: int
     name: str
@@ -94,14 +94,14 @@ class RecipeNamed(Message):
 
 
 class RecipeShown(RecipeNamed):
-    """A recipe that is in force."""
+    """Summary of a recipe in force."""
 
     values: str
     """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
 
 
 class DeviceShown(Message):
-    """How a device does."""
+    """State of a device."""
 
     name: str
     fault: str
@@ -128,7 +128,7 @@ class FruitShort(Message):
 
 
 class Counts(Message):
-    """How many fruit ended how."""
+    """Numbers of fruit by outcome."""
 
     passed: int = 0
     failed: int = 0
@@ -136,7 +136,7 @@ class Counts(Message):
 
 
 class PanelState(Message):
-    """What an operator sees at a glance."""
+    """The operator's summary of the station."""
 
     boot: str
     """Another one after each start of the station."""
@@ -144,7 +144,7 @@ class PanelState(Message):
     state: str
     """As `station.inspection.states.State` has it."""
     sentence: str
-    """What is going on, in English."""
+    """The present activity, in English."""
     packml_state: PackmlState | None
     mode: int
     ready: bool
@@ -155,7 +155,7 @@ class PanelState(Message):
     needs_person: bool
     """Nothing but a person's confirmation leads on."""
     stopping: bool
-    """A person has told the station to stop: it takes no trigger until it is started."""
+    """Stopped by a person: it accepts no trigger until it is started."""
     simulated: bool
     recipe: RecipeNamed | None
     lot: str | None
@@ -167,16 +167,16 @@ class PanelState(Message):
     plc_alive: bool
     line_trouble: str
     check_due: str
-    """Why the check with the ball comes before any fruit, where it is demanded; empty where it does not."""
+    """Why the check with the ball is required before any fruit; empty if it is not."""
     alarms: tuple[ListedAlarm, ...]
     """Those that are not normal, most urgent first; those that are shelved are among them."""
     devices: tuple[DeviceShown, ...]
     orders: tuple[OrderShown, ...]
     """The last ones, newest first."""
     may: tuple[OrderName, ...]
-    """What would be begun now."""
+    """Commands that would be accepted now."""
     recoveries: tuple[RecoveryName, ...]
-    """What stands to be recovered from."""
+    """Latched stops to recover from."""
     last_sequence: int | None
     """Of the last fruit with an outcome."""
     lot_counts: Counts
@@ -185,7 +185,7 @@ class PanelState(Message):
 
 
 class AskRecent(Message):
-    """The last fruit. Answered with `Recent`."""
+    """Query the latest fruit. Answered with `Recent`."""
 
     asked: ClassVar[str] = "for the last fruit"
     most: int = Field(default=20, ge=1, le=200)
@@ -198,7 +198,7 @@ class Recent(Message):
 
 
 class AskFruit(Message):
-    """One of the last fruit in full. Answered with `Fruit`; refused where it is not among the last any more."""
+    """Query one of the latest fruit in full. Answered with `Fruit`; refused if it is not among the latest any more."""
 
     asked: ClassVar[str] = "for a fruit"
     sequence: int = Field(ge=1, lt=2**32)
@@ -241,7 +241,7 @@ class Fruit(Message):
 
 
 class AskPicture(Message):
-    """A fruit's picture. Answered with `Picture`; refused where there is none any more."""
+    """Query a fruit's picture. Answered with `Picture`; refused if it is not stored any more."""
 
     asked: ClassVar[str] = "for a picture"
     sequence: int = Field(ge=1, lt=2**32)
@@ -259,23 +259,23 @@ class Picture(Message):
 
 
 class AskRecipes(Message):
-    """The recipes that can be chosen. Answered with `Recipes`."""
+    """Query the recipes to select from. Answered with `Recipes`."""
 
     asked: ClassVar[str] = "for the recipes"
 
 
 class Recipes(Message):
-    """The recipes in force, by their number."""
+    """Recipes in force, by their number."""
 
     recipes: tuple[RecipeShown, ...]
     active: RecipeShown | None
-    """What the next fruit is inspected with; of a lot under way it may be an older revision."""
+    """The recipe of the next fruit; during a lot it may be an older revision."""
     problems: tuple[str, ...]
     """Of the recipes' files."""
 
 
 class AskAlarmHistory(Message):
-    """What alarms did lately. Answered with `AlarmHistory`."""
+    """Query recent changes of alarms. Answered with `AlarmHistory`."""
 
     asked: ClassVar[str] = "for the alarms' history"
     most: int = Field(default=100, ge=1, le=1000)

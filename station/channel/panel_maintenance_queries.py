@@ -1,4 +1,4 @@
-"""What the maintenance page asks: health, jogging, the live image, calibration, the PLC's registers, the log."""
+"""Messages of the maintenance page: health, jogging, live image, calibration, PLC registers, log."""
 
 from typing import Annotated, ClassVar, Literal
 
@@ -16,13 +16,13 @@ Serial = Annotated[str, Field(max_length=64)]
 
 
 class GetHealth(Message):
-    """How everything does, with ages."""
+    """Query the state of every part, with ages."""
 
     asked: ClassVar[str] = "for the station's health"
 
 
 class PartHealth(Message):
-    """One thing that inspecting needs."""
+    """State of one part that an inspection needs."""
 
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
@@ -33,7 +33,7 @@ class PartHealth(Message):
 
 
 class Health(Message):
-    """How everything does."""
+    """State of every part."""
 
     ready: bool
     why: str
@@ -42,7 +42,7 @@ class Health(Message):
     state: str
     """In words."""
     jog_refused: str
-    """Why nothing may be jogged now, with what to do; empty where it may."""
+    """Why jogging is refused now, with what to do; empty if it is allowed."""
     parts: tuple[PartHealth, ...]
     devices: dict[str, str]
     versions: dict[str, str]
@@ -61,12 +61,12 @@ class JogGripper(Message):
     asked: ClassVar[str] = "to jog the gripper"
     to: Literal["open", "width", "stop"]
     width_mm: float | None = Field(default=None, ge=0.0, le=85.0, allow_inf_nan=False)
-    """Where `to` is `width`."""
+    """For `to` = `width`."""
     actor: Actor
 
 
 class Jogged(Message):
-    """Where the fingers are."""
+    """Position of the fingers."""
 
     width_mm: float
     object_state: str
@@ -84,11 +84,11 @@ class SetLeds(Message):
 
 
 class Lit(Message):
-    """The camera has taken it."""
+    """The camera has accepted the light setting."""
 
 
 class GetLiveImage(Message):
-    """The sensor's newest image."""
+    """Query the sensor's newest image."""
 
     asked: ClassVar[str] = "for a live image"
     contact: bool = False
@@ -98,7 +98,7 @@ class GetLiveImage(Message):
 
 
 class LiveImage(Message):
-    """An image with its time and what is in it."""
+    """An image with its time and contact."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
     picture: Picture
@@ -116,11 +116,11 @@ class LiveImage(Message):
     area_mm2: float | None
     flags: tuple[str, ...]
     contact: str
-    """Why no contact was measured; empty where it was, or was not asked for."""
+    """Why no contact was measured; empty if it was, or was not requested."""
 
 
 class GetCalibration(Message):
-    """The sensor's calibration and its last verification."""
+    """Query the sensor's calibration and its last verification."""
 
     asked: ClassVar[str] = "for the calibration"
 
@@ -150,7 +150,7 @@ class CalibrationTold(Message):
 
 
 class RunStep(Message):
-    """What a run at the ball has said."""
+    """One step reported by a calibration run."""
 
     number: int
     of: int
@@ -159,25 +159,25 @@ class RunStep(Message):
 
 
 class BallRunTold(Message):
-    """A calibration or verification that runs, or the last one."""
+    """A calibration or verification, in progress or the last one."""
 
     kind: Literal["calibration", "verification"]
     state: Literal["running", "waiting", "passed", "failed", "ended"]
     """`waiting` for the person to lay the ball."""
     request: str
-    """What the person is to do; empty where nothing."""
+    """The person's next action; empty for none."""
     steps: tuple[RunStep, ...]
     """The last of each title."""
     told: str
-    """What came of it."""
+    """The result."""
 
 
 class CalibrationState(Message):
-    """How the sensor stands."""
+    """State of the sensor's calibration."""
 
     serial: str
     in_use: str
-    """The scale in words."""
+    """The scale as text."""
     calibration: CalibrationTold | None
     verification: CalibrationTold | None
     age_s: float | None
@@ -188,11 +188,11 @@ class CalibrationState(Message):
     ball_mm: float
     run: BallRunTold | None
     run_refused: str
-    """Why none may begin now."""
+    """Why no run can start now."""
 
 
 class GetCalibrationPicture(Message):
-    """A plot of a calibration or verification. Answered with `Picture`."""
+    """Query a plot of a calibration or verification. Answered with `Picture`."""
 
     asked: ClassVar[str] = "for a calibration's plot"
     kind: Literal["calibration", "verification"]
@@ -205,40 +205,40 @@ class BeginBallRun(Message):
     asked: ClassVar[str] = "to begin at the ball"
     kind: Literal["calibration", "verification"]
     places: tuple[tuple[float, float], ...] = Field(default=(), max_length=6)
-    """Further places of the ball, mm beside its first; each is asked for when its turn comes."""
+    """Further places of the ball, mm beside its first; the run requests each in turn."""
     actor: Actor
 
 
 class GoOnBallRun(Message):
-    """The ball lies where it was asked for. Answered with `BallRunTold`."""
+    """Confirm that the ball is in place. Answered with `BallRunTold`."""
 
     asked: ClassVar[str] = "to go on at the ball"
     actor: Actor
 
 
 class EndBallRun(Message):
-    """Call the run off; the jaws open. Idempotent; answered with `BallRunTold`."""
+    """Cancel the run; the jaws open. Idempotent; answered with `BallRunTold`."""
 
     asked: ClassVar[str] = "to call the run off"
     actor: Actor
 
 
 class GetRegisters(Message):
-    """The PLC's registers as the PLC interface has them; asked of it with its next beat."""
+    """Query the PLC's registers; the PLC interface sends them with its next beat."""
 
     asked: ClassVar[str] = "for the PLC's registers"
 
 
 class Registers(Message):
-    """All of the map, in the order of their addresses."""
+    """All registers of the map, in the order of their addresses."""
 
     registers: tuple[RegisterTold, ...]
     age_s: float | None
-    """Since the PLC interface told them; None where it has not yet."""
+    """Since the PLC interface sent them; None if it has not yet."""
 
 
 class ReadLog(Message):
-    """The last lines of the log."""
+    """Read the last lines of the log."""
 
     asked: ClassVar[str] = "for the log"
     limit: int = Field(default=100, ge=1, le=MOST_LINES)
@@ -256,6 +256,6 @@ class LogLine(Message):
 
 
 class Log(Message):
-    """Newest last; of the station's process since its start."""
+    """Lines since the start of the station's process, newest last."""
 
     lines: tuple[LogLine, ...]

@@ -1,7 +1,7 @@
-"""What the operators' pages ask of the past: inspections, pictures, lots, the audit trail, and files made of them.
+"""Queries of the operators' pages on the records: inspections, pictures, lots, audit trail, exports.
 
-Every answer is bounded: lists come a page at a time, files piece by piece. What takes long is a job: it is begun,
-looked at, and its files are then read.
+Every answer is bounded: lists come a page at a time, files piece by piece. A long operation is a job: it is started,
+polled, and its files are then read.
 """
 
 from typing import Annotated, Any, ClassVar, Literal
@@ -25,7 +25,7 @@ UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
 
 
 class Search(Message):
-    """What is looked for among the inspections: all that is given has to hold."""
+    """Conditions on inspections: all given ones have to be met."""
 
     lot: Annotated[str, Field(max_length=32)] | None = None
     grower: Text | None = None
@@ -38,7 +38,7 @@ class Search(Message):
 
 
 class FindInspections(Message):
-    """One page of what a search finds, newest first."""
+    """Query one page of a search's results, newest first."""
 
     asked: ClassVar[str] = "for inspections"
     search: Search = Search()
@@ -64,15 +64,15 @@ class InspectionRow(Message):
 
 
 class InspectionPage(Message):
-    """What was found."""
+    """One page of a search's results."""
 
     rows: tuple[InspectionRow, ...]
     below: int | None
-    """What to ask with for the next page; None where this is the last."""
+    """The cursor of the next page; None for the last one."""
 
 
 class GetInspection(Message):
-    """All that is known of one inspection."""
+    """Query all data of one inspection."""
 
     asked: ClassVar[str] = "for an inspection"
     sequence: Sequence
@@ -89,22 +89,22 @@ class CurvePointTold(Message):
     confidence: float | None
     flags: tuple[str, ...]
     changed_area_mm2: float | None = None
-    """How much of the image has changed; None in older records, and where the method does not say."""
+    """Changed fraction of the image; None in older records, and for a method without it."""
     changed_area_px: int | None = None
 
 
 class ImageTold(Message):
-    """An image that was kept."""
+    """A stored image."""
 
     kind: Literal["reference", "step", "mask"]
     step: int | None
     sha256: str
     there: bool
-    """Whether its file still is."""
+    """Whether its file still exists."""
 
 
 class InspectionTold(Message):
-    """All that is known of one inspection."""
+    """All data of one inspection."""
 
     sequence: int
     trigger_id: int
@@ -113,10 +113,10 @@ class InspectionTold(Message):
     began_utc_ms: int
     simulated: bool
     standing: Outcome | None
-    """What the PLC was told, or is to be told; None while it runs."""
+    """The published outcome, or the one to be published; None while it runs."""
     judged: OutcomeName | None
     reasons: tuple[tuple[str, str], ...]
-    """Of what stands: its name, and a sentence."""
+    """Of the final outcome: name and sentence."""
     explanation: tuple[str, ...]
     curve: tuple[CurvePointTold, ...]
     recipe_name: str
@@ -138,7 +138,7 @@ class InspectionTold(Message):
 
 
 class GetImage(Message):
-    """A stored image's file."""
+    """Query a stored image's file."""
 
     asked: ClassVar[str] = "for an image"
     sha256: Sha256
@@ -153,7 +153,7 @@ class Picture(Message):
 
 
 class GetStages(Message):
-    """What the measurement made of one step's image, stage by stage, by the inspection's own recipe."""
+    """Query the measurement of one step's image, stage by stage, by the inspection's own recipe."""
 
     asked: ClassVar[str] = "for a step's stages"
     sequence: Sequence
@@ -169,7 +169,7 @@ class Stages(Message):
 
 
 class ListLots(Message):
-    """The last lots that were told of, or one of them."""
+    """Query the latest lots, or one of them."""
 
     asked: ClassVar[str] = "for the lots"
     limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
@@ -193,7 +193,7 @@ class Lots(Message):
 
 
 class StartLot(Message):
-    """Tell of a lot's begin. Idempotent; answered with `LotTold`."""
+    """Begin a lot. Idempotent; answered with `LotTold`."""
 
     asked: ClassVar[str] = "to begin a lot"
     name: str = Field(min_length=1, max_length=32)
@@ -202,7 +202,7 @@ class StartLot(Message):
 
 
 class EndLot(Message):
-    """Tell of a lot's end. Idempotent; answered with `LotTold`."""
+    """End a lot. Idempotent; answered with `LotTold`."""
 
     asked: ClassVar[str] = "to end a lot"
     name: str = Field(min_length=1, max_length=32)
@@ -210,7 +210,7 @@ class EndLot(Message):
 
 
 class ReadAudit(Message):
-    """The last rows of the audit trail."""
+    """Query the latest rows of the audit trail."""
 
     asked: ClassVar[str] = "for the audit trail"
     limit: int = Field(default=50, ge=1, le=LARGEST_PAGE)
@@ -221,7 +221,7 @@ class ReadAudit(Message):
 
 
 class AuditRowTold(Message):
-    """One row of the trail; `old` and `new` are JSON, shortened where they are long."""
+    """One row of the audit trail; `old` and `new` are JSON, shortened where they are long."""
 
     seq: int
     utc_ms: int
@@ -241,7 +241,7 @@ class AuditRows(Message):
 
 
 class StartExport(Message):
-    """Write what a search finds as a table, as a job."""
+    """Export a search's results as a table, as a job."""
 
     asked: ClassVar[str] = "to export inspections"
     search: Search
@@ -259,14 +259,14 @@ class StartLotReport(Message):
 
 
 class AskJob(Message):
-    """How a job does."""
+    """Query the state of a job."""
 
     asked: ClassVar[str] = "for a job"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
 
 
 class EndJob(Message):
-    """Call a job off. Idempotent; answered with `JobTold`."""
+    """Cancel a job. Idempotent; answered with `JobTold`."""
 
     asked: ClassVar[str] = "to call a job off"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
@@ -281,7 +281,7 @@ class JobFile(Message):
 
 
 class JobTold(Message):
-    """How a job does."""
+    """State of a job."""
 
     job: str
     kind: Literal["export", "lot_report", "whatif"]
@@ -290,7 +290,7 @@ class JobTold(Message):
     of: int
     """0 where it is not known."""
     told: str
-    """What it says of itself: its last words where it failed."""
+    """Its message: its last output if it failed."""
     files: tuple[JobFile, ...]
     """Once it is done."""
 

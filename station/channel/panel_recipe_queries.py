@@ -1,4 +1,4 @@
-"""What the operators' pages ask about recipes: how they stand, what changed, and a person's changes to them."""
+"""Messages of the recipes page: state, differences, and a person's changes."""
 
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -18,13 +18,13 @@ Scalar = bool | int | float | str | None
 
 
 class ListRecipes(Message):
-    """How all recipes stand."""
+    """Query the state of all recipes."""
 
     asked: ClassVar[str] = "for the recipes"
 
 
 class RecipeRow(Message):
-    """How one recipe stands."""
+    """State of one recipe."""
 
     name: str
     title: str
@@ -33,7 +33,7 @@ class RecipeRow(Message):
     in_force: int | None
     """The approved revision; None where there is none."""
     file_state: Literal["approved", "draft", "broken", "missing"]
-    """What its file is beside that."""
+    """Its file, compared with that revision."""
     sha256: str
     """Of the file's values, to base a change on; empty where the file is broken or missing."""
     waiting: int | None
@@ -41,7 +41,7 @@ class RecipeRow(Message):
     waiting_author: str
     waiting_reason: str
     note: str
-    """What a person has to know or do."""
+    """Information, or an action for a person."""
 
 
 class Recipes(Message):
@@ -49,17 +49,17 @@ class Recipes(Message):
 
     rows: tuple[RecipeRow, ...]
     problems: tuple[str, ...]
-    """What is wrong with files of the folder."""
+    """Problems of the folder's files."""
     editable: bool
-    """Whether they lie in a folder of the site's; those shipped are the software's own."""
+    """Whether the folder is the site's; the shipped one belongs to the software."""
     folder: str
-    """Where they lie."""
+    """Their folder."""
     own_folder: str
-    """Where a site's own may lie."""
+    """A possible folder for a site's own."""
 
 
 class GetRecipe(Message):
-    """One recipe's file, or one of its revisions."""
+    """Query one recipe's file, or one of its revisions."""
 
     asked: ClassVar[str] = "for a recipe"
     name: Name
@@ -68,7 +68,7 @@ class GetRecipe(Message):
 
 
 class RecipeTold(Message):
-    """A recipe's text and what it says."""
+    """A recipe's text and values."""
 
     row: RecipeRow
     text: str
@@ -76,7 +76,7 @@ class RecipeTold(Message):
 
 
 class GetRecipeHistory(Message):
-    """A recipe's revisions, the newest first."""
+    """Query a recipe's revisions, the newest first."""
 
     asked: ClassVar[str] = "for a recipe's history"
     name: Name
@@ -85,7 +85,7 @@ class GetRecipeHistory(Message):
 
 
 class Change(Message):
-    """One value that differs; both as JSON has them."""
+    """One value that differs; both as JSON."""
 
     path: str
     old: str
@@ -93,7 +93,7 @@ class Change(Message):
 
 
 class RevisionTold(Message):
-    """One revision, with what changed against the one before it."""
+    """One revision, with the differences from the one before it."""
 
     revision: int
     status: Literal["draft", "approved", "retired"]
@@ -119,7 +119,7 @@ class RecipeHistory(Message):
 
 
 class CompareRecipe(Message):
-    """Every value that differs between two forms of a recipe."""
+    """Query every value that differs between two forms of a recipe."""
 
     asked: ClassVar[str] = "for a recipe's differences"
     name: Name
@@ -136,9 +136,9 @@ class Changes(Message):
 
 
 class SaveDraft(Message):
-    """Change values in a recipe's file, its comments kept, and record it as a draft. Answered with `RecipeRow`.
+    """Change values in a recipe's file, with its comments, and record it as a draft. Answered with `RecipeRow`.
 
-    Refused as a whole where the recipe would be bad, or somebody changed it since it was looked at.
+    Refused as a whole if the recipe would be invalid, or has changed since the author read it.
     """
 
     asked: ClassVar[str] = "to save a draft"
@@ -146,7 +146,7 @@ class SaveDraft(Message):
     values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
     """New values by their dotted paths, as `damage.area[0].area_mm2`."""
     base: str = Field(pattern=r"^[0-9a-f]{64}$")
-    """What was looked at."""
+    """The version that the author read."""
     reason: Why
     actor: Actor
 
@@ -192,7 +192,7 @@ class RevertRecipe(Message):
 
 
 class ExportRecipe(Message):
-    """A recipe's file with a first line that names what it is. Answered with `RecipeText`."""
+    """Query a recipe's file with a first line that names it. Answered with `RecipeText`."""
 
     asked: ClassVar[str] = "to export a recipe"
     name: Name
@@ -206,18 +206,18 @@ class RecipeText(Message):
 
 
 class ImportRecipe(Message):
-    """Put a whole recipe in the place of its file. Answered with `RecipeRow`."""
+    """Replace a recipe's file by a whole recipe. Answered with `RecipeRow`."""
 
     asked: ClassVar[str] = "to import a recipe"
     text: str = Field(min_length=1, max_length=LARGEST_TEXT)
     base: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
-    """What it is based on; empty for what the text names."""
+    """The base revision; empty for the one that the text names."""
     reason: Why
     actor: Actor
 
 
 class GetPastCurves(Message):
-    """The last judged curves of a recipe's fruit, to see limits against."""
+    """Query the latest judged curves of a recipe's fruit, for comparison with limits."""
 
     asked: ClassVar[str] = "for past curves"
     name: Name

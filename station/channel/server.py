@@ -1,4 +1,4 @@
-"""The answering side of a channel."""
+"""Server of a channel."""
 
 import asyncio
 import logging
@@ -21,15 +21,15 @@ log = logging.getLogger(__name__)
 
 
 class ChannelServer:
-    """Answers any number of clients, each request in a task of its own."""
+    """Server for any number of clients; each request has a task of its own."""
 
     def __init__(self, endpoint: str, handlers: Handlers) -> None:
         """Bind the endpoint.
 
         Args:
             endpoint: `ipc://PATH` or `tcp://127.…:PORT`.
-            handlers: what answers each type of request. A handler's `StationError` is the refusal that the client
-                reads; any other exception is logged and told as a failure.
+            handlers: the function for each type of request. A handler's `StationError` is the refusal that the client
+                receives; any other exception is logged and sent as a failure.
 
         Raises:
             BadInputError: the endpoint is not a local one.
@@ -48,7 +48,7 @@ class ChannelServer:
             raise
 
     async def serve(self) -> None:
-        """Answer until cancelled; requests that are under way are then cancelled too."""
+        """Answer until cancelled; pending requests are then cancelled too."""
         try:
             while True:
                 frames = await self._socket.recv_multipart()

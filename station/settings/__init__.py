@@ -1,1 +1,1 @@
-"""What people write in YAML: the station's configuration and the recipes, checked at the door."""
+"""Settings models: the station's configuration and the recipes in YAML, validated when they are read."""

@@ -1,4 +1,4 @@
-"""The ball, what a calibration is good for, and what a verification tolerates."""
+"""Calibration settings: the ball, the range of a calibration, the tolerances of a verification."""
 
 from station.settings.model import Settings, setting
 

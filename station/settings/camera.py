@@ -1,4 +1,4 @@
-"""Which camera a station has, and where it is."""
+"""Camera settings."""
 
 from typing import Literal
 
@@ -26,7 +26,7 @@ class DigitSettings(Settings):
 
 
 class ReplaySettings(Settings):
-    """Recorded frames in the place of a sensor."""
+    """Recorded frames that replace a sensor."""
 
     source: str = setting(
         ".",

@@ -1,4 +1,4 @@
-"""The line's CAN: the bus, its two nodes, and how long anything may stay silent."""
+"""CAN settings: the bus, its two nodes, and their time-outs."""
 
 import ipaddress
 import re
@@ -10,7 +10,7 @@ from pydantic import model_validator
 from station.settings.model import Settings, setting
 
 EDS_FOLDER = Path(__file__).parent / "eds"
-"""The nodes' electronic data sheets: what the station and whoever builds a node have both been told."""
+"""The nodes' electronic data sheets, common to the station and to the builder of a node."""
 GATE_EDS = EDS_FOLDER / "reject_gate.eds"
 ENCODER_EDS = EDS_FOLDER / "line_encoder.eds"
 

@@ -1,7 +1,7 @@
-"""Who speaks to whom: the station's zones and conduits, as IEC 62443-3-2 names them, from its configuration.
+"""Zones and conduits of the station (IEC 62443-3-2), from its configuration.
 
-A zone is a group of machines that trust each other alike; a conduit is one way of speaking between two zones, and what
-is no conduit is closed.
+A zone is a group of machines with the same trust; a conduit is one connection between two zones. Everything else is
+closed.
 """
 
 from enum import StrEnum
@@ -18,7 +18,7 @@ ARM_PORTS = {
 
 
 class Zone(StrEnum):
-    """A group of machines that trust each other alike, and how far they are from a hand that may be crushed."""
+    """A group of machines with the same trust, and its distance from a hand that may be crushed."""
 
     CELL = "cell"
     LINE = "line"
@@ -39,30 +39,26 @@ MEANING = {
 
 
 class Conduit(NamedTuple):
-    """One way of speaking, opened from one side."""
+    """One connection between zones, opened from one side."""
 
     source: Zone
     target: Zone
     protocol: str
     host: str
-    """What is listened on, where the station is the target; else whom the station calls."""
+    """The listening address, if the station is the target; else the called host."""
     port: int
     setting: str
-    """What sets the port, or the host where the port is fixed."""
+    """The setting of the port, or of the host if the port is fixed."""
     carries: str
     protected: str
     """By what its content is, beyond the network."""
     peers: tuple[str, ...] = ()
-    """Who alone may open it, as far as a setting says so; empty where the firewall alone decides."""
+    """The only permitted clients, if a setting restricts them; empty if the firewall alone decides."""
     enabled: bool = True
 
 
 def conduits(site: Configuration) -> tuple[Conduit, ...]:
-    """All of them, with those that this configuration leaves closed.
-
-    Args:
-        site: the configuration.
-    """
+    """Return all conduits, including those that this configuration closes."""
     return (*_listened(site), *_called(site))
 
 

@@ -33,7 +33,7 @@ FILE_NAME = "station.yaml"
 
 
 class MetricsSettings(Settings):
-    """Where Prometheus and supervisors reach the station."""
+    """Addresses of the metrics and health checks, for Prometheus and supervisors."""
 
     host: Host = setting(
         "127.0.0.1",
@@ -51,7 +51,7 @@ class MetricsSettings(Settings):
 
 
 class Configuration(Settings):
-    """What a site sets once: folders, addresses and devices. A recipe holds what changes with the fruit."""
+    """Settings of a site: folders, addresses and devices. A recipe holds what changes with the fruit."""
 
     home: Folder = setting(
         Path("state"),
@@ -96,7 +96,7 @@ class Configuration(Settings):
 
     @model_validator(mode="after")
     def _addresses_differ(self) -> Self:
-        """Two servers cannot share one address."""
+        """Refuse one address for two servers."""
         servers: dict[Where, tuple[str, int]] = {
             (name,): (getattr(self, name).host, getattr(self, name).port) for name in ("modbus", "hmi", "metrics")
         }
@@ -147,7 +147,7 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
 
 
 def _file(file: Path | None, environ: Mapping[str, str]) -> Path | None:
-    """The configuration file to read, or None for none."""
+    """Return the configuration file to read, or None for none."""
     if file is not None:
         return file
     if CONFIG_VARIABLE in environ:
@@ -159,7 +159,7 @@ def _file(file: Path | None, environ: Mapping[str, str]) -> Path | None:
 
 
 def _with(values: Any, path: Where, value: Any) -> Any:
-    """Plain values with one more set; a section that is no mapping stays, to be refused as it stands."""
+    """Return plain values with one more; a section that is no mapping is left, to be refused as it is."""
     if not path:
         return value
     if not isinstance(values, dict):
@@ -168,7 +168,7 @@ def _with(values: Any, path: Where, value: Any) -> Any:
 
 
 def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folder: Path) -> Any:
-    """Plain values with every path absolute: the file's from its folder, all others from the working folder."""
+    """Return plain values with every path absolute: the file's from its folder, others from the working folder."""
     root = schema_of(Configuration)
     for leaf in leaves(root):
         if all(branch.get("format") != "path" for branch in branches(leaf.node, root)):
@@ -181,7 +181,7 @@ def _anchored(values: Any, document: Document, given: Mapping[Where, Any], folde
 
 
 def _at(values: Any, path: Where) -> Any:
-    """The value of a field, or None where there is none."""
+    """Return the value of a field, or None for none."""
     for part in path:
         values = values.get(part) if isinstance(values, dict) else None
     return values

@@ -1,4 +1,4 @@
-"""What fails a fruit: area and growth thresholds, how they go with its size, and the uncertainty that guards them."""
+"""Damage thresholds: limits of area and growth, their scaling with the fruit's size, and the guard band."""
 
 from itertools import pairwise
 from statistics import NormalDist
@@ -45,14 +45,14 @@ class AreaThreshold(Settings):
 
 
 class LengthRange(Settings):
-    """The lengths of fruit that a recipe or a size class is meant for."""
+    """Lengths of fruit for a recipe or a size class."""
 
     smallest_mm: float = setting(title="Smallest", description="No fruit is shorter.", unit="mm", ge=1.0, le=200.0)
     largest_mm: float = setting(title="Largest", description="No fruit is longer.", unit="mm", ge=1.0, le=200.0)
 
     @property
     def middle_mm(self) -> float:
-        """Half way between smallest and largest, mm."""
+        """Middle between smallest and largest, mm."""
         return (self.smallest_mm + self.largest_mm) / 2
 
     @model_validator(mode="after")
@@ -64,7 +64,7 @@ class LengthRange(Settings):
 
 
 class RatioRange(Settings):
-    """How long fruit are for their width."""
+    """Ratio of a fruit's length to its width."""
 
     smallest: float = setting(title="Smallest", description="No fruit is shorter for its width.", gt=0.0, le=10.0)
     largest: float = setting(title="Largest", description="No fruit is longer for its width.", gt=0.0, le=10.0)
@@ -87,7 +87,7 @@ class SizeClass(LengthRange):
 
 
 class SizeOfFruit(Settings):
-    """The fruit's size, measured by a grader upstream, with which the area limits and growth limits go."""
+    """Scaling of the area and growth limits with the fruit's size, measured by an upstream grader."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
@@ -166,7 +166,7 @@ class SizeOfFruit(Settings):
 
 
 class Repeatability(Settings):
-    """How far the area repeats on one fruit, at one closing."""
+    """Repeatability of the area on one fruit, at one closing."""
 
     closing_mm: float = setting(
         title="Closing",
@@ -184,7 +184,7 @@ class Repeatability(Settings):
 
 
 class AreaUncertainty(Settings):
-    """What the guard band of the thresholds is made of, beside what the press itself tells."""
+    """Uncertainty for the guard band of the thresholds, in addition to that of the press itself."""
 
     coverage: float = setting(
         0.95,
@@ -204,7 +204,7 @@ class AreaUncertainty(Settings):
 
     @property
     def factor(self) -> float:
-        """The coverage factor k: so many standard uncertainties are the guard band."""
+        """Coverage factor k: the guard band is k standard uncertainties."""
         return NormalDist().inv_cdf(self.coverage)
 
     @model_validator(mode="after")
@@ -224,7 +224,7 @@ AREA_UNCERTAINTY = AreaUncertainty()
 
 
 class DamageThresholds(Settings):
-    """What fails a fruit."""
+    """Limits of a fruit."""
 
     area: tuple[AreaThreshold, ...] = setting(
         title="Area thresholds",
@@ -241,7 +241,7 @@ class DamageThresholds(Settings):
         le=500.0,
     )
     # The two below are left out of a recipe's values where they are as in recipes written before them: such a
-    # recipe keeps its content hash, and with it its approval.
+    # recipe retains its content hash, and with it its approval.
     size: Annotated[SizeOfFruit | None, Field(exclude_if=lambda size: size is None)] = setting(
         None,
         title="Size of the fruit",

@@ -15,7 +15,7 @@ PLACE = "environment"
 
 
 def variable(path: Path) -> str:
-    """The variable of a field: its path's names in capitals, joined by `_`.
+    """Return the variable of a field: its path's names in capitals, joined by `_`.
 
     Args:
         path: `("modbus", "port")` gives `STATION_MODBUS_PORT`.
@@ -24,7 +24,7 @@ def variable(path: Path) -> str:
 
 
 def named(path: Path, given: Iterable[Path]) -> str | None:
-    """A field's variable, with what is inside its value, where the environment gives it; else None.
+    """Return a field's variable, with the path inside its value, if the environment sets it; else None.
 
     Args:
         path: a field, or a place inside a field's list or mapping.
@@ -42,7 +42,7 @@ def named(path: Path, given: Iterable[Path]) -> str | None:
 
 
 def variables(root: Node) -> dict[str, Leaf]:
-    """Every variable with the field that it sets.
+    """Return every variable with the field that it sets.
 
     Args:
         root: the configuration's schema.
@@ -60,11 +60,11 @@ def variables(root: Node) -> dict[str, Leaf]:
 
 
 def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], list[Problem]]:
-    """The values that the environment gives, by their fields; and its unknown variables and texts that are no value.
+    """Return the environment's values by their fields; and its unknown variables and invalid texts.
 
     Args:
         root: the configuration's schema.
-        environ: all environment variables; those without the prefix are none of ours.
+        environ: all environment variables; those without the prefix are ignored.
     """
     known = variables(root)
     problems: list[Problem] = []
@@ -85,7 +85,7 @@ def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], 
 
 
 def _value(text: str, node: Node, root: Node) -> Any:
-    """A variable's text as the field's value: as it stands for a text, else as a YAML file would hold it."""
+    """Parse a variable's text as the field's value: literally for a text, else as YAML."""
     try:
         content = text.encode()
     except UnicodeEncodeError as error:
@@ -99,7 +99,7 @@ def _value(text: str, node: Node, root: Node) -> Any:
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:
-    """An unknown variable, with the known ones that it looks like."""
+    """Describe an unknown variable, with similar known ones."""
     near = difflib.get_close_matches(name.removeprefix(PREFIX), [each.removeprefix(PREFIX) for each in known], n=1)
     hint = f"did you mean {PREFIX}{near[0]}?" if near else "see docs/configuration.md for those there are"
     return f"unknown variable: {hint}"

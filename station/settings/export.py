@@ -1,4 +1,4 @@
-"""Write what is made from the settings models: `python -m station.settings.export`, in a checkout.
+"""Generator of files from the settings models: `python -m station.settings.export`, in a checkout.
 
 The JSON Schemas, the example configuration and the tables of fields in the documents; a test compares them.
 """
@@ -20,10 +20,10 @@ BEGIN, END = "<!-- fields: made by python -m station.settings.export -->\n", "<!
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """What each file has to hold.
+    """Return the content of each file.
 
     Args:
-        root: the checkout; the documents there are read for the text around their tables.
+        root: the checkout; of its documents the text around the tables is retained.
     """
     recipe_guide, configuration_guide = root / "docs" / "recipes.md", root / "docs" / "configuration.md"
     return {
@@ -37,11 +37,11 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
 
 
 def json_schema(model: type[BaseModel], title: str) -> str:
-    """A model's JSON Schema as a file.
+    """Return a model's JSON Schema as a file.
 
     Args:
         model: the settings model.
-        title: what the file describes.
+        title: the schema's title.
     """
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(model), "title": title}
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
@@ -74,7 +74,7 @@ def example() -> str:
 
 
 def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
-    """The lines of one section's fields."""
+    """Return the lines of one section's fields."""
     indent = "  " * depth
     for name, child in resolved(node, root)["properties"].items():
         field = resolved(child, root)
@@ -89,14 +89,14 @@ def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
 
 
 def _columns(leaf: Leaf, root: Node) -> list[str]:
-    """A field's title, what it takes, its default and its meaning."""
+    """Return a field's title, accepted values, default and meaning."""
     default = f"`{json.dumps(leaf.node['default'], ensure_ascii=False)}`" if "default" in leaf.node else "required"
     takes = "a list of the following" if _of_mappings(leaf, root) else expectation(leaf.node, root)
     return [leaf.node.get("title", ""), takes, default, leaf.node.get("description", "")]
 
 
 def _of_mappings(leaf: Leaf, root: Node) -> bool:
-    """Whether a field is a list of mappings."""
+    """Return whether a field is a list of mappings."""
     return "properties" in resolved(leaf.node.get("items") or {}, root)
 
 
@@ -106,7 +106,7 @@ def _dotted(leaf: Leaf) -> str:
 
 
 def _head(*names: str) -> str:
-    """A table's first two rows."""
+    """Return a table's first two rows."""
     return _row(list(names)) + _row(["---"] * len(names))
 
 
@@ -117,7 +117,7 @@ def _row(cells: list[str]) -> str:
 
 
 def _with_table(text: str, table: str) -> str:
-    """A document with the table between its two marks renewed."""
+    """Replace the table between the document's two marks."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}{table}{END}{after}"

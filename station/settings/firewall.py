@@ -1,4 +1,4 @@
-"""A site's configuration as rules of nftables: what is no conduit is closed, in both directions."""
+"""Firewall rules of a site's configuration: nftables that close everything but the conduits, in both directions."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping
@@ -10,18 +10,18 @@ LOOPBACK = ("127.0.0.0/8", "::1/128")
 
 
 def rules(site: Configuration, zones: Mapping[Zone, tuple[str, ...]], maintenance: tuple[str, ...] = ()) -> str:
-    """The rules as a file for `nft -f`.
+    """Return the rules as a file for `nft -f`.
 
     A conduit that listens on loopback, or calls there, needs no rule. Names of hosts are left to the address lists of
     their zone, as rules take none.
 
     Args:
         site: with the ports and the peers.
-        zones: the addresses and networks of each zone; one that is missing is reached by nobody.
-        maintenance: from where the machine is administered over SSH, and what tells it the time and names.
+        zones: the addresses and networks of each zone; a missing zone is blocked.
+        maintenance: sources of SSH, and the servers of time and names.
 
     Raises:
-        ValueError: an address is none.
+        ValueError: an address is invalid.
     """
     opened = [each for each in conduits(site) if each.enabled and not _loopback(each.host)]
     inward = [line for each in opened if each.target is Zone.STATION for line in _inward(each, zones)]
@@ -69,21 +69,21 @@ table inet fruit_station {{
 
 
 def _inward(conduit: Conduit, zones: Mapping[Zone, tuple[str, ...]]) -> Iterable[str]:
-    """From the peers that the setting names, or else from the zone."""
+    """Return the peers in the setting, or else the zone."""
     named = tuple(peer for peer in conduit.peers if peer not in LOOPBACK)
     for group in _families(named or zones.get(conduit.source, ())):
         yield f"{_from(group)} tcp dport {conduit.port} accept  # {conduit.protocol}: {conduit.setting}"
 
 
 def _outward(conduit: Conduit, zones: Mapping[Zone, tuple[str, ...]]) -> Iterable[str]:
-    """To the one host where it is an address, else to its zone."""
+    """Return the one host if it is an address, else its zone."""
     hosts = (conduit.host,) if _address(conduit.host) else zones.get(conduit.target, ())
     for group in _families(hosts):
         yield f"{_to(group)} tcp dport {conduit.port} accept  # {conduit.protocol}: {conduit.setting}"
 
 
 def _families(networks: Iterable[str]) -> list[tuple[str, tuple[str, ...]]]:
-    """Networks by their family, with nftables' name of it."""
+    """Return networks by their family, with nftables' name of it."""
     parsed = [ipaddress.ip_network(network) for network in networks]
     return [
         (name, found)

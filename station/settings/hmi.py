@@ -1,4 +1,4 @@
-"""Where operators' browsers reach the station, and how long a person stays logged in."""
+"""HMI settings: addresses, TLS, languages, idle times."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -36,7 +36,7 @@ class HmiTlsSettings(Settings):
 
 
 class HmiSettings(Settings):
-    """Where operators' browsers reach the station, and how long a person stays logged in."""
+    """Address of the operators' pages, languages, and time until a log-out."""
 
     host: Host = setting(
         "127.0.0.1",
@@ -97,7 +97,7 @@ class HmiSettings(Settings):
 
 
 def panel_endpoint(settings: HmiSettings, home: Path) -> str:
-    """Where the station serves the panel's channel and the HMI looks for it.
+    """Return the endpoint of the panel's channel.
 
     Args:
         settings: with the endpoint, or null for the default.
@@ -117,10 +117,6 @@ def panel_endpoint(settings: HmiSettings, home: Path) -> str:
 
 
 def address_of(settings: HmiSettings) -> str:
-    """What a person types into a browser.
-
-    Args:
-        settings: with host, port and whether TLS is served.
-    """
+    """Return the address for a browser."""
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     return f"{'https' if settings.tls.enabled else 'http'}://{host}:{settings.port}"

@@ -1,4 +1,4 @@
-"""A `station.yaml` of an earlier program in the words of this one, with a person's comments kept."""
+"""Migration of a `station.yaml` from an earlier version, with its comments."""
 
 import io
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ _WIDE = 4096
 
 
 class Move(NamedTuple):
-    """A setting that has another place now. An old place is never used for anything else."""
+    """A setting with a new place. An old place is never reused."""
 
     old: tuple[str, ...]
     new: tuple[str, ...]
@@ -22,22 +22,22 @@ MOVES = (Move(("service", "channel"), ("handshake", "endpoint")),)
 
 
 class Migrated(NamedTuple):
-    """A configuration's text in this program's words."""
+    """A migrated configuration."""
 
     text: str
     changes: tuple[str, ...]
-    """What was changed, one sentence each; empty where the text is as it was."""
+    """The changes, one sentence each; empty for an unchanged text."""
 
 
 def migrated(text: str, source: str) -> Migrated:
-    """Move what an earlier program had elsewhere. Doing so again changes nothing.
+    """Move the settings of an earlier version to their new places. Idempotent.
 
     Args:
-        text: the file's; whether its values are good is for `load_configuration` to say.
+        text: the file's; `load_configuration` validates its values.
         source: the file's name for messages.
 
     Raises:
-        SettingsError: it is no YAML mapping, or a setting stands in its old and in its new place.
+        SettingsError: it is no YAML mapping, or a setting is in its old and in its new place.
     """
     yaml = YAML()
     yaml.preserve_quotes = True
@@ -59,7 +59,7 @@ def migrated(text: str, source: str) -> Migrated:
 
 
 def _section(values: Any, path: tuple[str, ...]) -> dict[str, Any] | None:
-    """The mapping that has the setting, or None where none has."""
+    """Return the mapping that has the setting, or None."""
     for part in path[:-1]:
         values = values.get(part) if isinstance(values, dict) else None
     return values if isinstance(values, dict) and path[-1] in values else None
@@ -84,7 +84,7 @@ def _moved(values: dict[str, Any], move: Move, source: str) -> str:
 
 
 def _drop(values: dict[str, Any], path: tuple[str, ...]) -> None:
-    """Take away sections that nothing is left in: `service:` alone would be a null."""
+    """Remove empty sections: `service:` alone would be a null."""
     for depth in range(len(path), 0, -1):
         section = _section(values, path[:depth])
         if section is None or section[path[depth - 1]]:

@@ -1,4 +1,4 @@
-"""Where the line's PLC reaches the station, who may, and when a connection is given up."""
+"""Modbus settings: addresses, permitted clients, time-outs of connections."""
 
 from typing import Literal, Self
 
@@ -12,7 +12,7 @@ LOOPBACK = ("127.0.0.0/8", "::1/128")
 
 
 class ModbusTlsSettings(Settings):
-    """Modbus/TCP Security: a second port with TLS 1.3, where a client's certificate says what it may do."""
+    """Modbus/TCP Security: a second port with TLS 1.3, where a client's certificate defines its rights."""
 
     enabled: bool = setting(
         default=False,
@@ -47,7 +47,7 @@ class ModbusTlsSettings(Settings):
 
 
 class ModbusSettings(Settings):
-    """Where the line's PLC reaches the station, and who may."""
+    """Addresses of the Modbus TCP server, and its permitted clients."""
 
     host: Host = setting(
         "127.0.0.1",

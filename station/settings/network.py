@@ -20,7 +20,7 @@ def _host(text: str) -> str:
 
 
 def _network(text: str) -> str:
-    """Refuse what is no network, and one with bits behind its prefix, which may be a slip of the pen."""
+    """Refuse an invalid network, and one with bits behind its prefix, which may be a typing error."""
     try:
         ipaddress.ip_network(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Write what is made from the conduits: `python -m station.settings.network_export`, in a checkout.
+"""Generator of files from the conduits: `python -m station.settings.network_export`, in a checkout.
 
 The table and the drawing of docs/network.md, and the rules of an example site; a test compares them.
 """
@@ -27,7 +27,7 @@ _SIDES = {_LEFT: (Zone.CELL, Zone.LINE), _RIGHT: (Zone.OPERATORS, Zone.MONITORIN
 
 
 def example_site() -> Configuration:
-    """The configuration of a site whose addresses are those of the document."""
+    """Return the example configuration of the document."""
     return Configuration.model_validate(
         {
             "home": Path("/var/lib/fruit-station"),
@@ -43,10 +43,10 @@ def example_site() -> Configuration:
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """What each file has to hold.
+    """Return the content of each file.
 
     Args:
-        root: the checkout; the document there is read for the text around its table.
+        root: the checkout; of its document the text around the table is retained.
     """
     guide = root / "docs" / "network.md"
     before, _, rest = guide.read_text(encoding="utf-8").partition(BEGIN)
@@ -58,11 +58,7 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
 
 
 def table(shown: tuple[Conduit, ...]) -> str:
-    """The conduits as a Markdown table.
-
-    Args:
-        shown: in their order.
-    """
+    """Return the conduits as a Markdown table."""
     rows = ["| from | to | protocol | default | set by | carries | protected by |", "|" + " --- |" * 7]
     rows += [
         f"| {each.source} | {each.target} | {each.protocol} | {each.host}:{each.port}{_closed(each)} "
@@ -77,11 +73,7 @@ def _closed(conduit: Conduit) -> str:
 
 
 def drawing(shown: tuple[Conduit, ...]) -> str:
-    """The zones with their conduits as an SVG: black on white, readable without colour.
-
-    Args:
-        shown: in any order.
-    """
+    """Return the zones with their conduits as an SVG: black on white, readable without colour."""
     height = 3 * (_BOX_HEIGHT + _GAP) + _GAP
     places = {
         zone: (x, _GAP + (height - _GAP) / len(zones) * index + ((height - _GAP) / len(zones) - _BOX_HEIGHT - _GAP) / 2)
@@ -115,7 +107,7 @@ def _box(zone: Zone, x: float, y: float, height: float, *, thick: bool = False) 
 
 
 def _arrows(zone: Zone, x: float, y: float, shown: list[Conduit]) -> str:
-    """From who opens to who listens, one arrow for each direction, with its ports."""
+    """Return arrows from the opening to the listening zone, one for each direction, with its ports."""
     near, far = (x + _BOX_WIDTH, _MIDDLE) if x < _MIDDLE else (x, _MIDDLE + _BOX_WIDTH)
     groups = [
         (near, far, [each for each in shown if each.source is zone]),

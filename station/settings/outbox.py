@@ -1,4 +1,4 @@
-"""Which other systems are told of inspections, lots and the audit trail."""
+"""Outbox settings: the systems that receive inspections, lots and the audit trail."""
 
 from typing import Literal
 
@@ -37,7 +37,7 @@ class OutboxPostgresqlSettings(Settings):
 
 
 class OutboxMqttSettings(Settings):
-    """An MQTT broker that whoever is interested subscribes at."""
+    """An MQTT broker with any number of subscribers."""
 
     enabled: bool = setting(default=False, title="Published", description="Whether events are published over MQTT.")
     host: Host = setting("127.0.0.1", title="Address", description="Name or address of the broker.", max_length=253)
@@ -65,7 +65,7 @@ class OutboxMqttSettings(Settings):
 
 
 class OutboxSettings(Settings):
-    """What leaves the station. It waits for no other system: what cannot be told now is told later, in order."""
+    """Publishers to other systems. The station never waits for these: undelivered messages are sent later, in order."""
 
     station: str = setting(
         "station-1",

@@ -1,4 +1,4 @@
-"""Types of paths in settings; whether there is anything at a path is for whoever opens it to say."""
+"""Types of paths in settings; the reader of a path checks its existence."""
 
 import os
 from collections.abc import Callable
@@ -8,11 +8,11 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 LONGEST_BYTES, LONGEST_NAME_BYTES = 1000, 255
-"""Linux takes 4096 (limits.h, PATH_MAX) and 255 (NAME_MAX); the rest is room for what lies in a folder."""
+"""Linux takes 4096 (limits.h, PATH_MAX) and 255 (NAME_MAX); the rest is left for the names inside a folder."""
 
 
 def _plain(what: str) -> Callable[[Path], Path]:
-    """Refuse the empty text, and what no file system or only a shell understands."""
+    """Refuse the empty text, and characters that a file system refuses or only a shell interprets."""
 
     def check(path: Path) -> Path:
         if path == Path() or "\0" in str(path) or "~" in path.parts:

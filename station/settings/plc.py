@@ -1,4 +1,4 @@
-"""How the PLC interface waits: for the PLC and for the station."""
+"""PLC interface settings: time-outs for the PLC and for the station."""
 
 from pathlib import Path
 from typing import Self
@@ -13,7 +13,7 @@ LONGEST_SOCKET_PATH = 107
 
 
 class HandshakeSettings(Settings):
-    """The handshake's deadlines and time-outs, and where the interface reaches the station."""
+    """Deadlines and time-outs of the handshake, and the endpoint of the station."""
 
     endpoint: str | None = setting(
         None,
@@ -95,7 +95,7 @@ class HandshakeSettings(Settings):
 
 
 def line_endpoint(settings: HandshakeSettings, home: Path) -> str:
-    """Where the station serves the line's channel and the PLC interface looks for it.
+    """Return the endpoint of the line's channel.
 
     Args:
         settings: with the endpoint, or null for the default.

@@ -1,4 +1,4 @@
-"""What is wrong in a file or in the environment, each thing with its place."""
+"""Problems of a file or of the environment, each with its place."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -6,11 +6,11 @@ from typing import NamedTuple
 from station.errors import BadInputError
 
 Path = tuple[str | int, ...]
-"""Where a value stands in nested mappings and lists: keys and positions, outermost first."""
+"""Path of a value in nested mappings and lists: keys and positions, outermost first."""
 
 
 def dotted(path: Path) -> str:
-    """A path in the words of a message: `steps.result_closings_mm[2]`, or `file` for the whole.
+    """Return a path for a message: `steps.result_closings_mm[2]`, or `file` for the whole.
 
     Args:
         path: keys and positions.
@@ -22,11 +22,10 @@ def dotted(path: Path) -> str:
 
 
 def shortened(text: str, longest: int = 60) -> str:
-    """A text that fits a message's line, with everything unprintable escaped.
+    """Return a text that fits a message's line, with everything unprintable escaped.
 
     Args:
-        text: any text.
-        longest: characters kept.
+        longest: maximum number of characters.
     """
     if len(text) > longest:
         text = text[: longest - 1] + "…"
@@ -34,7 +33,7 @@ def shortened(text: str, longest: int = 60) -> str:
 
 
 class Problem(NamedTuple):
-    """One thing to mend; its text is `place: field: what was expected`."""
+    """One problem; its text is `place: field: what was expected`."""
 
     place: str
     field: str
@@ -45,7 +44,7 @@ class Problem(NamedTuple):
 
 
 class SettingsError(BadInputError):
-    """Everything that is wrong with the settings, one problem a line."""
+    """All problems of the settings, one per line."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -56,7 +55,7 @@ class SettingsError(BadInputError):
 
 
 class Contradiction(ValueError):  # noqa: N818 (pydantic's validators raise it; it reaches users as problems)
-    """Fields that are right one by one and wrong together; each with the path from the model that says so."""
+    """Fields that are valid one by one and wrong together; each with its path in the model."""
 
     def __init__(self, parts: Iterable[tuple[Path, str]]) -> None:
         self.parts = tuple(parts)

@@ -1,4 +1,4 @@
-"""Find and read recipe files, alone or a folder of them."""
+"""Recipe files: search and reading, alone or a folder of them."""
 
 import difflib
 import importlib.resources
@@ -21,7 +21,7 @@ APPROVED_NAME = "approved.json"
 
 
 class Checked(NamedTuple):
-    """What a number of files hold."""
+    """Result of reading several files."""
 
     recipes: dict[Path, Recipe]
     """The good ones, by their files; of recipes that clash with each other, none."""
@@ -57,16 +57,16 @@ def load_recipes(folder: Path | None = None) -> dict[str, Recipe]:
 
 
 def find_recipe(name_or_path: str | Path, folder: Path | None = None) -> Recipe:
-    """Read a recipe by its name, or by its file's path: whatever ends in `.yaml` or holds a separator is a path.
+    """Read a recipe by its name, or by its file's path: text that ends in `.yaml` or holds a separator is a path.
 
-    A broken file beside the one looked for does no harm.
+    A broken file beside the wanted one does no harm.
 
     Args:
-        name_or_path: what the user asked for.
-        folder: where names are looked for; the recipes shipped with the station by default.
+        name_or_path: the user's input.
+        folder: searched for names; the recipes shipped with the station by default.
 
     Raises:
-        BadInputError: there is no such recipe; the message lists those there are. Or its file is bad.
+        BadInputError: there is no such recipe; the message lists the existing ones. Or its file is invalid.
     """
     if isinstance(name_or_path, Path) or "/" in name_or_path or name_or_path.endswith(SUFFIXES):
         return load_recipe(Path(name_or_path))
@@ -85,7 +85,7 @@ def find_recipe(name_or_path: str | Path, folder: Path | None = None) -> Recipe:
 
 
 def recipe_files(folder: Path | None = None) -> list[Path]:
-    """The recipe files of a folder, sorted by name.
+    """Return the recipe files of a folder, sorted by name.
 
     Args:
         folder: the folder; the recipes shipped with the station by default.
@@ -106,12 +106,12 @@ def recipe_files(folder: Path | None = None) -> list[Path]:
 
 
 def shipped_folder() -> Path:
-    """Where the recipes shipped with the station are."""
+    """Return the folder of the recipes shipped with the station."""
     return Path(str(importlib.resources.files("recipes")))
 
 
 def approved_by_distribution() -> dict[str, str]:
-    """The content hashes of the recipes as they were shipped, by name; empty where the list was taken away."""
+    """Return the content hashes of the shipped recipes, by name; empty if the list was removed."""
     try:
         listed = json.loads((shipped_folder() / APPROVED_NAME).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -120,7 +120,7 @@ def approved_by_distribution() -> dict[str, str]:
 
 
 def approved_list(folder: Path | None = None) -> str:
-    """What that list has to hold.
+    """Return the content of that list.
 
     Args:
         folder: of the recipes; those shipped by default.
@@ -130,7 +130,7 @@ def approved_list(folder: Path | None = None) -> str:
 
 
 def check_recipes(files: Iterable[Path]) -> Checked:
-    """Read many recipes, whatever is wrong with some of them.
+    """Read many recipes, including those with errors.
 
     Args:
         files: the recipes' files.

@@ -1,4 +1,4 @@
-"""A recipe's text of any released form: brought to this program's form, read, and known by its content."""
+"""Recipe schema versions: migration to the present one, parsing, and content hash."""
 
 import hashlib
 import json
@@ -21,26 +21,26 @@ text's values with their comments, in place; `schema_version` is raised by the c
 
 
 def parse_recipe(text: str, source: str) -> Recipe:
-    """Read a recipe from its text.
+    """Parse a recipe.
 
     Args:
-        text: YAML of this or an earlier form.
+        text: YAML of this or an earlier schema version.
         source: the text's name for messages.
 
     Raises:
-        SettingsError: all that is wrong with it.
+        SettingsError: all problems of the recipe.
     """
     return recipe_of(parse_document(text.encode(), source))
 
 
 def recipe_of(document: Document) -> Recipe:
-    """Read a recipe.
+    """Validate a recipe.
 
     Args:
-        document: a file's content, of this or an earlier form.
+        document: a file's content, of this or an earlier schema version.
 
     Raises:
-        SettingsError: all that is wrong with it.
+        SettingsError: all problems of the recipe.
     """
     values = document.value
     form = values.get("schema_version") if isinstance(values, dict) else None
@@ -55,13 +55,13 @@ def recipe_of(document: Document) -> Recipe:
 
 
 def upgrade(values: MutableMapping[str, Any]) -> int | None:
-    """Bring values of an earlier form to this program's, in place.
+    """Migrate values of an earlier schema version to the present one, in place.
 
     Args:
-        values: a recipe's, perhaps bad ones: what a migration cannot find is left for the check that follows.
+        values: a recipe's, perhaps invalid: the validation that follows reports what a migration cannot find.
 
     Returns:
-        The form that they had; None where nothing was to be done.
+        Their schema version; None if there was nothing to do.
     """
     found = form = values.get("schema_version")
     if not isinstance(form, int) or form not in MIGRATIONS:
@@ -74,12 +74,12 @@ def upgrade(values: MutableMapping[str, Any]) -> int | None:
 
 
 def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
-    """What a migration renames a field by: its place and, in a text, its comment stay.
+    """Rename a field in a migration: its place and, in a text, its comment are retained.
 
     Args:
         values: the mapping that has the field.
-        old: its name; nothing happens where there is none.
-        new: its name from now on.
+        old: its name; a missing field is ignored.
+        new: its new name.
     """
     if old not in values:
         return
@@ -94,19 +94,11 @@ def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
 
 
 def canonical_text(recipe: Recipe) -> str:
-    """A recipe's values as JSON of one form only: what its hash and the PLC's checksum are made of.
-
-    Args:
-        recipe: as read.
-    """
+    """Return a recipe's values as canonical JSON, the input of its hash and the PLC's checksum."""
     values = recipe.model_dump(mode="json")
     return json.dumps(values, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def content_sha256(recipe: Recipe) -> str:
-    """The hash by which a recipe is known; comments and layout are no part of it.
-
-    Args:
-        recipe: as read.
-    """
+    """Return the hash that identifies a recipe; comments and layout are no part of it."""
     return hashlib.sha256(canonical_text(recipe).encode()).hexdigest()

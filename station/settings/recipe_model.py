@@ -1,4 +1,4 @@
-"""One fruit's recipe: how it is pressed, how the contact is found, and what is too much."""
+"""Recipe of one fruit: width steps, segmentation, damage thresholds."""
 
 from typing import Annotated, Literal, Self
 
@@ -11,7 +11,7 @@ from station.settings.segmentation import Segmentation
 
 
 def _integer(value: object) -> object:
-    """Pydantic takes true and 1.0 for the choice 1, also where it is strict."""
+    """Refuse true and 1.0, which pydantic accepts for the choice 1, even if it is strict."""
     if type(value) is not int:
         raise ValueError("expected 1")
     return value
@@ -24,7 +24,7 @@ def _printable(title: str) -> str:
 
 
 class WidthRange(Settings):
-    """The widths of fruit that the recipe is meant for."""
+    """Widths of fruit for this recipe."""
 
     smallest_mm: float = setting(
         title="Smallest", description="A narrower fruit is not this recipe's.", unit="mm", ge=1.0, le=85.0
@@ -43,7 +43,7 @@ class WidthRange(Settings):
 
 
 class WidthSteps(Settings):
-    """How the gripper closes while images are taken."""
+    """Closing of the gripper and times of the images."""
 
     start: Literal["onset", "width"] = setting(
         title="Start",
@@ -121,7 +121,7 @@ class WidthSteps(Settings):
 
 
 class Grip(Settings):
-    """How the gripper moves during the steps."""
+    """Motion of the gripper during the steps."""
 
     speed_mm_s: float = setting(
         title="Speed",
@@ -140,7 +140,7 @@ class Grip(Settings):
 
 
 class Imaging(Settings):
-    """When images are taken, and how many."""
+    """Times and number of images."""
 
     settle_s: float = setting(
         title="Settle time",
@@ -164,7 +164,7 @@ class Imaging(Settings):
 
 
 class PressPlan(Settings):
-    """How often one fruit may be pressed, and whether the arm brings it to the field's middle first."""
+    """Number of presses of one fruit, and centring of the fruit in the sensor's field by the arm."""
 
     centre_from_mm: float | None = setting(
         None,
@@ -191,7 +191,7 @@ PRESS_PLAN = PressPlan()
 
 
 class EarlyStop(Settings):
-    """What ends the steps before the last one, to spare fruit and gel."""
+    """Conditions that end the steps before the last one, to spare fruit and gel."""
 
     area_mm2: float = setting(
         title="Area limit",

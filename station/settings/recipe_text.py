@@ -1,4 +1,4 @@
-"""A recipe's YAML text changed by a program, with a person's comments kept."""
+"""Edits of a recipe's YAML text by a program, with its comments retained."""
 
 import io
 import re
@@ -18,15 +18,15 @@ _WIDE = 4096
 
 
 def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str, Recipe]:
-    """A recipe's text with some values changed, checked as a whole.
+    """Return a recipe's text with some values changed, checked as a whole.
 
     Args:
-        text: a good recipe's YAML.
-        changes: new values by their dotted paths, as `damage.area[0].area_mm2`; what is around a value has to be there.
+        text: a valid recipe's YAML.
+        changes: new values by their dotted paths, as `damage.area[0].area_mm2`; the enclosing structure has to exist.
         source: the text's name for messages.
 
     Raises:
-        BadInputError: there is no such value, or the recipe would be bad; all that would be wrong with it.
+        BadInputError: there is no such value, or the recipe would be invalid; all problems.
     """
     yaml, values = _round_trip(text, source)
     upgrade(values)
@@ -37,17 +37,17 @@ def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str
 
 
 def upgraded_text(text: str, source: str) -> tuple[str, int] | None:
-    """A text of an earlier form in this program's form.
+    """Migrate a text of an earlier schema version.
 
     Args:
         text: YAML.
         source: the text's name for messages.
 
     Returns:
-        The new text, a good recipe's, and the form that it had; None where it has this program's form.
+        The new text, a valid recipe's, and its earlier schema version; None if it has the present one.
 
     Raises:
-        BadInputError: it is no good recipe of its form.
+        BadInputError: it is no valid recipe of its version.
     """
     yaml, values = _round_trip(text, source)
     found = upgrade(values)

@@ -1,10 +1,10 @@
-"""What the station keeps of its inspections."""
+"""Records settings: storage of inspections and images."""
 
 from station.settings.model import Settings, setting
 
 
 class RecordsSettings(Settings):
-    """The records in the home folder's `records`."""
+    """Records in the home folder's `records`."""
 
     deadline_s: float = setting(
         2.0,

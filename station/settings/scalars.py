@@ -1,8 +1,7 @@
-"""What an unquoted word in a YAML file means: the YAML 1.2 core schema, where YAML 1.1 agrees with it.
+"""Plain scalars of a YAML file: the YAML 1.2 core schema, where YAML 1.1 agrees with it.
 
-Source: YAML 1.2.2, section 10.3.2 (core schema); YAML 1.1 as PyYAML resolves it. A word that the two read
-differently (`NO`, `012`, `1e3`, `1:30`, `1_000`, a date) is refused: whoever wrote it cannot know what the next
-reader makes of it.
+Source: YAML 1.2.2, section 10.3.2 (core schema); YAML 1.1 as PyYAML resolves it. A word that the two read differently
+(`NO`, `012`, `1e3`, `1:30`, `1_000`, a date) is refused: its author cannot predict the next reader's result.
 """
 
 import math
@@ -30,14 +29,14 @@ _YAML_1_1 = Resolver()
 
 
 class MeaningError(ValueError):
-    """A word that has no certain or no sane meaning; its text says what was expected."""
+    """A word without one finite meaning; its text states what was expected."""
 
 
 def plain_scalar(text: str) -> Scalar:
-    """Read an unquoted word.
+    """Parse an unquoted word.
 
     Args:
-        text: the word as it stands in the file.
+        text: as in the file.
 
     Raises:
         MeaningError: YAML 1.1 and 1.2 read it differently, or it is not finite, or absurdly large.
@@ -54,7 +53,7 @@ def plain_scalar(text: str) -> Scalar:
 
 
 def _number(text: str, kind: str) -> int | float:
-    """A number in the range that is taken."""
+    """Return a number in the accepted range."""
     if len(text) > LONGEST_NUMBER:
         raise MeaningError(f"expected a number of at most {LONGEST_NUMBER} characters, got {len(text)}")
     if kind == "int":
@@ -69,7 +68,7 @@ def _number(text: str, kind: str) -> int | float:
 
 
 def _ambiguous(text: str, kind: str, old_kind: str) -> str:
-    """The message for a word with two meanings, with the ways to write what was meant."""
+    """Describe a word with two meanings, and the unambiguous forms."""
     shown = shortened(text, 40)
     quoted = f'"{shown}" in quotes for a text'
     if old_kind == "timestamp":

@@ -1,4 +1,4 @@
-"""Walk a model's JSON Schema: what a field is, in words, for messages, documents and the environment's names."""
+"""Description of fields from a model's JSON Schema, for messages, documents and environment variables."""
 
 import json
 from collections.abc import Iterator
@@ -21,16 +21,12 @@ class Leaf(NamedTuple):
 
 @cache
 def schema_of(model: type[BaseModel]) -> Node:
-    """A model's JSON Schema.
-
-    Args:
-        model: any settings model.
-    """
+    """Return a model's JSON Schema."""
     return model.model_json_schema()
 
 
 def resolved(node: Node, root: Node) -> Node:
-    """A node with its reference followed; what stands beside the reference wins.
+    """Return a node with its reference resolved; keys beside the reference have precedence.
 
     Args:
         node: a part of `root`.
@@ -43,7 +39,7 @@ def resolved(node: Node, root: Node) -> Node:
 
 
 def branches(node: Node, root: Node) -> list[Node]:
-    """A node's alternatives without `null`; the node itself where it has none.
+    """Return a node's alternatives without `null`; the node itself if it has none.
 
     Args:
         node: a part of `root`.
@@ -57,7 +53,7 @@ def branches(node: Node, root: Node) -> list[Node]:
 
 
 def find(root: Node, path: Path) -> Node | None:
-    """The node of a field, or None where the schema has no such field.
+    """Return the node of a field, or None if the schema has no such field.
 
     Args:
         root: the whole schema.
@@ -70,7 +66,7 @@ def find(root: Node, path: Path) -> Node | None:
 
 
 def _children(node: Node, part: str | int) -> list[Node]:
-    """The node of one entry or item, as a list of none or one."""
+    """Return the node of one entry or item, as a list of none or one."""
     if isinstance(part, int):
         items = node.get("prefixItems", ())
         child = items[part] if part < len(items) else node.get("items")
@@ -82,18 +78,18 @@ def _children(node: Node, part: str | int) -> list[Node]:
 
 
 def names(root: Node, path: Path) -> list[str]:
-    """The names of the fields inside a mapping.
+    """Return the names of the fields inside a mapping.
 
     Args:
         root: the whole schema.
-        path: where the mapping stands.
+        path: of the mapping.
     """
     node = find(root, path)
     return [name for branch in branches(node, root) for name in branch.get("properties", ())] if node else []
 
 
 def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists: bool = False) -> Iterator[Leaf]:
-    """All fields that hold a value, in the model's order.
+    """Return all fields that hold a value, in the model's order.
 
     Args:
         root: the whole schema.
@@ -116,7 +112,7 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
 
 
 def expectation(node: Node, root: Node) -> str:
-    """What a field takes, in words: `a number from 0.1 to 10 mm`.
+    """Describe the accepted values of a field: `a number from 0.1 to 10 mm`.
 
     Args:
         node: the field's node.
@@ -128,7 +124,7 @@ def expectation(node: Node, root: Node) -> str:
 
 
 def _words(node: Node, root: Node) -> str:
-    """What one alternative takes."""
+    """Describe one alternative."""
     if "const" in node or "enum" in node:
         choices = node.get("enum", [node.get("const")])
         known = ", ".join(each if isinstance(each, str) else json.dumps(each) for each in choices)
@@ -148,7 +144,7 @@ def _words(node: Node, root: Node) -> str:
 
 
 def _list(node: Node, root: Node) -> str:
-    """What a list has to be; its unit is its items'."""
+    """Describe a list; its unit is its items'."""
     inner = resolved(node.get("items") or next(iter(node.get("prefixItems", ())), {}), root)
     if "unit" in node:
         inner = {**inner, "unit": node["unit"]}
@@ -157,14 +153,14 @@ def _list(node: Node, root: Node) -> str:
 
 
 def _text(node: Node) -> str:
-    """What a text has to be."""
+    """Describe a text."""
     kind = "a path" if node.get("format") == "path" else "a text"
     pattern = f" that matches {node['pattern']}" if "pattern" in node else ""
     return kind + _length(node, "minLength", "maxLength", "character") + pattern
 
 
 def _length(node: Node, least: str, most: str, thing: str) -> str:
-    """` of 1 to 20 items`, or nothing where there is no bound."""
+    """Return ` of 1 to 20 items`, or nothing without a bound."""
     low, high = node.get(least), node.get(most)
     if low is None and high is None:
         return ""
@@ -175,7 +171,7 @@ def _length(node: Node, least: str, most: str, thing: str) -> str:
 
 
 def bounds(node: Node) -> str:
-    """A number's bounds and unit with a space before them: ` from 1 to 10 mm`, ` in mm`.
+    """Return a number's bounds and unit with a space before them: ` from 1 to 10 mm`, ` in mm`.
 
     Args:
         node: a number's node.
@@ -194,7 +190,7 @@ def bounds(node: Node) -> str:
 
 
 def figure(value: float) -> str:
-    """A number to six digits, without a needless `.0`.
+    """Format a number to six digits, without a needless `.0`.
 
     Args:
         value: the number.
@@ -203,7 +199,7 @@ def figure(value: float) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it.
+    """Format a value for a message.
 
     Args:
         value: anything that a document holds.

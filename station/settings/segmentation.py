@@ -1,4 +1,4 @@
-"""How a recipe has the contact found in an image: the method and every parameter of it."""
+"""Segmentation settings of a recipe: the method and its parameters."""
 
 from typing import Literal, Self
 
@@ -9,7 +9,7 @@ from station.settings.problems import Contradiction
 
 
 class PaperParameters(Settings):
-    """The pipeline as printed in Computers and Electronics in Agriculture 235 (2025) 110397."""
+    """Parameters of the pipeline as printed in Computers and Electronics in Agriculture 235 (2025) 110397."""
 
     amplification: float = setting(
         10.0,
@@ -90,7 +90,7 @@ class PaperParameters(Settings):
 
     @model_validator(mode="after")
     def _windows_have_a_centre(self) -> Self:
-        """OpenCV takes an even window for the next odd one without a word, and an even kernel shifts the mask."""
+        """Refuse even windows: OpenCV silently takes the next odd one, and an even kernel shifts the mask."""
         even = [
             ((name,), f"expected an odd side, got {side_px}")
             for name in ("template_window_px", "search_window_px", "kernel_px")
@@ -102,7 +102,7 @@ class PaperParameters(Settings):
 
 
 class RobustParameters(Settings):
-    """The station's own method; pixels are those of a 640x480 image and scale with the image."""
+    """Parameters of the station's own method; pixels are those of a 640x480 image and scale with the image."""
 
     contacts: Literal["one", "several"] = setting(
         "one",
@@ -150,7 +150,7 @@ class RobustParameters(Settings):
 
 
 class Segmentation(Settings):
-    """The method that a recipe uses, with the parameters of both methods for comparison."""
+    """Segmentation method of a recipe, with the parameters of both methods for comparison."""
 
     method: Literal["robust", "paper"] = setting(
         "robust",

@@ -1,4 +1,4 @@
-"""From plain values to a settings model, or to every problem in a person's words."""
+"""Validation of plain values as a settings model, with all problems as text."""
 
 import difflib
 import json
@@ -25,7 +25,7 @@ def load_file(model: type[Model], path: Path) -> Model:
     """Read a YAML file into a model.
 
     Args:
-        model: what the file has to hold.
+        model: the expected content.
         path: the file.
 
     Raises:
@@ -36,13 +36,13 @@ def load_file(model: type[Model], path: Path) -> Model:
 
 
 def validated(model: type[Model], document: Document, value: Any, locate: Locate) -> Model:
-    """Check plain values against a model.
+    """Validate plain values.
 
     Args:
-        model: what the values have to be.
-        document: the file they come from; its own problems come first.
-        value: the values: mappings, lists, texts, numbers, truth values and None.
-        locate: says where a value was written.
+        model: the expected model.
+        document: the source file; its own problems come first.
+        value: mappings, lists, texts, numbers, truth values and None.
+        locate: returns the place of a value in the source.
 
     Raises:
         SettingsError: all problems.
@@ -65,7 +65,7 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
 
 
 def _readable(problems: list[Problem]) -> list[Problem]:
-    """As many as anybody reads."""
+    """Limit the number of problems to a readable one."""
     if len(problems) <= MOST_PROBLEMS:
         return problems
     more = Problem(problems[MOST_PROBLEMS].place, "file", "and more: mend these first")
@@ -73,7 +73,7 @@ def _readable(problems: list[Problem]) -> list[Problem]:
 
 
 def _line(problem: Problem) -> int:
-    """A problem's line, for sorting; 0 where its place has none."""
+    """Return a problem's line, for sorting; 0 for none."""
     line = problem.place.rpartition(":")[2]
     return int(line) if line.isdecimal() else 0
 
@@ -81,7 +81,7 @@ def _line(problem: Problem) -> int:
 def _problems(
     details: ErrorDetails, value: Any, root: Node, locate: Locate, doubtful: frozenset[Where]
 ) -> list[Problem]:
-    """What one complaint of pydantic's means to a person; nothing where the loader has complained already."""
+    """Convert one error of pydantic to problems; none if the loader has reported it already."""
     path = _cleaned(details["loc"], value)
     if details["type"] == "missing" and isinstance(path[-1], int):  # one complaint for a list that is too short
         path = path[:-1]
@@ -96,7 +96,7 @@ def _problems(
 
 
 def _cleaned(location: tuple[str | int, ...], value: Any) -> Where:
-    """A path without the names of alternatives that pydantic mixes in; its last part may be missing in the value."""
+    """Return a path without the names of alternatives that pydantic inserts; the value may lack its last part."""
     path: list[str | int] = []
     for index, part in enumerate(location):
         inside = _inside(value, part)
@@ -109,7 +109,7 @@ def _cleaned(location: tuple[str | int, ...], value: Any) -> Where:
 
 
 def _inside(value: Any, part: str | int) -> tuple[Any] | None:
-    """One entry or item, or None where there is none."""
+    """Return one entry or item, or None if there is none."""
     if isinstance(value, dict) and part in value:
         return (value[part],)
     if isinstance(value, list) and isinstance(part, int) and part < len(value):
@@ -118,7 +118,7 @@ def _inside(value: Any, part: str | int) -> tuple[Any] | None:
 
 
 def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str:
-    """What was expected, and what came instead."""
+    """Describe the expected and the actual value."""
     if details["type"] == "extra_forbidden":
         return _unknown(str(path[-1]), names(root, path[:-1]))
     node = find(root, path)
@@ -131,7 +131,7 @@ def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str
 
 
 def _unknown(name: str, known: list[str]) -> str:
-    """An unknown key, with the known one that it looks like or all of them."""
+    """Describe an unknown key, with a similar known one or all of them."""
     near = difflib.get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"expected {', '.join(known)}"
     return f"unknown key {shortened(name)}: {hint}"

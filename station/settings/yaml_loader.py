@@ -1,7 +1,7 @@
-"""Read a YAML file that a person wrote, or an enemy: plain values with their lines, or every problem at once.
+"""YAML loader for untrusted files: plain values with their lines, or all problems at once.
 
-PyYAML's parser gives the events; what they mean is decided here, so that nothing of YAML 1.1's types, tags or
-references is ever constructed.
+PyYAML's parser gives the events; their meaning is decided here, so that nothing of YAML 1.1's types, tags or references
+is ever constructed.
 """
 
 import errno
@@ -27,7 +27,7 @@ MOST_PROBLEMS = 50
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What a file holds: mappings, lists, texts, numbers, truth values and None, and where each stands."""
+    """Content of a file: mappings, lists, texts, numbers, truth values and None, with the line of each."""
 
     source: str
     value: Any
@@ -35,10 +35,10 @@ class Document:
     """The line, counted from 1, on which each value (or its key) begins."""
     problems: tuple[Problem, ...] = ()
     doubtful: frozenset[Where] = field(default=frozenset())
-    """Where the problems are: what stands there is a stopgap that nobody should judge again."""
+    """Places of the problems: their values are stopgaps, exempt from further checks."""
 
     def locate(self, path: Where) -> tuple[str, str]:
-        """`file:line` of a value, or of the innermost thing around it that the file has; and its dotted name.
+        """Return `file:line` of a value, or of the innermost existing parent; and its dotted name.
 
         Args:
             path: keys and positions.
@@ -56,13 +56,13 @@ def read_document(path: Path) -> Document:
         path: a regular file of at most `LARGEST_FILE_BYTES`, UTF-8, with or without a byte order mark.
 
     Raises:
-        SettingsError: the file cannot be read. What is wrong inside it is in the document's `problems`.
+        SettingsError: the file cannot be read. Problems of its content are in the document's `problems`.
     """
     return parse_document(_content(path), shortened(str(path), 1000))
 
 
 def parse_document(content: bytes, source: str) -> Document:
-    """Understand a file's content.
+    """Parse a file's content.
 
     Args:
         content: the bytes.
@@ -78,7 +78,7 @@ def parse_document(content: bytes, source: str) -> Document:
 
 
 def _content(path: Path) -> bytes:
-    """The bytes of a regular file, without ever waiting for a pipe or a device."""
+    """Read the bytes of a regular file, without ever waiting for a pipe or a device."""
     source = shortened(str(path), 1000)
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -96,12 +96,12 @@ def _content(path: Path) -> bytes:
 
 
 def _kind(mode: int) -> str:
-    """What a path is that is not a file."""
+    """Describe a path that is not a file."""
     return "a folder" if stat.S_ISDIR(mode) else "a pipe" if stat.S_ISFIFO(mode) else "a device"
 
 
 def _unreadable(error: OSError | ValueError) -> str:
-    """Why a file cannot be opened."""
+    """Describe why a file cannot be opened."""
     if isinstance(error, IsADirectoryError):
         return "expected a regular file, got a folder"
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
@@ -110,11 +110,11 @@ def _unreadable(error: OSError | ValueError) -> str:
 
 
 class _Abandoned(Exception):  # noqa: N818 (a signal inside this file, never an error outside)
-    """Reading on makes no sense; why is among the problems."""
+    """Parsing cannot continue; the reason is among the problems."""
 
 
 class _Composer:
-    """Turns the parser's events into plain values, noting lines and problems."""
+    """Converts the parser's events to plain values, with lines and problems."""
 
     def __init__(self, text: str, source: str) -> None:
         self._text = text
@@ -125,7 +125,7 @@ class _Composer:
         self._values = 0
 
     def document(self) -> Document:
-        """Read the only document; nothing at all is None."""
+        """Compose the only document; an empty file is None."""
         value = None
         try:
             value = self._only_document(self._events())
@@ -137,12 +137,12 @@ class _Composer:
         return Document(self._source, value, self._lines, found, frozenset(self._doubtful))
 
     def _events(self) -> Iterator[events.Event]:
-        """The parser's events."""
+        """Yield the parser's events."""
         loader = yaml.SafeLoader(self._text)
         while True:
             try:
                 event = loader.get_event() if loader.check_event() else None
-            except (ValueError, OverflowError):  # PyYAML takes \UFFFFFFFF to chr() as it stands
+            except (ValueError, OverflowError):  # PyYAML passes \UFFFFFFFF to chr() unchecked
                 self._note((), loader.line + 1, "expected characters that exist in Unicode")
                 raise _Abandoned from None
             if event is None:
@@ -150,7 +150,7 @@ class _Composer:
             yield event
 
     def _only_document(self, stream: Iterator[events.Event]) -> Any:
-        """The value of the stream's one document."""
+        """Return the value of the stream's one document."""
         value = None
         documents = 0
         for event in stream:
@@ -164,7 +164,7 @@ class _Composer:
         return value
 
     def _value(self, event: events.Event, stream: Iterator[events.Event], path: Where) -> Any:
-        """The value that begins with an event."""
+        """Return the value that begins with an event."""
         self._lines.setdefault(path, _line(event))
         self._values += 1
         if self._values > MOST_VALUES:
@@ -189,14 +189,14 @@ class _Composer:
         return self._mapping(stream, path)
 
     def _sequence(self, stream: Iterator[events.Event], path: Where) -> list[Any]:
-        """The items up to the list's end."""
+        """Return the items up to the list's end."""
         items: list[Any] = []
         while not isinstance(event := next(stream), events.SequenceEndEvent):
             items.append(self._value(event, stream, (*path, len(items))))
         return items
 
     def _mapping(self, stream: Iterator[events.Event], path: Where) -> dict[str, Any]:
-        """The entries up to the mapping's end; of a doubled key the first is kept."""
+        """Return the entries up to the mapping's end; of a doubled key the first is retained."""
         entries: dict[str, Any] = {}
         while not isinstance(event := next(stream), events.MappingEndEvent):
             line = _line(event)
@@ -214,7 +214,7 @@ class _Composer:
         return entries
 
     def _key(self, event: events.Event, stream: Iterator[events.Event], path: Where) -> str | None:
-        """A mapping's key, or None where it is not a plain text."""
+        """Return a mapping's key, or None if it is not a plain text."""
         if not isinstance(event, events.ScalarEvent):
             self._note(path, _line(event), "expected a key that is a plain text")
             self._value(event, stream, (*path, "?"))
@@ -235,7 +235,7 @@ class _Composer:
         return None
 
     def _scalar(self, event: events.ScalarEvent, path: Where) -> Any:
-        """A text, number, truth value or None."""
+        """Return a text, number, truth value or None."""
         if event.style is not None:
             if any("\ud800" <= character <= "\udfff" for character in event.value):
                 self._note(path, _line(event), "expected characters that exist in Unicode")
@@ -248,7 +248,7 @@ class _Composer:
             return None
 
     def _syntax(self, error: yaml.YAMLError) -> None:
-        """What the parser could not make sense of."""
+        """Describe a syntax error of the parser."""
         self._doubtful.add(())
         if isinstance(error, yaml.MarkedYAMLError):
             mark = error.problem_mark or error.context_mark
@@ -263,7 +263,7 @@ class _Composer:
         self._note((), line, "expected printable text, got a control character")
 
     def _note(self, path: Where, line: int, expected: str) -> None:
-        """Keep a problem, up to the number that anybody reads."""
+        """Add a problem, up to the readable number."""
         self._doubtful.add(path)
         if len(self._problems) >= MOST_PROBLEMS:
             self._problems[-1] = Problem(f"{self._source}:{line}", "file", "and more: mend these first")
@@ -272,5 +272,5 @@ class _Composer:
 
 
 def _line(event: events.Event) -> int:
-    """The line on which an event begins, counted from 1."""
+    """Return the line of an event's begin, counted from 1."""
     return event.start_mark.line + 1

@@ -1,1 +1,1 @@
-"""The station's processes: started, watched, restarted within a budget, and ended in order."""
+"""Process supervision: start, monitoring, restart within a budget, orderly end."""

@@ -1,4 +1,4 @@
-"""Memory that a process has freed, kept for its next images."""
+"""Retention of freed memory for a process's next images."""
 
 import ctypes
 
@@ -9,10 +9,10 @@ _LARGEST_BYTES = 8 * 2**20
 
 
 def keep_freed_memory() -> None:
-    """Have the C library keep what was freed, up to 64 MB at its end, instead of giving it back at once.
+    """Configure the C library to retain freed memory, up to 64 MB at its end.
 
-    Otherwise every image's memory is mapped anew, page by page, and drawing a frame takes three times as long.
-    Numbers: mallopt(3), M_TRIM_THRESHOLD and M_MMAP_THRESHOLD. A C library without them is left as it is.
+    Otherwise every image's memory is mapped anew, page by page, and drawing a frame takes three times as long. Numbers:
+    mallopt(3), M_TRIM_THRESHOLD and M_MMAP_THRESHOLD. A C library without them is left as it is.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:

@@ -1,4 +1,4 @@
-"""What a process tells whoever supervises it: that it is ready, and that it makes progress.
+"""Notifications to the supervisor: readiness and progress.
 
 The protocol is the one of sd_notify(3), so the same process runs below systemd and below `station run`.
 """
@@ -17,7 +17,7 @@ _LOOK_S = 0.5
 
 
 def notify(message: str) -> None:
-    """Tell the supervisor; nothing happens where there is none, or where it does not listen any more.
+    """Send a message to the supervisor; does nothing if there is none, or if it does not listen any more.
 
     Args:
         message: `READY=1`, `WATCHDOG=1`, `STOPPING=1` or `STATUS=…`.
@@ -34,13 +34,13 @@ def notify(message: str) -> None:
 
 
 async def feed_watchdog(progressing: Callable[[], bool]) -> None:
-    """Feed the supervisor's watchdog for as long as there is progress, and end this process when it is orphaned.
+    """Feed the supervisor's watchdog as long as there is progress, and end this process when it is orphaned.
 
     Runs until cancelled. A supervisor that was killed cannot end its processes, so they end themselves, by the same
     SIGTERM that it would have sent.
 
     Args:
-        progressing: whether the process does what it is there for; asked several times in each time-out.
+        progressing: returns whether the process makes progress; called several times in each time-out.
     """
     timeout_s = int(os.environ.get(WATCHDOG_VARIABLE, "0")) / 1e6
     parent = int(os.environ.get(PARENT_VARIABLE, "0"))

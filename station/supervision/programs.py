@@ -1,4 +1,4 @@
-"""The station's processes, as they are started."""
+"""Start commands of the station's processes."""
 
 import sys
 from pathlib import Path
@@ -7,12 +7,12 @@ from station.supervision.supervisor import Program
 
 
 def station_programs(config: Path | None, logs: Path | None = None, *, outbox: bool = False) -> list[Program]:
-    """The processes of one station: the service, the PLC interface, which outlives it, and the pages.
+    """Return the processes of one station: the service, the PLC interface, which outlives it, and the pages.
 
     Args:
         config: the configuration's file; None for the usual one.
-        logs: the folder of their logs; None to leave them on the supervisor's own output.
-        outbox: whether other systems are told of inspections, by one more process.
+        logs: the folder of their logs; None for the supervisor's own output.
+        outbox: whether the process of the outbox runs too.
     """
     programs = [
         _program("service", logs, "service", *_config(config)),
@@ -23,7 +23,7 @@ def station_programs(config: Path | None, logs: Path | None = None, *, outbox: b
 
 
 def twin_program(config: Path | None, console_port: int, seed: int, logs: Path | None = None) -> Program:
-    """The simulated world in place of the devices.
+    """Return the process of the simulated world, which replaces the devices.
 
     Args:
         config: as the station's.
@@ -40,6 +40,6 @@ def _config(config: Path | None) -> tuple[str, ...]:
 
 
 def _program(name: str, logs: Path | None, *arguments: str) -> Program:
-    # -P: a folder `station` where somebody happens to stand is not this program.
+    # -P: a folder `station` in the working directory is not this program.
     command = (sys.executable, "-P", "-m", "station", *arguments)
     return Program(name, command, output=logs / f"{name}.log" if logs else None)

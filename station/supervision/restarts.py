@@ -1,4 +1,4 @@
-"""What the supervisor had to start again, told to the processes by a small file that each of them knows the name of."""
+"""Restart counts of the supervised processes, published to these in a small file."""
 
 import json
 import logging
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class Restarts(NamedTuple):
-    """One program's."""
+    """Restarts of one program."""
 
     total: int
     """Since the supervisor's start."""
@@ -23,16 +23,12 @@ class Restarts(NamedTuple):
     given_up: bool
 
     def within(self, seconds: float) -> int:
-        """How many there were lately.
-
-        Args:
-            seconds: how lately.
-        """
+        """Return the number of recent restarts."""
         return sum(time.monotonic() - at_s < seconds for at_s in self.times_s)
 
 
 def tell(file: Path, programs: Mapping[str, Restarts]) -> None:
-    """Write it whole or not at all; a disk that takes nothing is logged.
+    """Write the file atomically; a write error is logged.
 
     Args:
         file: in a folder of the supervisor's.
@@ -47,7 +43,7 @@ def tell(file: Path, programs: Mapping[str, Restarts]) -> None:
 
 
 def told() -> dict[str, Restarts]:
-    """What the supervisor of this process says; empty where there is none, or none of ours."""
+    """Read the supervisor's counts; empty without a supervisor of ours."""
     name = os.environ.get(RESTARTS_VARIABLE, "")
     try:
         data = json.loads(Path(name).read_text(encoding="utf-8")) if name else {}

@@ -1,4 +1,4 @@
-"""What every server of ours over HTTP needs: an address to listen on, and the process's signals left to the process."""
+"""Base of our HTTP servers: a listening socket with a clear error, and signals left to the process."""
 
 import contextlib
 import errno
@@ -10,11 +10,11 @@ import uvicorn
 from station.errors import StationError
 
 CLOSE_S = 1.0
-"""How long closing waits for answers under way."""
+"""Maximum wait for pending answers when closing."""
 
 
 class AddressError(StationError):
-    """The address cannot be listened on."""
+    """An address that cannot be listened on."""
 
 
 class Server(uvicorn.Server):
@@ -27,13 +27,13 @@ class Server(uvicorn.Server):
 
 
 def listen(host: str, port: int, setting: str, what: str) -> socket.socket:
-    """A listening socket, or one clear sentence.
+    """Return a listening socket, or raise one clear sentence.
 
     Args:
         host: an address or a name of this machine.
         port: TCP; 0 takes a free one.
         setting: the configuration's section with `host` and `port`.
-        what: is served there, as `the pages`.
+        what: the service, as `the pages`.
 
     Raises:
         AddressError: the port is in use, or the address is not this machine's.

@@ -1,10 +1,9 @@
-"""Starts processes, restarts what dies or hangs, and gives up when that happens too often.
+"""Supervisor: starts processes, restarts those that die or hang, and gives up after too many restarts.
 
-What is given up stays down while the rest goes on: without the station's process the PLC interface still tells the PLC
-that the station is lost, which is the safe output, and a person has to mend the cause and start again.
-
-The supervisor has one itself, systemd, and feeds its watchdog by what it hears of all its programs: while one of them
-is silent, or while the supervisor itself is stuck, nothing is fed.
+What is given up stays down while the rest goes on: without the station's process the PLC interface still reports to the
+PLC that the station is lost, which is the safe output. A person has to remove the cause and start the station again.
+The supervisor's own supervisor is systemd. It feeds systemd's watchdog while all its programs notify it: if one of them
+is silent, or if the supervisor itself hangs, nothing is fed.
 """
 
 import asyncio
@@ -38,7 +37,7 @@ class SupervisionError(StationError):
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """One process to keep running. It says READY=1 when it serves, and WATCHDOG=1 while it makes progress."""
+    """One process to supervise. It sends READY=1 when it serves, and WATCHDOG=1 while it makes progress."""
 
     name: str
     command: tuple[str, ...]
@@ -47,11 +46,11 @@ class Program:
     stop_limit_s: float = 30.0
     """From SIGTERM to SIGKILL."""
     output: Path | None = None
-    """Where its output and messages are appended; None for the supervisor's own."""
+    """File for its output and messages; None for the supervisor's own output."""
 
 
 class _Child:
-    """A program's process of the moment."""
+    """A program's present process."""
 
     def __init__(self, program: Program, folder: Path, environment: Mapping[str, str]) -> None:
         self.program = program
@@ -65,7 +64,7 @@ class _Child:
         self._listening.bind(str(self._address))
         self.ready = self.given_up = False
         self.heard_s = 0.0
-        """When it was started, or last said that it makes progress; monotonic."""
+        """Time of its start or last sign of progress; monotonic."""
 
     async def start(self) -> None:
         self.ready = False
@@ -89,7 +88,7 @@ class _Child:
         self.heard_s = time.monotonic()
 
     def listen(self) -> None:
-        """Take what the process has said since the last call."""
+        """Receive the process's messages since the last call."""
         while True:
             try:
                 message = self._listening.recv(_LONGEST_MESSAGE_BYTES)
@@ -101,7 +100,7 @@ class _Child:
                 self.heard_s = time.monotonic()
 
     def trouble(self) -> str:
-        """What is wrong with the process, empty where nothing is."""
+        """Return the process's fault, empty for none."""
         if self.process is None:
             return "is not running"
         if self.process.returncode is not None:
@@ -114,7 +113,7 @@ class _Child:
         return ""
 
     async def stop(self, limit_s: float) -> None:
-        """End the process by SIGTERM, after the limit by SIGKILL, with all that it has started."""
+        """End the process and all its children by SIGTERM, after the limit by SIGKILL."""
         process = self.process
         if process is None:
             return
@@ -128,7 +127,7 @@ class _Child:
         await process.wait()
 
     def last_words(self) -> str:
-        """What the process wrote last, or where to look for it."""
+        """Return the process's last output, or the place of its log."""
         if self.program.output is None:
             return "see its messages above"
         lines = self.program.output.read_text(encoding="utf-8", errors="replace").strip().splitlines()
@@ -139,10 +138,10 @@ class _Child:
 
 
 class Supervisor:
-    """Keeps programs running.
+    """Supervisor of programs.
 
     Args:
-        programs: in the order in which they are started, each when the one before is ready; ended in reverse.
+        programs: in the order of their start, each when the one before is ready; ended in reverse.
         environment: theirs.
     """
 
@@ -155,11 +154,11 @@ class Supervisor:
 
     @property
     def restarts(self) -> dict[str, int]:
-        """Of each program, within the budget's time."""
+        """Return the restarts of each program, within the budget's time."""
         return {child.program.name: len(child.restarts) for child in self._children}
 
     def ready(self, name: str) -> bool:
-        """Whether a program's process of the moment has said that it serves.
+        """Return whether a program's present process has reported that it serves.
 
         Args:
             name: the program's.
@@ -167,7 +166,7 @@ class Supervisor:
         return any(child.ready for child in self._children if child.program.name == name)
 
     async def run(self, on_ready: Callable[[], None], ended: asyncio.Event) -> None:
-        """Start everything, keep it running, and end it.
+        """Start everything, supervise it, and end it.
 
         Args:
             on_ready: called once all are ready for the first time.
@@ -217,7 +216,7 @@ class Supervisor:
             await self._look((), ended)
 
     def _feed(self) -> None:
-        """Feed the watchdog above once every program that is kept running, if any is, was heard since the last time."""
+        """Feed systemd's watchdog once all running programs, if there are any, have notified since the last time."""
         kept = [child for child in self._children if not child.given_up]
         if kept and all(child.ready and child.heard_s > self._fed_s for child in kept):
             notify("WATCHDOG=1")

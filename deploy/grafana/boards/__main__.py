@@ -1,4 +1,4 @@
-"""Write every dashboard's JSON: `python -m deploy.grafana.boards`, in a checkout; a test compares them."""
+"""Generator of the dashboards' JSON: `python -m deploy.grafana.boards`, in a checkout; a test compares them."""
 
 from deploy.grafana.boards.export import exported
 

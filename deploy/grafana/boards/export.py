@@ -1,4 +1,4 @@
-"""What each dashboard's file has to hold."""
+"""Content of the dashboards' files."""
 
 import json
 from pathlib import Path
@@ -12,11 +12,7 @@ BOARDS = {"line": line, "station": station, "quality": quality, "fleet": fleet}
 
 
 def exported(folder: Path = FOLDER) -> dict[Path, str]:
-    """Each file's text.
-
-    Args:
-        folder: where they lie.
-    """
+    """Return each file's text."""
     return {
         folder / f"{name}.json": json.dumps(
             module.dashboard().build(), cls=JSONEncoder, indent=2, sort_keys=True, ensure_ascii=False

@@ -1,4 +1,4 @@
-"""All stations side by side: for whoever plans where to go next."""
+"""Dashboard of all stations side by side, for maintenance planning."""
 
 from typing import Any
 

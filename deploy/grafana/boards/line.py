@@ -1,4 +1,4 @@
-"""What the line does: rejects, throughput, areas; for whoever answers for a shift."""
+"""Dashboard of the line: rejects, throughput, areas; for the person responsible for a shift."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A panel as its author thinks of it, and the same for Grafana: none without a unit, a description and a link."""
+"""Panel definitions and their conversion for Grafana: each with a unit, a description and a link."""
 
 import itertools
 from collections.abc import Iterator
@@ -36,13 +36,13 @@ from grafana_foundation_sdk.models.prometheus import PromQueryFormat
 PROMETHEUS = DataSourceRef(type_val="prometheus", uid="prometheus")
 POSTGRESQL = DataSourceRef(type_val="grafana-postgresql-datasource", uid="postgresql")
 DOCS = "${docs}"
-"""The variable that holds where the documents are kept."""
+"""The variable with the documents' address."""
 WIDTH = 24
 HEIGHT = 8
 
 
 class Prom(NamedTuple):
-    """A question to Prometheus."""
+    """A Prometheus query."""
 
     expr: str
     legend: str = ""
@@ -50,13 +50,13 @@ class Prom(NamedTuple):
 
 
 class Sql(NamedTuple):
-    """A question to PostgreSQL."""
+    """A PostgreSQL query."""
 
     sql: str
 
 
 class Panel(NamedTuple):
-    """One picture on a dashboard."""
+    """One panel of a dashboard."""
 
     kind: str
     """`lines`, `stacked`, `bars`, `number`, `heat` or `table`."""
@@ -64,7 +64,7 @@ class Panel(NamedTuple):
     unit: str
     """Grafana's id of it."""
     about: str
-    """What it shows, and what to do where it looks wrong."""
+    """Its content, and what to do about a bad value."""
     link: str
     """The alarm's or the subject's document, below `docs/`."""
     asks: tuple[Prom, ...] | tuple[Sql, ...]
@@ -74,7 +74,7 @@ class Panel(NamedTuple):
 
 
 def prom(kind: str, title: str, unit: str, about: str, link: str, *asks: tuple[str, str] | str, **more: Any) -> Panel:
-    """A panel that asks Prometheus.
+    """Make a panel with Prometheus queries.
 
     Args:
         kind: as in `Panel`, likewise the following.
@@ -90,7 +90,7 @@ def prom(kind: str, title: str, unit: str, about: str, link: str, *asks: tuple[s
 
 
 def sql(kind: str, title: str, unit: str, about: str, link: str, ask: str, **more: Any) -> Panel:
-    """A panel that asks PostgreSQL.
+    """Make a panel with a PostgreSQL query.
 
     Args:
         kind: as in `Panel`, likewise the following.
@@ -98,14 +98,14 @@ def sql(kind: str, title: str, unit: str, about: str, link: str, ask: str, **mor
         unit: see there.
         about: see there.
         link: see there.
-        ask: the statement; the first column of a picture over time is `time`.
+        ask: the statement; the first column of a time series is `time`.
         more: other fields of `Panel`.
     """
     return Panel(kind, title, unit, about, link, (Sql(" ".join(ask.split())),), **more)
 
 
 class _SqlQuery(Dataquery):
-    """PostgreSQL's query, which the SDK has no model of: as Grafana 11 writes it."""
+    """PostgreSQL query as Grafana 11 writes it; the SDK has no model of it."""
 
     def __init__(self, ref_id: str, text: str, *, over_time: bool) -> None:
         self._ref_id, self._text, self._over_time = ref_id, text, over_time
@@ -130,11 +130,11 @@ class _SqlBuilder(Builder[Dataquery]):
 
 
 def built(panel: Panel, number: int) -> Any:
-    """The panel for Grafana.
+    """Return the panel for Grafana.
 
     Args:
-        panel: what is wanted.
-        number: its own on the dashboard.
+        panel: the definition.
+        number: unique on the dashboard.
     """
     making = _MAKERS[panel.kind](panel)
     source = PROMETHEUS if isinstance(panel.asks[0], Prom) else POSTGRESQL
@@ -149,13 +149,13 @@ def built(panel: Panel, number: int) -> Any:
 
 
 def board(uid: str, title: str, about: str, variables: tuple[Any, ...], rows: dict[str, tuple[Panel, ...]]) -> Any:
-    """A dashboard.
+    """Make a dashboard.
 
     Args:
-        uid: its identity, which links and bookmarks keep.
+        uid: permanent identity for links and bookmarks.
         title: its name.
-        about: what question it answers.
-        variables: what can be chosen.
+        about: the question that it answers.
+        variables: the reader's selections.
         rows: panels under their headings.
     """
     docs = dashboard.TextBoxVariable("docs").label("Documents").default_value("/docs").description(
@@ -178,13 +178,13 @@ def board(uid: str, title: str, about: str, variables: tuple[Any, ...], rows: di
 
 
 def chosen(name: str, label: str, query: str, *, several: bool) -> Any:
-    """A variable that is chosen from what there is.
+    """Make a variable that a reader selects from existing values.
 
     Args:
         name: in expressions.
         label: for people.
         query: `label_values(…)` for Prometheus, a SELECT for PostgreSQL.
-        several: whether all or some may be chosen; else one.
+        several: whether all or some may be selected; else one.
     """
     source = POSTGRESQL if query.upper().startswith("SELECT") else PROMETHEUS
     making = (

@@ -1,5 +1,5 @@
 # ruff: noqa: S608 (constants put together; what Grafana puts in is quoted by it)
-"""Lots, growers and trends, from the records of all stations in PostgreSQL: for quality and the growers' talks."""
+"""Dashboard of lots, growers and trends, from the records of all stations in PostgreSQL; for quality management."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""One station's health: for whoever is called when it does not run."""
+"""Dashboard of one station's health, for troubleshooting."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ LASTED = "station_inspection_duration_seconds"
 
 
 def mean_of(phases: str) -> str:
-    """Seconds in these phases of the cycle, per inspection.
+    """Return an expression: seconds in these phases of the cycle, per inspection.
 
     Args:
         phases: a regular expression.
