@@ -18,7 +18,7 @@ from pathlib import Path
 import can
 
 from plc_interface.can.counts import further
-from plc_interface.can.errors import LateShotError
+from plc_interface.can.errors import LateRejectError
 from plc_interface.can.line_io import LineIo
 from plc_interface.can.link import ORDER, REPORT, open_bus
 from station.settings.can import CanSettings
@@ -88,7 +88,7 @@ async def measure(settings: CanSettings) -> list[list[str]]:
                 raise TimeoutError("the encoder is silent")
             try:
                 shots_s.append((await io.divert(sequence, 1, further(count.value, AHEAD_COUNTS))).confirmed_s)
-            except LateShotError:  # this machine stood still for longer than the belt took
+            except LateRejectError:  # this machine stood still for longer than the belt took
                 missed += 1
         bare_s = await asyncio.to_thread(bare, settings)
     finally:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import psutil
 
-from plc_interface.latency import favour_latency
+from plc_interface.latency import request_real_time_priority
 from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.server import ModbusServer
 from station.settings.modbus import ModbusSettings
@@ -55,7 +55,7 @@ def serve_ours(port: int, *, priority: bool) -> None:
         settings = ModbusSettings(port=port, max_connections=2 * max(CLIENTS))
         await ModbusServer(settings, RegisterImage(), lambda *_: None, lambda *_: None).start()
         if priority:
-            favour_latency()
+            request_real_time_priority()
         await asyncio.Event().wait()
 
     asyncio.run(serve())

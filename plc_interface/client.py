@@ -14,7 +14,7 @@ from plc_interface.client_errors import (
     TriggerRefusedError,
 )
 from plc_interface.codec import WordOrder
-from plc_interface.inspection_result import InspectionResult, result_shown
+from plc_interface.inspection_result import InspectionResult, published_result
 from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_link import RegisterLink
 from plc_interface.register_map import BY_NAME, COUNTERS
@@ -82,7 +82,7 @@ class StationClient(RegisterLink):
 
     async def shown(self) -> InspectionResult | None:
         """Return the result that waits for its acknowledgement, or None."""
-        return result_shown(await self.scan())
+        return published_result(await self.scan())
 
     async def inspect(
         self,
@@ -133,10 +133,10 @@ class StationClient(RegisterLink):
             raise TriggerRefusedError(f"trigger {trigger_id} was refused: {code.meaning}", code.name)
 
         def is_mine(now: dict[str, Any]) -> bool:
-            result = result_shown(now)
+            result = published_result(now)
             return result is not None and result.trigger_id == trigger_id
 
-        taken = result_shown(await self._until(is_mine, ends_s, f"the result of trigger {trigger_id}"))
+        taken = published_result(await self._until(is_mine, ends_s, f"the result of trigger {trigger_id}"))
         if taken is None or taken.trigger_id != trigger_id:
             raise ClientError(f"the result of trigger {trigger_id} was lost")
         await self.acknowledge(taken.sequence)

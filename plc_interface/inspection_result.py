@@ -42,7 +42,7 @@ class InspectionResult:
         return self.outcome == "PASS" and "pass" in self.flags and "late" not in self.flags
 
 
-def result_shown(block: Mapping[str, Any]) -> InspectionResult | None:
+def published_result(block: Mapping[str, Any]) -> InspectionResult | None:
     """Return the result in one read of status and result block; None if there is none, or the read is torn.
 
     Args:

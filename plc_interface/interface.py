@@ -20,7 +20,7 @@ from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.statistics import Statistics
 from plc_interface.register_map import BY_NAME
-from plc_interface.register_telling import registers_told
+from plc_interface.register_telling import formatted_registers
 from plc_interface.station_link import StationLink, now
 from station.channel.line import Line
 from station.settings.plc import HandshakeSettings
@@ -77,7 +77,7 @@ class Interface:
 
     def leave(self) -> None:
         """Report to the PLC that the station is offline; nothing is started any more."""
-        self.feed(ev.Leaving(now()))
+        self.feed(ev.ShuttingDown(now()))
 
     def on_write(self, _writer: Peer, values: Mapping[str, int | float | str]) -> None:
         """Handle a write; the answer is in the registers before the request is answered."""
@@ -87,16 +87,16 @@ class Interface:
         self._inputs = replace(self._inputs, **known)
         count = self._output.encoder_count()
         inputs = self._inputs if count is None else replace(self._inputs, encoder=count)
-        self._tell_output()
+        self._report_output()
         self.feed(ev.PlcWrote(now(), inputs, frozenset(known)))
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:
         """Handle a change of the right to write."""
         self._writer = peer
         if peer is None or change is WriterChange.TAKEN_OVER:
-            self.feed(ev.WriterWent(now()))
+            self.feed(ev.WriterWithdrawn(now()))
         if peer is not None:
-            self.feed(ev.WriterCame(now()))
+            self.feed(ev.WriterGranted(now()))
         self._image.commit({"writer_ipv4": _ipv4(peer)})
 
     def feed(self, event: ev.Event) -> None:
@@ -106,7 +106,7 @@ class Interface:
         if self._state.journal.epoch != epoch:
             self._before_reset = (self._statistics.bad_requests, self._statistics.refused_connections)
         for action in actions:
-            if isinstance(action, do.Keep):
+            if isinstance(action, do.SaveJournal):
                 self._journal.write(action.journal, durable=action.durable)
         self._show()
         for action in actions:
@@ -114,12 +114,12 @@ class Interface:
         if isinstance(event, ev.Beat) and self._state.link is Link.UP and event.station.healthy:
             self._output.renew_health(self._settings.station_lost_after_s)
         if isinstance(event, ev.Beat):
-            self._tell_output()
+            self._report_output()
         self._wake_when_due()
 
-    def _tell_output(self) -> None:
+    def _report_output(self) -> None:
         if self._output.ready != self._state.diverts:
-            self.feed(ev.OutputTold(now(), self._output.ready))
+            self.feed(ev.OutputChanged(now(), self._output.ready))
 
     def _show(self) -> None:
         values = view(self._state) | self._server_counts()
@@ -129,13 +129,13 @@ class Interface:
 
     def _carry_out(self, action: do.Action) -> None:
         match action:
-            case do.Say(text=text, warning=warning):
+            case do.Log(text=text, warning=warning):
                 log.log(logging.WARNING if warning else logging.INFO, "%s", text)
-            case do.PassOn(outcome=outcome):
+            case do.ForwardOutcome(outcome=outcome):
                 self._output.publish(outcome)
             case do.ClearFaults():
                 self._output.acknowledge_faults()
-            case do.AskCommand(command=command, argument=argument):
+            case do.RequestCommand(command=command, argument=argument):
                 log.info("%s orders %s, argument %d", self._writer, command.value, argument)
                 self._station.carry_out(action)
             case _:
@@ -151,10 +151,10 @@ class Interface:
     def _line(self) -> Line:
         faults = (*((self._journal.trouble,) if self._journal.trouble else ()), *self._output.faults)
         counters = {**self._server_counts(), **self._output.counters}
-        told, station = line(self._state, counters, faults), self._state.station
+        state, station = line(self._state, counters, faults), self._state.station
         if station is None or not station.registers_wanted:
-            return told
-        return told.model_copy(update={"registers": registers_told(self._image.value)})
+            return state
+        return state.model_copy(update={"registers": formatted_registers(self._image.value)})
 
     def _wake_when_due(self) -> None:
         if self._timer is not None:

@@ -10,7 +10,7 @@ REAL_TIME_PRIORITY = 1
 log = logging.getLogger(__name__)
 
 
-def favour_latency() -> bool:
+def request_real_time_priority() -> bool:
     """Freeze the garbage collector's objects and request real-time priority. Call once all is set up.
 
     Needs CAP_SYS_NICE (systemd: `CPUSchedulingPolicy=rr`, or `AmbientCapabilities=CAP_SYS_NICE`); without it a log line

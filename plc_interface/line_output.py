@@ -12,11 +12,11 @@ from plc_interface.can.errors import (
     InterfaceError,
     LineIoError,
     NotReadyError,
-    ShotLostError,
-    ShotRefusedError,
+    RejectLostError,
+    RejectRefusedError,
 )
 from plc_interface.can.line_io import LineIo
-from plc_interface.shot_file import ShotFile
+from plc_interface.shot_file import PendingRejectFile
 from station.channel.line import Outcome
 from station.settings.can import CanSettings
 
@@ -41,7 +41,7 @@ class LineOutput(Protocol):
         """Act on an outcome. The same one may be published again after a restart."""
         ...
 
-    def renew_health(self, lease_s: float) -> None:
+    def renew_health(self, valid_s: float) -> None:
         """Declare the station healthy for so many seconds more."""
         ...
 
@@ -85,7 +85,7 @@ class NoOutput:
     def publish(self, outcome: Outcome) -> None:
         """Do nothing: the PLC reads the outcome."""
 
-    def renew_health(self, lease_s: float) -> None:
+    def renew_health(self, valid_s: float) -> None:
         """Do nothing."""
 
     def acknowledge_faults(self) -> None:
@@ -111,7 +111,7 @@ class RejectGate:
             folder: of the journal.
         """
         self._io, self._distance = LineIo(settings), settings.distance_counts
-        self._file = ShotFile(folder)
+        self._file = PendingRejectFile(folder)
         self._due = self._file.read()
         self._shots: set[asyncio.Task[None]] = set()
         self.renew_health = self._io.renew_health
@@ -151,7 +151,7 @@ class RejectGate:
         while not self._is_too_far(sequence, at_count):
             try:
                 await self._io.divert(sequence, REJECTS_LANE, at_count)
-            except (NotReadyError, InterfaceError, EchoMissingError, ShotLostError) as error:
+            except (NotReadyError, InterfaceError, EchoMissingError, RejectLostError) as error:
                 if said != (said := type(error).__name__):
                     log.warning("inspection %d: %s; its shot is ordered until its count is past", sequence, error)
                 await asyncio.sleep(_RETRY_S)
@@ -166,7 +166,7 @@ class RejectGate:
         count = self._io.encoder_count()
         if count is None or ahead(count.value, at_count) <= self._distance:
             return False
-        error = ShotRefusedError(
+        error = RejectRefusedError(
             sequence,
             f"count {at_count} lies further ahead than the way from the nest to the gate, the belt is at "
             f"{count.value}: the encoder was set anew, or not known at the trigger; look at the fruit",

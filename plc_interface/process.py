@@ -8,7 +8,7 @@ from importlib.metadata import version
 from plc_interface.codec import WordOrder
 from plc_interface.interface import Interface
 from plc_interface.journal_file import JournalFile
-from plc_interface.latency import favour_latency
+from plc_interface.latency import request_real_time_priority
 from plc_interface.line_output import make_output
 from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.server import ModbusServer
@@ -55,7 +55,7 @@ async def serve(configuration: Configuration) -> None:
     feeding: asyncio.Task[None] | None = None
     try:
         await server.start()
-        favour_latency()
+        request_real_time_priority()
         interface.start(server.statistics)
         await output.start()
         feeding = asyncio.create_task(feed_watchdog(lambda: True))

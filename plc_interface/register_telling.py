@@ -9,7 +9,7 @@ from station.channel.line import RegisterTold
 Value = int | float | str | None
 
 
-def registers_told(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
+def formatted_registers(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
     """Return every register of the map with its formatted value, in the order of the addresses.
 
     Args:
@@ -19,7 +19,7 @@ def registers_told(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
         RegisterTold(
             name=register.name,
             address=register.address,
-            value=_in_words(register, value(register.name)),
+            value=_formatted(register, value(register.name)),
             unit=register.unit,
             writable=register.access is Access.READ_WRITE,
             meaning=register.meaning,
@@ -28,7 +28,7 @@ def registers_told(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
     )
 
 
-def _in_words(register: Register, value: Value) -> str:
+def _formatted(register: Register, value: Value) -> str:
     if value is None:
         return "none"
     if isinstance(value, str):

@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 _RANGE = 2**32
 
 
-class ShotFile:
+class PendingRejectFile:
     """One file, replaced as a whole. It belongs to the holder of the journal's lock."""
 
     def __init__(self, folder: Path) -> None:

@@ -55,7 +55,7 @@ class StationLink:
         """
         self._settings, self._feed, self._line = settings, feed, line
         self._client = ChannelClient(endpoint, "the station")
-        self._notes: deque[do.TellPublished | do.TellAcknowledged] = deque()
+        self._notes: deque[do.NotifyPublished | do.NotifyAcknowledged] = deque()
         self._noting: asyncio.Task[None] | None = None
         self._outcomes: dict[int, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -77,17 +77,17 @@ class StationLink:
     def carry_out(self, action: do.Action) -> None:
         """Send a request; its answer arrives as an event. Actions that are not for the station are ignored."""
         match action:
-            case do.AskBegin():
+            case do.RequestBegin():
                 self._spawn(self._begin(action), f"begin {action.trigger_id}")
-            case do.AskOutcome():
+            case do.RequestOutcome():
                 if action.sequence in self._outcomes:
                     self._outcomes[action.sequence].cancel()
                 self._outcomes[action.sequence] = self._spawn(self._outcome(action), f"outcome {action.sequence}")
-            case do.AskOpen():
+            case do.RequestOpen():
                 self._spawn(self._open(action), "open")
-            case do.AskCommand():
+            case do.RequestCommand():
                 self._spawn(self._command(action), f"command {action.command}")
-            case do.TellPublished() | do.TellAcknowledged():
+            case do.NotifyPublished() | do.NotifyAcknowledged():
                 self._notes.append(action)
                 if self._noting is None or self._noting.done():
                     self._noting = self._spawn(self._note(), "notes")
@@ -120,7 +120,7 @@ class StationLink:
             except TimeoutError:
                 pass
 
-    async def _begin(self, action: do.AskBegin) -> None:
+    async def _begin(self, action: do.RequestBegin) -> None:
         request = Begin(
             trigger_id=action.trigger_id,
             encoder=action.encoder,
@@ -136,7 +136,7 @@ class StationLink:
         else:
             self._feed(ev.BeginAnswered(now(), action.number, begun))
 
-    async def _outcome(self, action: do.AskOutcome) -> None:
+    async def _outcome(self, action: do.RequestOutcome) -> None:
         request = AwaitOutcome(sequence=action.sequence)
         try:
             outcome = await self._client.ask(request, Outcome, deadline_s=action.within_s + OUTCOME_GRACE_S)
@@ -145,22 +145,22 @@ class StationLink:
             self._feed(ev.OutcomeFailed(now(), action.sequence, str(error)))
         else:
             self._forget_outcome(action.sequence)
-            self._feed(ev.OutcomeCame(now(), outcome))
+            self._feed(ev.OutcomeReceived(now(), outcome))
             self._beat_now.set()  # the station may be ready for the next trigger at once
 
     def _forget_outcome(self, sequence: int) -> None:
         if self._outcomes.get(sequence) is asyncio.current_task():
             del self._outcomes[sequence]
 
-    async def _open(self, action: do.AskOpen) -> None:
+    async def _open(self, action: do.RequestOpen) -> None:
         try:
             opened = await self._client.ask(Resume(), Open, deadline_s=self._settings.station_lost_after_s)
         except ChannelError as error:
             self._feed(ev.RequestFailed(now(), str(error)))
         else:
-            self._feed(ev.OpenTold(now(), action.number, opened))
+            self._feed(ev.OpenAnswered(now(), action.number, opened))
 
-    async def _command(self, action: do.AskCommand) -> None:
+    async def _command(self, action: do.RequestCommand) -> None:
         request = Command(command=action.command, argument=action.argument)
         try:
             done = await self._client.ask(request, CommandDone, deadline_s=self._settings.command_deadline_s)
@@ -176,7 +176,7 @@ class StationLink:
         """Send notes one after the other: an acknowledgement never overtakes its outcome."""
         while self._notes:
             action = self._notes[0]
-            told = isinstance(action, do.TellPublished)
+            told = isinstance(action, do.NotifyPublished)
             request = Published(outcome=action.outcome) if told else Acknowledged(sequence=action.sequence)
             try:
                 await self._client.ask(request, Noted, deadline_s=self._settings.station_lost_after_s)

@@ -91,7 +91,7 @@ def verify_identity(node: Node) -> str:
     return f"{node.remote.object_dictionary.device_information.product_name} {revision >> 16}.{revision & 0xFFFF}"
 
 
-def standing_error(node: Node) -> tuple[int, int] | None:
+def active_error(node: Node) -> tuple[int, int] | None:
     """Return the node's latest active error as code and error register; None if it has none.
 
     Raises:
@@ -151,7 +151,7 @@ def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
     """
     for name, pdo in pdos.items():
         wanted = _wanted(pdo)
-        with _asking(node, f"for the mapping of its {name}"):
+        with _sdo_access(node, f"for the mapping of its {name}"):
             pdo.map.read()
         if _layout(pdo.map) != wanted:
             return f"{name} is {_layout(pdo.map)}, expected {wanted}"
@@ -161,7 +161,7 @@ def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
 def _write_pdos(node: Node, pdos: dict[str, Pdo]) -> None:
     for name, pdo in pdos.items():
         _wanted(pdo)
-        with _asking(node, f"to take the mapping of its {name}"):
+        with _sdo_access(node, f"to take the mapping of its {name}"):
             pdo.map.save()
     if foreign := foreign_mapping(node, pdos):
         raise BringUpError(f"{node.name} took its PDO mapping and holds another: {foreign}; {_OTHER_NODE}")
@@ -184,7 +184,7 @@ _OTHER_NODE = "compare its firmware with the data sheet that the station ships"
 
 
 @contextmanager
-def _asking(node: Node, what: str) -> Iterator[None]:
+def _sdo_access(node: Node, what: str) -> Iterator[None]:
     try:
         yield
     except SdoAbortedError as error:
@@ -212,13 +212,13 @@ def _default(node: Node, index: int, subindex: int) -> int:
 
 def _get(node: Node, index: int, subindex: int) -> int:
     variable = _variable(node, index, subindex)
-    with _asking(node, f"for its {variable.name}"):
+    with _sdo_access(node, f"for its {variable.name}"):
         return variable.raw
 
 
 def _put(node: Node, index: int, subindex: int, value: int) -> None:
     variable = _variable(node, index, subindex)
-    with _asking(node, f"to set its {variable.name} to 0x{value:X}"):
+    with _sdo_access(node, f"to set its {variable.name} to 0x{value:X}"):
         variable.raw = value
     kept = _get(node, index, subindex)
     if kept != value:

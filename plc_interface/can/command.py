@@ -36,7 +36,7 @@ def check_can(config: Path | None) -> None:
     try:
         click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
         for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
-            looked = _look_at_gate if node.number == settings.gate_node else _look_at_encoder
+            looked = _check_gate if node.number == settings.gate_node else _check_encoder
             try:
                 found = looked(link, node, settings)
             except LineIoError as error:
@@ -50,15 +50,15 @@ def check_can(config: Path | None) -> None:
         raise LineIoError(f"not usable: {', '.join(faulty)}")
 
 
-def _look_at_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
-    return _look(link, node, settings, bring_up.gate_pdos)
+def _check_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return _check_node(link, node, settings, bring_up.gate_pdos)
 
 
-def _look_at_encoder(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
-    return f"{_look(link, node, settings, bring_up.encoder_pdos)}, count {bring_up.read_position(node)}"
+def _check_encoder(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return f"{_check_node(link, node, settings, bring_up.encoder_pdos)}, count {bring_up.read_position(node)}"
 
 
-def _look(
+def _check_node(
     link: CanLink,
     node: bring_up.Node,
     settings: CanSettings,

@@ -33,7 +33,7 @@ def is_reset(code: int) -> bool:
     return code & 0xFF00 == 0
 
 
-def in_words(code: int, register: int) -> str:
+def described_emergency(code: int, register: int) -> str:
     """Describe an emergency, with the remedy.
 
     Args:

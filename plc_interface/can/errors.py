@@ -27,7 +27,7 @@ class NotReadyError(LineIoError):
     """No reject actuation can be ordered now."""
 
 
-class ShotError(LineIoError):
+class RejectError(LineIoError):
     """A reject actuation that did not happen, or whose result is unknown."""
 
     def __init__(self, sequence: int, what: str) -> None:
@@ -35,21 +35,21 @@ class ShotError(LineIoError):
         self.sequence = sequence
 
 
-class LateShotError(ShotError):
+class LateRejectError(RejectError):
     """The count at which the flap had to open is past; the gate did not actuate."""
 
 
-class ShotRefusedError(ShotError):
+class RejectRefusedError(RejectError):
     """The order cannot be carried out; the gate did not actuate."""
 
 
-class EchoMissingError(ShotError):
+class EchoMissingError(RejectError):
     """The gate did not confirm or report in time; whether it actuated is unknown."""
 
 
-class EchoWrongError(ShotError):
+class EchoWrongError(RejectError):
     """The gate reports something other than was ordered."""
 
 
-class ShotLostError(ShotError):
+class RejectLostError(RejectError):
     """The gate was lost with the order pending; whether it actuated is unknown."""

@@ -15,20 +15,20 @@ from typing import TypeVar
 
 from plc_interface.can import bring_up
 from plc_interface.can.counts import RANGE, Count, ahead, further
-from plc_interface.can.emergency import in_words, is_reset
+from plc_interface.can.emergency import described_emergency, is_reset
 from plc_interface.can.errors import (
     BringUpError,
     EchoMissingError,
     InterfaceError,
-    LateShotError,
+    LateRejectError,
     LineIoError,
     NodeLostError,
     NotReadyError,
-    ShotError,
-    ShotRefusedError,
+    RejectError,
+    RejectRefusedError,
 )
 from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
-from plc_interface.can.shots import DivertEcho, Fired, Order, PendingShot, Shots
+from plc_interface.can.shots import DivertEcho, Fired, Order, PendingReject, PendingRejects
 from station.settings.can import CanSettings
 
 _LONGEST_PAUSE_S = 10.0
@@ -53,7 +53,7 @@ class LineIo:
     def __init__(self, settings: CanSettings) -> None:
         self._settings = settings
         self._counters: Counter[str] = Counter()
-        self._shots = Shots(self._counters, settings.tolerance_counts)
+        self._shots = PendingRejects(self._counters, settings.tolerance_counts)
         self._emergencies: dict[tuple[int, int], str] = {}
         self._healthy_until_s = 0.0
         self._link: CanLink | None = None
@@ -81,9 +81,9 @@ class LineIo:
             self._worker.shutdown()
             self._worker = None
 
-    def renew_health(self, lease_s: float) -> None:
+    def renew_health(self, valid_s: float) -> None:
         """Declare the station healthy for so many seconds; after these its heartbeat stops."""
-        self._healthy_until_s = time.monotonic() + lease_s
+        self._healthy_until_s = time.monotonic() + valid_s
 
     @property
     def ready(self) -> bool:
@@ -109,7 +109,7 @@ class LineIo:
         trouble = (self._trouble,) if self._trouble else ()
         return (*trouble, *self._emergencies.values(), *self._shots.faults)
 
-    def give_up(self, error: ShotError) -> None:
+    def give_up(self, error: RejectError) -> None:
         """Count a reject actuation that is not ordered at all, and store it as a fault."""
         self._shots.blame(error)
 
@@ -150,12 +150,12 @@ class LineIo:
 
         Raises:
             NotReadyError: nothing was ordered.
-            LateShotError, ShotRefusedError: the gate does not actuate.
+            LateRejectError, RejectRefusedError: the gate does not actuate.
             InterfaceError: the order did not leave.
-            EchoMissingError, EchoWrongError, ShotLostError: the gate's action, if any, is not the ordered one.
+            EchoMissingError, EchoWrongError, RejectLostError: the gate's action, if any, is not the ordered one.
         """
         if not 1 <= sequence < RANGE or not 1 <= lane <= _LANES or not 0 <= at_count < RANGE:
-            raise ShotRefusedError(
+            raise RejectRefusedError(
                 sequence,
                 f"expected a sequence from 1 to {RANGE - 1}, a lane from 1 to {_LANES} and a count from 0 to "
                 f"{RANGE - 1}, found {sequence}, {lane} and {at_count}",
@@ -165,7 +165,7 @@ class LineIo:
             raise NotReadyError(f"shot {sequence} was not ordered: {self.why_not_ready}")
         with self._shots.under_way(Order(sequence, lane, at_count)) as shot:
             if ahead(now.value, at_count) <= 0:
-                raise LateShotError(
+                raise LateRejectError(
                     sequence,
                     f"count {at_count} is past, the belt is at {now.value}; nothing was ordered and the fruit went by: "
                     "shorten the inspection, or raise the distance from the nest to the gate",
@@ -183,7 +183,7 @@ class LineIo:
             self._counters["shots_fired"] += 1
             return DivertEcho(sequence, lane, at_count, report.encoder_count, confirmed_s)
 
-    async def _confirmed(self, shot: PendingShot) -> Report:
+    async def _confirmed(self, shot: PendingReject) -> Report:
         try:
             async with asyncio.timeout(self._settings.echo_deadline_s):
                 return await shot.next()
@@ -195,7 +195,7 @@ class LineIo:
                 "and take the fruit for not diverted",
             ) from None
 
-    async def _fired(self, shot: PendingShot, began_s: float) -> Report:
+    async def _fired(self, shot: PendingReject, began_s: float) -> Report:
         """Wait until the belt reaches the count, however slowly, and then for the report."""
         at = shot.order.at_count
         passed_s: float | None = None
@@ -298,7 +298,7 @@ class LineIo:
         await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
         await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
         for node in (encoder, gate):
-            if standing := await self._in_worker(lambda node=node: bring_up.standing_error(node)):
+            if standing := await self._in_worker(lambda node=node: bring_up.active_error(node)):
                 self._on_emergency(Emergency(node.number, *standing))
             await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
 
@@ -354,7 +354,7 @@ class LineIo:
             return
         self._counters["emergencies"] += 1
         name = "the reject gate" if node == self._settings.gate_node else "the line encoder"
-        self._emergencies[node, code] = f"{name} (node {node}): {in_words(code, register)}"
+        self._emergencies[node, code] = f"{name} (node {node}): {described_emergency(code, register)}"
 
     def _in_worker(self, work: Callable[[], Result]) -> Awaitable[Result]:
         """Run a blocking function in the one worker thread."""

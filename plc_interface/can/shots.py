@@ -10,10 +10,10 @@ from typing import NamedTuple
 from plc_interface.can.counts import ahead
 from plc_interface.can.errors import (
     EchoWrongError,
-    LateShotError,
-    ShotError,
-    ShotLostError,
-    ShotRefusedError,
+    LateRejectError,
+    RejectError,
+    RejectLostError,
+    RejectRefusedError,
 )
 from plc_interface.can.link import Report
 
@@ -57,22 +57,22 @@ class DivertEcho(NamedTuple):
     """From the order to the gate's confirmation that it is armed."""
 
 
-class PendingShot:
+class PendingReject:
     """A pending reject."""
 
     def __init__(self, order: Order, tolerance_counts: int) -> None:
         self.order = order
         self._tolerance_counts = tolerance_counts
-        self.reports: asyncio.Queue[Report | ShotError] = asyncio.Queue()
+        self.reports: asyncio.Queue[Report | RejectError] = asyncio.Queue()
 
     async def next(self) -> Report:
         """Return the gate's next report, if it is that of an order which proceeds as it should.
 
         Raises:
-            ShotError: it was refused, differs from the order, or the gate is lost.
+            RejectError: it was refused, differs from the order, or the gate is lost.
         """
         report = await self.reports.get()
-        if isinstance(report, ShotError):
+        if isinstance(report, RejectError):
             raise report
         sequence, at = self.order.sequence, self.order.at_count
         match report.fired:
@@ -88,50 +88,50 @@ class PendingShot:
                     )
                 return report
             case Fired.LATE:
-                raise LateShotError(
+                raise LateRejectError(
                     sequence,
                     f"count {at} was past when the gate got the order, at {report.encoder_count}; "
                     "the fruit went by: raise can.distance_counts or shorten the inspection",
                 )
             case Fired.FULL:
-                raise ShotRefusedError(sequence, "the gate has no place left for an order; slow the line down")
+                raise RejectRefusedError(sequence, "the gate has no place left for an order; slow the line down")
             case _:
-                raise ShotRefusedError(
+                raise RejectRefusedError(
                     sequence, f"the gate does not take lane {self.order.lane} (answer {report.fired}); look at the lane"
                 )
 
 
-class Shots:
+class PendingRejects:
     """All pending rejects, by the sequence on the wire."""
 
     def __init__(self, counters: Counter[str], tolerance_counts: int) -> None:
         self._counters = counters
         self._tolerance_counts = tolerance_counts
-        self._pending: dict[int, PendingShot] = {}
+        self._pending: dict[int, PendingReject] = {}
         self._ended: deque[int] = deque(maxlen=_REMEMBERED)
         self.faults: deque[str] = deque(maxlen=_KEPT_FAULTS)
         """Failed reject actuations since the last acknowledgement, one sentence each."""
 
     @contextmanager
-    def under_way(self, order: Order) -> Iterator[PendingShot]:
+    def under_way(self, order: Order) -> Iterator[PendingReject]:
         """Expect reports of this order; a failure is counted and stored as a fault.
 
         Raises:
-            ShotRefusedError: an order with this sequence is pending.
+            RejectRefusedError: an order with this sequence is pending.
         """
         if order.on_wire in self._pending:
-            raise ShotRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
-        shot = self._pending[order.on_wire] = PendingShot(order, self._tolerance_counts)
+            raise RejectRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
+        shot = self._pending[order.on_wire] = PendingReject(order, self._tolerance_counts)
         try:
             yield shot
-        except ShotError as error:
+        except RejectError as error:
             self.blame(error)
             raise
         finally:
             del self._pending[order.on_wire]
             self._ended.append(order.on_wire)
 
-    def blame(self, error: ShotError) -> None:
+    def blame(self, error: RejectError) -> None:
         """Count a failed reject actuation, and store it as a fault."""
         self._counters["shots_failed"] += 1
         self.faults.append(str(error))
@@ -151,7 +151,7 @@ class Shots:
     def lose(self, why: str) -> None:
         """End all orders: the gate is lost, and its actions are unknown."""
         for shot in self._pending.values():
-            lost = ShotLostError(
+            lost = RejectLostError(
                 shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
             )
             shot.reports.put_nowait(lost)

@@ -7,7 +7,7 @@ from station.channel.line import CommandName, Outcome
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
+class SaveJournal:
     """Write the journal before the PLC sees the new registers."""
 
     journal: Journal
@@ -16,7 +16,7 @@ class Keep:
 
 
 @dataclass(frozen=True, slots=True)
-class AskBegin:
+class RequestBegin:
     """Send `Begin`; answer with BeginAnswered or BeginFailed."""
 
     number: int
@@ -28,22 +28,22 @@ class AskBegin:
 
 
 @dataclass(frozen=True, slots=True)
-class AskOutcome:
-    """Send `AwaitOutcome`; answer with OutcomeCame or RequestFailed."""
+class RequestOutcome:
+    """Send `AwaitOutcome`; answer with OutcomeReceived or RequestFailed."""
 
     sequence: int
     within_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class AskOpen:
-    """Send `Resume`; answer with OpenTold or RequestFailed."""
+class RequestOpen:
+    """Send `Resume`; answer with OpenAnswered or RequestFailed."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class AskCommand:
+class RequestCommand:
     """Send `Command`; answer with CommandAnswered or CommandFailed."""
 
     number: int
@@ -52,21 +52,21 @@ class AskCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class TellPublished:
+class NotifyPublished:
     """Send `Published` after earlier notes; answer with OutcomeNoted or RequestFailed."""
 
     outcome: Outcome
 
 
 @dataclass(frozen=True, slots=True)
-class TellAcknowledged:
+class NotifyAcknowledged:
     """Send `Acknowledged` after earlier notes; a failure is answered with RequestFailed."""
 
     sequence: int
 
 
 @dataclass(frozen=True, slots=True)
-class PassOn:
+class ForwardOutcome:
     """Give a new outcome to the line's outputs."""
 
     outcome: Outcome
@@ -78,7 +78,7 @@ class ClearFaults:
 
 
 @dataclass(frozen=True, slots=True)
-class Say:
+class Log:
     """Write one line into the log."""
 
     text: str
@@ -86,5 +86,14 @@ class Say:
 
 
 Action = (
-    Keep | AskBegin | AskOutcome | AskOpen | AskCommand | TellPublished | TellAcknowledged | PassOn | ClearFaults | Say
+    SaveJournal
+    | RequestBegin
+    | RequestOutcome
+    | RequestOpen
+    | RequestCommand
+    | NotifyPublished
+    | NotifyAcknowledged
+    | ForwardOutcome
+    | ClearFaults
+    | Log
 )

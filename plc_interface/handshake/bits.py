@@ -28,7 +28,7 @@ def lot_is_good(work: Work) -> bool:
 
 def latch(work: Work) -> None:
     """Accept the lot id, start the latch bit's time-out."""
-    work.keep(lot=work.state.inputs.lot or "")
+    work.update_journal(lot=work.state.inputs.lot or "")
     work.start(Signal.LATCH_TIMEOUT, work.settings.handshake_timeout_s)
 
 
@@ -42,9 +42,9 @@ def bad_lot(work: Work) -> None:
     work.fault(Fault.BAD_LOT)
 
 
-def latch_forgotten(work: Work) -> None:
+def latch_not_reset(work: Work) -> None:
     """Fault: latch bit not reset in time."""
-    work.fault(Fault.LATCH_FORGOTTEN)
+    work.fault(Fault.LATCH_NOT_RESET)
 
 
 def clear(work: Work) -> None:
@@ -60,7 +60,7 @@ def reset(work: Work) -> None:
     """Counters to 0, epoch raised."""
     work.state.counters = dict.fromkeys(COUNTERS, 0)
     work.state.reset_utc_ms = work.at.utc_ms
-    work.keep(epoch=(work.state.journal.epoch + 1) % 2**32)
+    work.update_journal(epoch=(work.state.journal.epoch + 1) % 2**32)
 
 
 DISARMED, RELEASED, ARMED = Arming.DISARMED, Arming.RELEASED, Arming.ARMED
@@ -86,7 +86,7 @@ LOT_ROWS = (
     row(Lot.OPEN, Signal.WRITER_LOST),
     row(Lot.LATCHED, Signal.LATCH_OFF, end_latch, to=Lot.OPEN),
     row(Lot.LATCHED, Signal.WRITER_LOST, end_latch, to=Lot.OPEN),
-    row(Lot.LATCHED, Signal.LATCH_TIMEOUT, latch_forgotten, to=Lot.OPEN),
+    row(Lot.LATCHED, Signal.LATCH_TIMEOUT, latch_not_reset, to=Lot.OPEN),
 )
 
 

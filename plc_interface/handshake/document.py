@@ -48,8 +48,8 @@ def _diagram(rows: tuple[Row, ...]) -> list[str]:
 def _table(rows: tuple[Row, ...]) -> list[str]:
     lines = ["| mode | signal | if | does | next |", "|---|---|---|---|---|"]
     for row in rows:
-        guard = _words(row.guard.__doc__) if row.guard else ""
-        effects = "; ".join(_words(effect.__doc__) for effect in row.effects)
+        guard = _phrase(row.guard.__doc__) if row.guard else ""
+        effects = "; ".join(_phrase(effect.__doc__) for effect in row.effects)
         after = "" if row.next is row.mode else row.next.value
         lines.append(f"| {row.mode.value} | {row.signal.value} | {guard} | {effects} | {after} |")
     return lines
@@ -59,7 +59,7 @@ def _node(mode: Mode) -> str:
     return mode.value.replace(" ", "_")
 
 
-def _words(docstring: str | None) -> str:
+def _phrase(docstring: str | None) -> str:
     """Return a docstring's sentence as a part of one; capitals as in PLC and `Begin` are unchanged."""
     words = (docstring or "").removesuffix(".")
     return words if words[1:2].isupper() else words[:1].lower() + words[1:]

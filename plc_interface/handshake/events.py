@@ -44,14 +44,14 @@ class PlcWrote:
 
 
 @dataclass(frozen=True, slots=True)
-class WriterCame:
+class WriterGranted:
     """A client got the right to write."""
 
     at: Moment
 
 
 @dataclass(frozen=True, slots=True)
-class WriterWent:
+class WriterWithdrawn:
     """The client with the right to write closed, died, or released it."""
 
     at: Moment
@@ -73,7 +73,7 @@ class Beat:
 
 
 @dataclass(frozen=True, slots=True)
-class OutputTold:
+class OutputChanged:
     """The line's output can, or cannot, divert a fruit now."""
 
     at: Moment
@@ -82,7 +82,7 @@ class OutputTold:
 
 @dataclass(frozen=True, slots=True)
 class BeginAnswered:
-    """The station's answer to `AskBegin` with this number."""
+    """The station's answer to `RequestBegin` with this number."""
 
     at: Moment
     number: int
@@ -91,14 +91,14 @@ class BeginAnswered:
 
 @dataclass(frozen=True, slots=True)
 class BeginFailed:
-    """`AskBegin` got no answer; whether it was carried out is unknown."""
+    """`RequestBegin` got no answer; whether it was carried out is unknown."""
 
     at: Moment
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class OutcomeCame:
+class OutcomeReceived:
     """An inspection's outcome."""
 
     at: Moment
@@ -107,7 +107,7 @@ class OutcomeCame:
 
 @dataclass(frozen=True, slots=True)
 class OutcomeFailed:
-    """`AskOutcome` got no answer, or an unusable one."""
+    """`RequestOutcome` got no answer, or an unusable one."""
 
     at: Moment
     sequence: int
@@ -116,7 +116,7 @@ class OutcomeFailed:
 
 
 @dataclass(frozen=True, slots=True)
-class Leaving:
+class ShuttingDown:
     """This process ends: it reports offline to the PLC, and begins nothing any more."""
 
     at: Moment
@@ -132,8 +132,8 @@ class RequestFailed:
 
 
 @dataclass(frozen=True, slots=True)
-class OpenTold:
-    """The station's answer to `AskOpen` with this number."""
+class OpenAnswered:
+    """The station's answer to `RequestOpen` with this number."""
 
     at: Moment
     number: int
@@ -150,7 +150,7 @@ class OutcomeNoted:
 
 @dataclass(frozen=True, slots=True)
 class CommandAnswered:
-    """The station's answer to `AskCommand` with this number."""
+    """The station's answer to `RequestCommand` with this number."""
 
     at: Moment
     number: int
@@ -160,7 +160,7 @@ class CommandAnswered:
 
 @dataclass(frozen=True, slots=True)
 class CommandFailed:
-    """`AskCommand` got no answer in time; whether it was carried out is unknown."""
+    """`RequestCommand` got no answer in time; whether it was carried out is unknown."""
 
     at: Moment
     number: int
@@ -168,19 +168,19 @@ class CommandFailed:
 
 Event = (
     PlcWrote
-    | WriterCame
-    | WriterWent
+    | WriterGranted
+    | WriterWithdrawn
     | Tick
     | Beat
-    | OutputTold
+    | OutputChanged
     | BeginAnswered
     | BeginFailed
-    | OutcomeCame
+    | OutcomeReceived
     | OutcomeFailed
     | RequestFailed
-    | OpenTold
+    | OpenAnswered
     | OutcomeNoted
     | CommandAnswered
     | CommandFailed
-    | Leaving
+    | ShuttingDown
 )

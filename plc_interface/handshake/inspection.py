@@ -2,23 +2,25 @@
 
 from collections.abc import Callable
 
-from plc_interface.handshake.actions import AskBegin, AskOutcome
+from plc_interface.handshake.actions import RequestBegin, RequestOutcome
 from plc_interface.handshake.events import BeginAnswered, Moment
 from plc_interface.handshake.journal import Running
 from plc_interface.handshake.modes import Inspection, Signal
-from plc_interface.handshake.state import Asked
+from plc_interface.handshake.state import PendingTrigger
 from plc_interface.handshake.trigger import note_refusal
-from plc_interface.handshake.verdict import give, is_sound, no_result, queue, tell_if_other
+from plc_interface.handshake.verdict import is_sound, no_result, publish_if_other, publish_own, queue
 from plc_interface.handshake.work import Work, row
 from station.channel.line import Begun, Reason, Refusal
 
 
-def ask_begin(work: Work) -> None:
+def request_begin(work: Work) -> None:
     """`Begin` to the station."""
     state = work.state
     number = work.number()
-    state.asked = asked = Asked(number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot, work.size)
-    work.actions.append(AskBegin(number, asked.trigger_id, asked.encoder, asked.lot, *asked.size))
+    state.pending = pending = PendingTrigger(
+        number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot, work.size
+    )
+    work.actions.append(RequestBegin(number, pending.trigger_id, pending.encoder, pending.lot, *pending.size))
 
 
 def is_new(work: Work) -> bool:
@@ -29,28 +31,28 @@ def is_new(work: Work) -> bool:
 
 def accept(work: Work) -> None:
     """Accept the id under the sequence, start the deadline, `AwaitOutcome`."""
-    state, event, asked = work.state, work.event, work.state.asked
-    if not isinstance(event, BeginAnswered) or event.begun.sequence is None or asked is None:
+    state, event, pending = work.state, work.event, work.state.pending
+    if not isinstance(event, BeginAnswered) or event.begun.sequence is None or pending is None:
         return
     state.missed = False
     work.count("count_triggers", "count_accepted")
-    work.keep(disowned=())
-    run(work, event.begun.sequence, asked, event.begun.deadline_s)
-    state.open_asked = None  # its answer may be older than this inspection
+    work.update_journal(disowned=())
+    run(work, event.begun.sequence, pending, event.begun.deadline_s)
+    state.open_request = None  # its answer may be older than this inspection
     work.signals.append(Signal.ACCEPTED)
 
 
-def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
+def run(work: Work, sequence: int, pending: PendingTrigger, deadline_s: float) -> None:
     """Register an inspection as running, with the interface's own deadline behind the station's."""
     state, station = work.state, work.state.station
     within_s = deadline_s + work.settings.result_margin_s
-    state.asked = None
+    state.pending = None
     state.running = Running(
         sequence=sequence,
-        trigger_id=asked.trigger_id,
-        encoder=asked.encoder,
-        lot=asked.lot,
-        **asked.size._asdict(),
+        trigger_id=pending.trigger_id,
+        encoder=pending.encoder,
+        lot=pending.lot,
+        **pending.size._asdict(),
         within_s=within_s,
         began_s=work.at.s,
         began_utc_ms=work.at.utc_ms,
@@ -58,19 +60,19 @@ def run(work: Work, sequence: int, asked: Asked, deadline_s: float) -> None:
         recipe_checksum=station.recipe_checksum if station else 0,
         simulated=station.simulated if station else False,
     )
-    work.keep(accepted_id=asked.trigger_id, highest=sequence)
+    work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
     work.start(Signal.RESULT_DEADLINE, within_s)
-    work.actions.append(AskOutcome(sequence, within_s))
+    work.actions.append(RequestOutcome(sequence, within_s))
 
 
-def unknown_run(asked: Asked, sequence: int, at: Moment) -> Running:
+def unknown_run(pending: PendingTrigger, sequence: int, at: Moment) -> Running:
     """Make an inspection of which only sequence and trigger id are known."""
     return Running(
         sequence=sequence,
-        trigger_id=asked.trigger_id,
-        encoder=asked.encoder,
-        lot=asked.lot,
-        **asked.size._asdict(),
+        trigger_id=pending.trigger_id,
+        encoder=pending.encoder,
+        lot=pending.lot,
+        **pending.size._asdict(),
         within_s=0.0,
         began_s=at.s,
         began_utc_ms=at.utc_ms,
@@ -80,35 +82,35 @@ def unknown_run(asked: Asked, sequence: int, at: Moment) -> Running:
     )
 
 
-def refuse_as_told(work: Work) -> None:
+def refuse_as_answered(work: Work) -> None:
     """Refuse with the station's reason."""
     event = work.event
     begun = event.begun if isinstance(event, BeginAnswered) else Begun()
-    refuse_asked(work, begun.refusal or Refusal.NOT_READY)
+    refuse_pending(work, begun.refusal or Refusal.NOT_READY)
     if begun.refusal is Refusal.BUSY:
         work.signals.append(Signal.STATION_BUSY)
 
 
-def refuse_asked(work: Work, reason: Refusal) -> None:
+def refuse_pending(work: Work, reason: Refusal) -> None:
     """Refuse the trigger of the pending `Begin`."""
-    asked, work.state.asked = work.state.asked, None
-    if asked is not None:
-        note_refusal(work, reason, asked.trigger_id)
+    pending, work.state.pending = work.state.pending, None
+    if pending is not None:
+        note_refusal(work, reason, pending.trigger_id)
     work.signals.append(Signal.REFUSED)
 
 
-def refuse_used(work: Work) -> None:
+def refuse_reused_sequence(work: Work) -> None:
     """Refuse as not ready: the station used a sequence twice."""
-    work.say("the station gave a sequence again, or a lower one: its records were changed; the trigger is refused")
-    refuse_asked(work, Refusal.NOT_READY)
+    work.log("the station gave a sequence again, or a lower one: its records were changed; the trigger is refused")
+    refuse_pending(work, Refusal.NOT_READY)
 
 
-def disown(work: Work) -> None:
+def refuse_as_lost(work: Work) -> None:
     """Refuse as station lost; if the station began it, its result is never published."""
-    asked = work.state.asked
-    if asked is not None:
-        work.keep(disowned=(*work.state.journal.disowned, asked.trigger_id)[-8:])
-    refuse_asked(work, Refusal.STATION_LOST)
+    pending = work.state.pending
+    if pending is not None:
+        work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-8:])
+    refuse_pending(work, Refusal.STATION_LOST)
 
 
 def is_its_outcome(work: Work) -> bool:
@@ -137,8 +139,8 @@ def _ending(words: str, *reasons: Reason) -> Callable[[Work], None]:
     def give_no_result(work: Work) -> None:
         running = end_run(work)
         if running is not None:
-            work.say(f"inspection {running.sequence}: NO_RESULT ({', '.join(reasons)})")
-            give(work, no_result(running, work.at, *reasons))
+            work.log(f"inspection {running.sequence}: NO_RESULT ({', '.join(reasons)})")
+            publish_own(work, no_result(running, work.at, *reasons))
 
     give_no_result.__doc__ = words
     return give_no_result
@@ -152,23 +154,23 @@ unsound = _ending("NO_RESULT (internal fault) stands, `Published`.", Reason.INTE
 def drop(work: Work) -> None:
     """Drop it; `Published` if another one is final under its sequence."""
     if work.found is not None:
-        tell_if_other(work, work.found)
+        publish_if_other(work, work.found)
 
 
 NONE, BEGINNING, RUNNING = Inspection.NONE, Inspection.BEGINNING, Inspection.RUNNING
 
 ROWS = (
-    row(NONE, Signal.BEGIN, ask_begin, to=BEGINNING),
+    row(NONE, Signal.BEGIN, request_begin, to=BEGINNING),
     row(NONE, Signal.RESUMED_RUN, to=RUNNING),
     row(NONE, Signal.FOREIGN_OUTCOME, drop),
     row(NONE, Signal.STATION_SILENT),
     row(NONE, Signal.STATION_RESTARTED),
     row(BEGINNING, Signal.BEGUN, accept, to=RUNNING, when=is_new),
-    row(BEGINNING, Signal.BEGUN, refuse_used, to=NONE),
-    row(BEGINNING, Signal.BEGIN_REFUSED, refuse_as_told, to=NONE),
-    row(BEGINNING, Signal.BEGIN_FAILED, disown, to=NONE),
-    row(BEGINNING, Signal.STATION_SILENT, disown, to=NONE),
-    row(BEGINNING, Signal.STATION_RESTARTED, disown, to=NONE),
+    row(BEGINNING, Signal.BEGUN, refuse_reused_sequence, to=NONE),
+    row(BEGINNING, Signal.BEGIN_REFUSED, refuse_as_answered, to=NONE),
+    row(BEGINNING, Signal.BEGIN_FAILED, refuse_as_lost, to=NONE),
+    row(BEGINNING, Signal.STATION_SILENT, refuse_as_lost, to=NONE),
+    row(BEGINNING, Signal.STATION_RESTARTED, refuse_as_lost, to=NONE),
     row(BEGINNING, Signal.FOREIGN_OUTCOME, drop),
     row(RUNNING, Signal.OUTCOME, publish, to=NONE, when=is_its_outcome),
     row(RUNNING, Signal.OUTCOME, unsound, to=NONE),

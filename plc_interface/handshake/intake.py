@@ -9,17 +9,17 @@ from plc_interface.handshake.events import (
     BeginFailed,
     CommandAnswered,
     CommandFailed,
-    Leaving,
-    OpenTold,
-    OutcomeCame,
+    OpenAnswered,
     OutcomeFailed,
     OutcomeNoted,
-    OutputTold,
+    OutcomeReceived,
+    OutputChanged,
     PlcWrote,
     RequestFailed,
+    ShuttingDown,
     Tick,
-    WriterCame,
-    WriterWent,
+    WriterGranted,
+    WriterWithdrawn,
 )
 from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.state import NO_SIZE, Size
@@ -35,17 +35,17 @@ EDGES: tuple[tuple[str, Signal, Signal | None], ...] = (
 """The bits in the order in which those of one write count; the acknowledgement, the command and the trigger follow."""
 
 
-def take_in(work: Work) -> None:
+def apply_event(work: Work) -> None:
     """Store the event's data in the state and queue its signals."""
-    _TAKERS[type(work.event)](work, work.event)
+    _HANDLERS[type(work.event)](work, work.event)
 
 
-def _writer_came(work: Work, _event: WriterCame) -> None:
+def _writer_granted(work: Work, _event: WriterGranted) -> None:
     work.state.writer = True
     work.state.seen = None
 
 
-def _writer_went(work: Work, _event: WriterWent) -> None:
+def _writer_withdrawn(work: Work, _event: WriterWithdrawn) -> None:
     work.state.writer = False
     work.state.seen = None
     work.state.size = NO_SIZE
@@ -58,11 +58,11 @@ def _beat(work: Work, event: Beat) -> None:
     work.signals.append(Signal.STATION_ANSWERED if same else Signal.STATION_RESTARTED)
 
 
-def _output_told(work: Work, event: OutputTold) -> None:
+def _output_changed(work: Work, event: OutputChanged) -> None:
     work.state.diverts = event.ready
 
 
-def _outcome_came(work: Work, event: OutcomeCame) -> None:
+def _outcome_received(work: Work, event: OutcomeReceived) -> None:
     running = work.state.running
     work.found = event.outcome
     mine = running is not None and running.sequence == event.outcome.sequence
@@ -70,19 +70,19 @@ def _outcome_came(work: Work, event: OutcomeCame) -> None:
 
 
 def _request_failed(work: Work, event: RequestFailed) -> None:
-    work.say(f"the station did not answer as it has to: {event.what}")
+    work.log(f"the station did not answer as it has to: {event.what}")
     work.signals.append(Signal.CHANNEL_FAILED)
 
 
 def _outcome_failed(work: Work, event: OutcomeFailed) -> None:
     running = work.state.running
     if running is not None and running.sequence == event.sequence:
-        work.say(f"inspection {event.sequence}: the station did not give its outcome: {event.what}")
+        work.log(f"inspection {event.sequence}: the station did not give its outcome: {event.what}")
         work.signals.append(Signal.CHANNEL_FAILED)
 
 
-def _open_told(work: Work, event: OpenTold) -> None:
-    if event.number == work.state.open_asked:
+def _open_answered(work: Work, event: OpenAnswered) -> None:
+    if event.number == work.state.open_request:
         work.signals.append(Signal.OPENED)
     else:
         work.state.stale += 1
@@ -90,7 +90,7 @@ def _open_told(work: Work, event: OpenTold) -> None:
 
 def _outcome_noted(work: Work, event: OutcomeNoted) -> None:
     verdicts = work.state.journal.verdicts
-    work.keep(verdicts=tuple(verdict for verdict in verdicts if verdict.sequence != event.sequence))
+    work.update_journal(verdicts=tuple(verdict for verdict in verdicts if verdict.sequence != event.sequence))
 
 
 def _plc_wrote(work: Work, event: PlcWrote) -> None:
@@ -107,7 +107,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
         fell = frozenset(bit for bit in _BITS if bit not in control and (seen is None or bit in seen))
         if seen is None:  # a bit that was high all along is no order to clear or to reset
             rose -= {"clear_error", "reset_counters"}
-    _take_size(work, event, by_trigger="trigger" in rose)
+    _apply_size(work, event, by_trigger="trigger" in rose)
     for bit, on, off in EDGES:
         if bit in rose:
             work.signals.append(on)
@@ -118,7 +118,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
     _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:
         work.signals.append(Signal.ACKNOWLEDGE_OFF)
-    held = seen is None and _is_answered_or_asked(work, event.inputs.trigger_id)
+    held = seen is None and _is_answered_or_pending(work, event.inputs.trigger_id)
     for bit, on, off in (
         ("execute_command", Signal.EXECUTE_ON, Signal.EXECUTE_OFF),
         ("trigger", Signal.TRIGGER_HELD if held else Signal.TRIGGER_ON, Signal.TRIGGER_OFF),
@@ -130,7 +130,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
 
 
-def _take_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
+def _apply_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
     """Store a written size; a trigger uses it up, accepted or refused.
 
     A size is valid for one trigger after it was written. So a PLC may write the size before the trigger or with it, and
@@ -141,10 +141,10 @@ def _take_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
     work.size, work.state.size = (size, NO_SIZE) if by_trigger else (NO_SIZE, size)
 
 
-def _is_answered_or_asked(work: Work, trigger_id: int) -> bool:
+def _is_answered_or_pending(work: Work, trigger_id: int) -> bool:
     """Return whether a trigger bit that is high with this id in a writer's first write is no new trigger."""
-    asked = work.state.asked
-    return trigger_id != 0 and trigger_id == (asked.trigger_id if asked else work.state.journal.accepted_id)
+    pending = work.state.pending
+    return trigger_id != 0 and trigger_id == (pending.trigger_id if pending else work.state.journal.accepted_id)
 
 
 def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed: bool, left_high: bool) -> None:
@@ -166,7 +166,7 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
 
 
 def _begin_answered(work: Work, event: BeginAnswered | BeginFailed) -> None:
-    if work.state.asked is None or work.state.asked.number != event.number:
+    if work.state.pending is None or work.state.pending.number != event.number:
         work.state.stale += 1
     elif isinstance(event, BeginFailed):
         work.signals += [Signal.BEGIN_FAILED, Signal.CHANNEL_FAILED]
@@ -177,32 +177,32 @@ def _begin_answered(work: Work, event: BeginAnswered | BeginFailed) -> None:
 
 
 def _command_answered(work: Work, event: CommandAnswered | CommandFailed) -> None:
-    if event.number != work.state.command_asked:
+    if event.number != work.state.command_request:
         work.state.stale += 1
     elif isinstance(event, CommandFailed):
         work.signals.append(Signal.COMMAND_FAILED)
     elif event.done:
         work.signals.append(Signal.COMMAND_DONE)
     else:
-        work.say(f"the station did not carry out the PLC's command: {event.why}")
+        work.log(f"the station did not carry out the PLC's command: {event.why}")
         work.signals.append(Signal.COMMAND_REFUSED)
 
 
-_TAKERS: dict[type, Callable[[Work, Any], None]] = {
+_HANDLERS: dict[type, Callable[[Work, Any], None]] = {
     PlcWrote: _plc_wrote,
-    WriterCame: _writer_came,
-    WriterWent: _writer_went,
+    WriterGranted: _writer_granted,
+    WriterWithdrawn: _writer_withdrawn,
     Tick: lambda _work, _event: None,
     Beat: _beat,
-    OutputTold: _output_told,
+    OutputChanged: _output_changed,
     BeginAnswered: _begin_answered,
     BeginFailed: _begin_answered,
-    OutcomeCame: _outcome_came,
+    OutcomeReceived: _outcome_received,
     OutcomeFailed: _outcome_failed,
     RequestFailed: _request_failed,
-    OpenTold: _open_told,
+    OpenAnswered: _open_answered,
     OutcomeNoted: _outcome_noted,
     CommandAnswered: _command_answered,
     CommandFailed: _command_answered,
-    Leaving: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
+    ShuttingDown: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
 }

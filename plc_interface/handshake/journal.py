@@ -8,11 +8,11 @@ from station.channel.line import Outcome
 COMMAND_RESULT = BY_NAME["command_result"]
 
 
-class _Kept(BaseModel):
+class _Persistent(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class Running(_Kept):
+class Running(_Persistent):
     """The inspection in progress."""
 
     sequence: int = Field(ge=1, lt=2**32)
@@ -31,7 +31,7 @@ class Running(_Kept):
     simulated: bool
 
 
-class Journal(_Kept):
+class Journal(_Persistent):
     """The persistent part of the state."""
 
     boots: int = Field(default=0, ge=0, lt=2**16)

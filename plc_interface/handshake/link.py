@@ -1,18 +1,18 @@
 """Link to the station over the channel: its state, its loss, its resynchronisation."""
 
-from plc_interface.handshake.actions import AskOpen
+from plc_interface.handshake.actions import RequestOpen
 from plc_interface.handshake.events import Beat
 from plc_interface.handshake.modes import Link, Signal
-from plc_interface.handshake.settle import settle
+from plc_interface.handshake.settle import resynchronise
 from plc_interface.handshake.work import Work, row
 
 
-def none_is_asked(work: Work) -> bool:
+def none_is_pending(work: Work) -> bool:
     """`Resume` is not pending."""
-    return work.state.open_asked is None
+    return work.state.open_request is None
 
 
-def hear(work: Work) -> None:
+def store_state(work: Work) -> None:
     """Store the station's state, wait for the next beat."""
     if not isinstance(work.event, Beat):
         return
@@ -30,42 +30,42 @@ def beat(work: Work) -> None:
         work.state.heartbeat = (work.state.heartbeat + 1) % 2**16
 
 
-def ask_open(work: Work) -> None:
+def request_open(work: Work) -> None:
     """`Resume` to the station."""
-    work.state.open_asked = work.number()
-    work.actions.append(AskOpen(work.state.open_asked))
+    work.state.open_request = work.number()
+    work.actions.append(RequestOpen(work.state.open_request))
 
 
-def forget_question(work: Work) -> None:
+def clear_request(work: Work) -> None:
     """Send `Resume` again at the next beat."""
-    work.state.open_asked = None
+    work.state.open_request = None
 
 
-def forget_station(work: Work) -> None:
+def clear_station(work: Work) -> None:
     """Clear the station's state."""
     work.state.station = None
-    work.state.open_asked = None
-    work.say("the station does not answer: triggers are refused until it does")
+    work.state.open_request = None
+    work.log("the station does not answer: triggers are refused until it does")
 
 
 LOST, RESUMING, UP = Link.LOST, Link.RESUMING, Link.UP
 
 ROWS = (
-    row(LOST, Signal.STATION_ANSWERED, hear, ask_open, to=RESUMING),
-    row(LOST, Signal.STATION_RESTARTED, hear, ask_open, to=RESUMING),
+    row(LOST, Signal.STATION_ANSWERED, store_state, request_open, to=RESUMING),
+    row(LOST, Signal.STATION_RESTARTED, store_state, request_open, to=RESUMING),
     row(LOST, Signal.CHANNEL_FAILED),
     row(LOST, Signal.STATION_SILENT),
-    row(RESUMING, Signal.STATION_ANSWERED, hear, ask_open, when=none_is_asked),
-    row(RESUMING, Signal.STATION_ANSWERED, hear),
-    row(RESUMING, Signal.STATION_RESTARTED, hear, ask_open),
-    row(RESUMING, Signal.OPENED, settle, to=UP),
+    row(RESUMING, Signal.STATION_ANSWERED, store_state, request_open, when=none_is_pending),
+    row(RESUMING, Signal.STATION_ANSWERED, store_state),
+    row(RESUMING, Signal.STATION_RESTARTED, store_state, request_open),
+    row(RESUMING, Signal.OPENED, resynchronise, to=UP),
     row(RESUMING, Signal.STATION_BUSY),
-    row(RESUMING, Signal.CHANNEL_FAILED, forget_question),
-    row(RESUMING, Signal.STATION_SILENT, forget_station, to=LOST),
-    row(UP, Signal.STATION_ANSWERED, hear, beat),
-    row(UP, Signal.STATION_RESTARTED, hear, ask_open, to=RESUMING),
-    row(UP, Signal.STATION_BUSY, ask_open),
-    row(UP, Signal.OPENED, settle),
-    row(UP, Signal.CHANNEL_FAILED, forget_question, to=RESUMING),
-    row(UP, Signal.STATION_SILENT, forget_station, to=LOST),
+    row(RESUMING, Signal.CHANNEL_FAILED, clear_request),
+    row(RESUMING, Signal.STATION_SILENT, clear_station, to=LOST),
+    row(UP, Signal.STATION_ANSWERED, store_state, beat),
+    row(UP, Signal.STATION_RESTARTED, store_state, request_open, to=RESUMING),
+    row(UP, Signal.STATION_BUSY, request_open),
+    row(UP, Signal.OPENED, resynchronise),
+    row(UP, Signal.CHANNEL_FAILED, clear_request, to=RESUMING),
+    row(UP, Signal.STATION_SILENT, clear_station, to=LOST),
 )

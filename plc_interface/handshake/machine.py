@@ -2,9 +2,9 @@
 
 import copy
 
-from plc_interface.handshake.actions import Action, Keep
+from plc_interface.handshake.actions import Action, SaveJournal
 from plc_interface.handshake.events import Event
-from plc_interface.handshake.intake import take_in
+from plc_interface.handshake.intake import apply_event
 from plc_interface.handshake.modes import TIMERS, Signal
 from plc_interface.handshake.state import State
 from plc_interface.handshake.table import apply
@@ -27,16 +27,20 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
         work.stop(due)
         work.signals.append(due)
         _run(work)
-    take_in(work)
+    apply_event(work)
     _run(work)
     state = work.state
-    kept = {"queue": state.queue, "running": state.running, "asked_id": state.asked.trigger_id if state.asked else None}
+    kept = {
+        "queue": state.queue,
+        "running": state.running,
+        "asked_id": state.pending.trigger_id if state.pending else None,
+    }
     if any(getattr(state.journal, name) != value for name, value in kept.items()):
-        work.keep(**kept)
+        work.update_journal(**kept)
     if state.journal == before.journal:
         return state, tuple(work.actions)
     durable = (state.journal.verdicts, state.journal.disowned) != (before.journal.verdicts, before.journal.disowned)
-    return state, (Keep(state.journal, durable), *work.actions)
+    return state, (SaveJournal(state.journal, durable), *work.actions)
 
 
 def next_due_s(state: State) -> float | None:

@@ -34,10 +34,10 @@ class Trigger(StrEnum):
     """The trigger bit and its acknowledgement."""
 
     LOW = "low"
-    ASKED = "asked"
+    PENDING = "pending"
     """The bit is high, the station has still to accept or refuse."""
     PULSED = "pulsed"
-    """As ASKED, but the PLC has reset its bit already."""
+    """As PENDING, but the PLC has reset its bit already."""
     ANSWERED = "answered"
     """Acknowledged; the PLC's bit has to fall."""
     HELD = "held"
@@ -63,7 +63,7 @@ class Result(StrEnum):
     """Acknowledged; the PLC's bit has to fall before the next result is published."""
 
 
-class Order(StrEnum):
+class Command(StrEnum):
     """The PLC's commands."""
 
     IDLE = "idle"
@@ -79,7 +79,7 @@ class Lot(StrEnum):
     LATCHED = "latched"
 
 
-Mode = Link | Arming | Service | Trigger | Inspection | Result | Order | Lot
+Mode = Link | Arming | Service | Trigger | Inspection | Result | Command | Lot
 
 
 class Signal(StrEnum):
@@ -116,7 +116,7 @@ class Signal(StrEnum):
     STATION_ANSWERED = "beat answered"
     STATION_RESTARTED = "beat answered by a new start"
     CHANNEL_FAILED = "request failed"
-    OPENED = "open ones told"
+    OPENED = "resume answered"
     BEGUN = "begun"
     BEGIN_REFUSED = "begin refused"
     BEGIN_FAILED = "begin failed"

@@ -1,8 +1,8 @@
 """The PLC's commands, each carried out once."""
 
-from plc_interface.handshake.actions import AskCommand
+from plc_interface.handshake.actions import RequestCommand
 from plc_interface.handshake.journal import COMMAND_RESULT
-from plc_interface.handshake.modes import Link, Order, Signal
+from plc_interface.handshake.modes import Command, Link, Signal
 from plc_interface.handshake.state import Fault
 from plc_interface.handshake.work import Effect, Row, Work, row
 from plc_interface.register_map import BY_NAME
@@ -38,25 +38,25 @@ def bit_is_high(work: Work) -> bool:
 
 def note_sequence(work: Work) -> None:
     """Echo the sequence."""
-    work.keep(command_sequence=work.state.inputs.command_sequence)
+    work.update_journal(command_sequence=work.state.inputs.command_sequence)
 
 
-def ask(work: Work) -> None:
+def request(work: Work) -> None:
     """`Command` to the station."""
     state = work.state
     command = CommandName(_CODES[state.inputs.command_code].name)
-    state.command_asked = work.number()
+    state.command_request = work.number()
     state.command_changes_recipe = command is CommandName.CHANGE_RECIPE
-    work.actions.append(AskCommand(state.command_asked, command, state.inputs.command_argument))
+    work.actions.append(RequestCommand(state.command_request, command, state.inputs.command_argument))
 
 
 def result(name: str) -> Effect:
     """Make an effect that sets the command's result."""
 
     def note(work: Work) -> None:
-        work.keep(command_result=COMMAND_RESULT.code(name))
+        work.update_journal(command_result=COMMAND_RESULT.code(name))
         if name != "executing":
-            work.state.command_asked = None
+            work.state.command_request = None
 
     note.__doc__ = f"Result {name}."
     return note
@@ -72,9 +72,9 @@ def end_watch(work: Work) -> None:
     work.stop(Signal.EXECUTE_TIMEOUT)
 
 
-def forgotten(work: Work) -> None:
+def not_reset(work: Work) -> None:
     """Fault: execute bit not reset in time."""
-    work.fault(Fault.EXECUTE_FORGOTTEN)
+    work.fault(Fault.EXECUTE_NOT_RESET)
 
 
 def busy(work: Work) -> None:
@@ -82,10 +82,10 @@ def busy(work: Work) -> None:
     work.fault(Fault.COMMAND_BUSY)
 
 
-IDLE, EXECUTING, DONE, FAILED = Order.IDLE, Order.EXECUTING, Order.DONE, Order.FAILED
+IDLE, EXECUTING, DONE, FAILED = Command.IDLE, Command.EXECUTING, Command.DONE, Command.FAILED
 
 
-ANSWERS: tuple[tuple[Signal, str, Order], ...] = (
+ANSWERS: tuple[tuple[Signal, str, Command], ...] = (
     (Signal.COMMAND_DONE, "done", DONE),
     (Signal.COMMAND_REFUSED, "failed", FAILED),
     (Signal.COMMAND_FAILED, "timed_out", FAILED),
@@ -94,7 +94,7 @@ ANSWERS: tuple[tuple[Signal, str, Order], ...] = (
 )
 
 
-def _at_rest(mode: Order) -> tuple[Row, ...]:
+def _at_rest(mode: Command) -> tuple[Row, ...]:
     """Return the rows of the modes in which no command is executed."""
     on = Signal.EXECUTE_ON
     return (
@@ -102,7 +102,7 @@ def _at_rest(mode: Order) -> tuple[Row, ...]:
         row(mode, on, watch, to=FAILED, when=is_repeated),
         row(mode, on, note_sequence, result("no_command"), watch, to=FAILED, when=is_no_command),
         row(mode, on, note_sequence, result("station_lost"), watch, to=FAILED, when=station_is_lost),
-        row(mode, on, note_sequence, result("executing"), end_watch, ask, to=EXECUTING),
+        row(mode, on, note_sequence, result("executing"), end_watch, request, to=EXECUTING),
         row(mode, Signal.EXECUTE_OFF, end_watch, to=IDLE),
         row(mode, Signal.WRITER_LOST, end_watch, to=IDLE),
         row(mode, Signal.STATION_SILENT),
@@ -110,9 +110,9 @@ def _at_rest(mode: Order) -> tuple[Row, ...]:
     )
 
 
-def _answered(mode: Order) -> tuple[Row, ...]:
+def _answered(mode: Command) -> tuple[Row, ...]:
     return (
-        row(mode, Signal.EXECUTE_TIMEOUT, forgotten, to=IDLE, when=bit_is_high),
+        row(mode, Signal.EXECUTE_TIMEOUT, not_reset, to=IDLE, when=bit_is_high),
         row(mode, Signal.EXECUTE_TIMEOUT, to=IDLE),
     )
 

@@ -46,15 +46,15 @@ def end_watch(work: Work) -> None:
     work.stop(Signal.ACKNOWLEDGE_TIMEOUT)
 
 
-def unstick(work: Work) -> None:
+def enable_bit(work: Work) -> None:
     """The bit is evaluated again."""
     work.state.acknowledge_stuck = False
 
 
-def forgotten(work: Work) -> None:
+def not_reset(work: Work) -> None:
     """Fault: acknowledge bit not reset in time; the bit is ignored until it falls."""
     work.state.acknowledge_stuck = True
-    work.fault(Fault.ACKNOWLEDGE_FORGOTTEN)
+    work.fault(Fault.ACKNOWLEDGE_NOT_RESET)
 
 
 def wrong(work: Work) -> None:
@@ -68,16 +68,16 @@ ROWS = (
     row(EMPTY, Signal.QUEUED, show, to=SHOWN),
     row(EMPTY, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
-    row(EMPTY, Signal.ACKNOWLEDGE_OFF, unstick),
-    row(EMPTY, Signal.WRITER_LOST, unstick),
+    row(EMPTY, Signal.ACKNOWLEDGE_OFF, enable_bit),
+    row(EMPTY, Signal.WRITER_LOST, enable_bit),
     row(SHOWN, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
     row(SHOWN, Signal.ACKNOWLEDGED, take, show, when=another_waits),
     row(SHOWN, Signal.ACKNOWLEDGED, take, to=EMPTY),
     row(SHOWN, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(SHOWN, Signal.QUEUED),
     row(SHOWN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
-    row(SHOWN, Signal.ACKNOWLEDGE_OFF, unstick),
-    row(SHOWN, Signal.WRITER_LOST, unstick),
+    row(SHOWN, Signal.ACKNOWLEDGE_OFF, enable_bit),
+    row(SHOWN, Signal.WRITER_LOST, enable_bit),
     row(TAKEN, Signal.ACKNOWLEDGED, take),
     row(TAKEN, Signal.QUEUED),
     row(TAKEN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
@@ -85,6 +85,6 @@ ROWS = (
     row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, to=EMPTY),
     row(TAKEN, Signal.WRITER_LOST, end_watch, show, to=SHOWN, when=one_waits),
     row(TAKEN, Signal.WRITER_LOST, end_watch, to=EMPTY),
-    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, forgotten, show, to=SHOWN, when=one_waits),
-    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, forgotten, to=EMPTY),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, to=EMPTY),
 )

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from plc_interface.handshake.events import Inputs, Moment
 from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
-from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Mode, Order, Result, Service, Signal, Trigger
+from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
 from plc_interface.register_map import QUEUE_PLACES
 from station.channel.line import Outcome, Refusal, StationState
 
@@ -17,10 +17,10 @@ class Fault(StrEnum):
 
     PLC_SILENT = "the PLC's heartbeat stood still: check the PLC, then give enable anew"
     WRITER_LOST = "the writing PLC's connection was lost: connect, then give enable anew"
-    TRIGGER_FORGOTTEN = "the PLC did not take its trigger bit back: drop it after trigger_acknowledged"
-    ACKNOWLEDGE_FORGOTTEN = "the PLC did not take its acknowledge bit back: drop it when result_valid falls"
-    EXECUTE_FORGOTTEN = "the PLC did not take its execute bit back: drop it after command_done or command_failed"
-    LATCH_FORGOTTEN = "the PLC did not take its latch bit back: drop it after lot_latched"
+    TRIGGER_NOT_RESET = "the PLC did not take its trigger bit back: drop it after trigger_acknowledged"
+    ACKNOWLEDGE_NOT_RESET = "the PLC did not take its acknowledge bit back: drop it when result_valid falls"
+    EXECUTE_NOT_RESET = "the PLC did not take its execute bit back: drop it after command_done or command_failed"
+    LATCH_NOT_RESET = "the PLC did not take its latch bit back: drop it after lot_latched"
     WRONG_ACKNOWLEDGEMENT = (
         "the PLC acknowledged another sequence than the one shown: read result_sequence, and check the word order"
     )
@@ -39,7 +39,7 @@ NO_SIZE = Size()
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PendingTrigger:
     """A trigger whose acceptance by the station is pending."""
 
     number: int
@@ -73,7 +73,7 @@ class State:
     trigger: Trigger = Trigger.LOW
     inspection: Inspection = Inspection.NONE
     result: Result = Result.EMPTY
-    order: Order = Order.IDLE
+    command: Command = Command.IDLE
     lot: Lot = Lot.OPEN
 
     timers: Mapping[Signal, float] = field(default_factory=dict)
@@ -105,15 +105,15 @@ class State:
     heartbeat: int = 0
     adopted: bool = False
     """The station has answered `Resume` at least once since this interface started."""
-    open_asked: int | None = None
-    """The number of `AskOpen` that is not answered."""
+    open_request: int | None = None
+    """The number of `RequestOpen` that is not answered."""
 
     # the line
     diverts: bool = True
     """Whether the line's output can divert a fruit; if not, no inspection is started."""
 
     # inspections
-    asked: Asked | None = None
+    pending: PendingTrigger | None = None
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first one is published."""
@@ -122,7 +122,7 @@ class State:
     toggle: bool = False
 
     # commands
-    command_asked: int | None = None
+    command_request: int | None = None
     command_changes_recipe: bool = False
 
     counters: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTERS, 0))

@@ -3,7 +3,7 @@
 from collections import defaultdict
 
 from plc_interface.handshake import bits, inspection, link, orders, results, trigger
-from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Mode, Order, Result, Service, Signal, Trigger
+from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
 from plc_interface.handshake.work import Row, Work
 
 REGIONS: dict[type[Mode], tuple[Row, ...]] = {
@@ -12,7 +12,7 @@ REGIONS: dict[type[Mode], tuple[Row, ...]] = {
     Arming: bits.ARMING_ROWS,
     Lot: bits.LOT_ROWS,
     Result: results.ROWS,
-    Order: orders.ROWS,
+    Command: orders.ROWS,
     Inspection: inspection.ROWS,
     Trigger: trigger.ROWS,
 }
@@ -46,4 +46,4 @@ def apply(work: Work, signal: Signal) -> None:
                 break
         else:
             work.state.unlisted += 1
-            work.say(f"{region.__name__.lower()} is {mode}, and then {signal}: not foreseen, nothing was done")
+            work.log(f"{region.__name__.lower()} is {mode}, and then {signal}: not foreseen, nothing was done")

@@ -1,6 +1,6 @@
 """The trigger bit and its acknowledgement."""
 
-from plc_interface.handshake.modes import Arming, Inspection, Link, Order, Service, Signal, Trigger
+from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Service, Signal, Trigger
 from plc_interface.handshake.state import Fault, State
 from plc_interface.handshake.work import Work, row
 from station.channel.line import Refusal
@@ -16,7 +16,7 @@ def obstacle(state: State) -> Refusal | None:
         (not state.diverts, Refusal.NOT_READY),
         (state.inspection is not Inspection.NONE, Refusal.BUSY),
         (waiting >= state.places, Refusal.QUEUE_FULL),
-        (state.order is Order.EXECUTING and state.command_changes_recipe, Refusal.RECIPE_CHANGING),
+        (state.command is Command.EXECUTING and state.command_changes_recipe, Refusal.RECIPE_CHANGING),
     )
     return next((refusal for holds, refusal in reasons if holds), None)
 
@@ -26,12 +26,12 @@ def refusal(state: State) -> Refusal | None:
 
     A repeated id has precedence over all other reasons: no other refusal then names an id that was accepted.
     """
-    if state.inputs.trigger_id in {0, state.journal.accepted_id, state.asked.trigger_id if state.asked else 0}:
+    if state.inputs.trigger_id in {0, state.journal.accepted_id, state.pending.trigger_id if state.pending else 0}:
         return Refusal.BAD_TRIGGER_ID
     return obstacle(state)
 
 
-def may_be_asked(work: Work) -> bool:
+def is_unobstructed(work: Work) -> bool:
     """Nothing blocks the trigger."""
     return refusal(work.state) is None
 
@@ -49,7 +49,7 @@ def note_refusal(work: Work, reason: Refusal, trigger_id: int) -> None:
     if reason is Refusal.QUEUE_FULL:
         state.overrun = True
         work.count("count_overrun")
-    work.say(f"trigger {trigger_id} refused: {reason.value}")
+    work.log(f"trigger {trigger_id} refused: {reason.value}")
 
 
 def refuse(work: Work) -> None:
@@ -67,31 +67,31 @@ def end_watch(work: Work) -> None:
     work.stop(Signal.TRIGGER_TIMEOUT)
 
 
-def forgotten(work: Work) -> None:
+def not_reset(work: Work) -> None:
     """Fault: trigger bit not reset in time."""
-    work.fault(Fault.TRIGGER_FORGOTTEN)
+    work.fault(Fault.TRIGGER_NOT_RESET)
 
 
 ROWS = (
-    row(Trigger.LOW, Signal.TRIGGER_ON, begin, to=Trigger.ASKED, when=may_be_asked),
+    row(Trigger.LOW, Signal.TRIGGER_ON, begin, to=Trigger.PENDING, when=is_unobstructed),
     row(Trigger.LOW, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
     row(Trigger.LOW, Signal.TRIGGER_HELD, watch, to=Trigger.ANSWERED),
     row(Trigger.LOW, Signal.TRIGGER_OFF),
     row(Trigger.LOW, Signal.WRITER_LOST),
-    row(Trigger.ASKED, Signal.ACCEPTED, watch, to=Trigger.ANSWERED),
-    row(Trigger.ASKED, Signal.REFUSED, watch, to=Trigger.ANSWERED),
-    row(Trigger.ASKED, Signal.TRIGGER_OFF, to=Trigger.PULSED),
-    row(Trigger.ASKED, Signal.WRITER_LOST, to=Trigger.PULSED),
+    row(Trigger.PENDING, Signal.ACCEPTED, watch, to=Trigger.ANSWERED),
+    row(Trigger.PENDING, Signal.REFUSED, watch, to=Trigger.ANSWERED),
+    row(Trigger.PENDING, Signal.TRIGGER_OFF, to=Trigger.PULSED),
+    row(Trigger.PENDING, Signal.WRITER_LOST, to=Trigger.PULSED),
     row(Trigger.PULSED, Signal.ACCEPTED, watch, to=Trigger.HELD),
     row(Trigger.PULSED, Signal.REFUSED, watch, to=Trigger.HELD),
-    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse, to=Trigger.ASKED),
-    row(Trigger.PULSED, Signal.TRIGGER_HELD, to=Trigger.ASKED),
+    row(Trigger.PULSED, Signal.TRIGGER_ON, refuse, to=Trigger.PENDING),
+    row(Trigger.PULSED, Signal.TRIGGER_HELD, to=Trigger.PENDING),
     row(Trigger.PULSED, Signal.TRIGGER_OFF),
     row(Trigger.PULSED, Signal.WRITER_LOST),
     row(Trigger.ANSWERED, Signal.TRIGGER_OFF, end_watch, to=Trigger.LOW),
     row(Trigger.ANSWERED, Signal.WRITER_LOST, end_watch, to=Trigger.LOW),
-    row(Trigger.ANSWERED, Signal.TRIGGER_TIMEOUT, forgotten, to=Trigger.STUCK),
-    row(Trigger.HELD, Signal.TRIGGER_ON, end_watch, begin, to=Trigger.ASKED, when=may_be_asked),
+    row(Trigger.ANSWERED, Signal.TRIGGER_TIMEOUT, not_reset, to=Trigger.STUCK),
+    row(Trigger.HELD, Signal.TRIGGER_ON, end_watch, begin, to=Trigger.PENDING, when=is_unobstructed),
     row(Trigger.HELD, Signal.TRIGGER_ON, refuse, watch, to=Trigger.ANSWERED),
     row(Trigger.HELD, Signal.TRIGGER_HELD, watch, to=Trigger.ANSWERED),
     row(Trigger.HELD, Signal.TRIGGER_OFF),

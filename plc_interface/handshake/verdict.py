@@ -1,13 +1,13 @@
 """Outcomes: those of the interface itself, and publication of every outcome to the PLC."""
 
-from plc_interface.handshake.actions import PassOn, TellAcknowledged, TellPublished
+from plc_interface.handshake.actions import ForwardOutcome, NotifyAcknowledged, NotifyPublished
 from plc_interface.handshake.events import Moment
 from plc_interface.handshake.journal import Running
 from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.work import Work
 from station.channel.line import Outcome, Reason
 
-KEPT_VERDICTS = 64
+MOST_OWN_OUTCOMES = 64
 """Maximum number of the interface's own outcomes that a station has not noted."""
 
 _COUNTED = {"PASS": "count_pass", "FAIL": "count_fail", "NO_RESULT": "count_no_result"}
@@ -63,22 +63,24 @@ def queue(work: Work, outcome: Outcome) -> None:
     state = work.state
     state.queue = (*state.queue, outcome)
     work.count(_COUNTED[outcome.outcome], *(("count_late",) if outcome.late else ()))
-    work.actions += [PassOn(outcome), TellPublished(outcome)]
+    work.actions += [ForwardOutcome(outcome), NotifyPublished(outcome)]
     work.signals.append(Signal.QUEUED)
 
 
-def give(work: Work, outcome: Outcome) -> None:
+def publish_own(work: Work, outcome: Outcome) -> None:
     """Publish the interface's own outcome; it survives a restart, until the station has noted it."""
-    work.keep(verdicts=(*work.state.journal.verdicts, outcome)[-KEPT_VERDICTS:])
+    work.update_journal(verdicts=(*work.state.journal.verdicts, outcome)[-MOST_OWN_OUTCOMES:])
     queue(work, outcome)
 
 
 def hide(work: Work, outcome: Outcome) -> None:
     """Close an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
     journal = work.state.journal
-    work.say(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
-    work.keep(verdicts=(*journal.verdicts, outcome)[-KEPT_VERDICTS:], hidden=(*journal.hidden, outcome.sequence))
-    work.actions.append(TellPublished(outcome))
+    work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
+    work.update_journal(
+        verdicts=(*journal.verdicts, outcome)[-MOST_OWN_OUTCOMES:], hidden=(*journal.hidden, outcome.sequence)
+    )
+    work.actions.append(NotifyPublished(outcome))
     pass_over_hidden(work)
 
 
@@ -91,21 +93,21 @@ def pass_over_hidden(work: Work) -> None:
     if passed:
         acknowledge(work, max(passed))
         left = tuple(sequence for sequence in state.journal.hidden if sequence not in passed)
-        work.keep(hidden=left)
+        work.update_journal(hidden=left)
 
 
 def acknowledge(work: Work, sequence: int) -> None:
     """Record that the PLC has taken everything up to here, and notify the station."""
     acknowledged = max(work.state.journal.acknowledged, sequence)
-    work.keep(acknowledged=acknowledged)
-    work.actions.append(TellAcknowledged(acknowledged))
+    work.update_journal(acknowledged=acknowledged)
+    work.actions.append(NotifyAcknowledged(acknowledged))
 
 
-def tell_if_other(work: Work, theirs: Outcome) -> None:
+def publish_if_other(work: Work, theirs: Outcome) -> None:
     """Send the final outcome to the station, if it holds another one of the same sequence."""
     for ours in (*work.state.journal.verdicts, *work.state.queue):
         if ours.sequence == theirs.sequence:
             if ours != theirs:
-                work.say(f"inspection {ours.sequence}: {theirs.outcome} came after {ours.outcome}, which stands")
-                work.actions.append(TellPublished(ours))
+                work.log(f"inspection {ours.sequence}: {theirs.outcome} came after {ours.outcome}, which stands")
+                work.actions.append(NotifyPublished(ours))
             return

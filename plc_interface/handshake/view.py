@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Mapping
 
-from plc_interface.handshake.modes import Arming, Inspection, Link, Lot, Order, Result, Service, Trigger
+from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Result, Service, Trigger
 from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
 from plc_interface.register_map import BY_NAME
@@ -80,9 +80,9 @@ def _status_bits(state: State) -> list[str]:
         "result_valid": state.result is Result.SHOWN,
         "overrun": state.overrun,
         "missed": state.missed,
-        "command_executing": state.order is Order.EXECUTING,
-        "command_done": state.order is Order.DONE,
-        "command_failed": state.order is Order.FAILED,
+        "command_executing": state.command is Command.EXECUTING,
+        "command_done": state.command is Command.DONE,
+        "command_failed": state.command is Command.FAILED,
         "error": state.link is not Link.UP or _is_faulted(station),
         "toggle": state.toggle,
         "lot_latched": state.lot is Lot.LATCHED,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from plc_interface.handshake.actions import Action, Say
+from plc_interface.handshake.actions import Action, Log
 from plc_interface.handshake.events import Event, Moment
 from plc_interface.handshake.modes import Mode, Signal
 from plc_interface.handshake.state import NO_SIZE, Fault, Size, State
@@ -28,7 +28,7 @@ class Work:
     size: Size = NO_SIZE
     """The fruit's size of the trigger of signal TRIGGER_ON."""
 
-    def keep(self, **changes: Any) -> None:
+    def update_journal(self, **changes: Any) -> None:
         """Change the journal; it is written before the PLC reads the consequences."""
         self.state.journal = self.state.journal.model_copy(update=changes)
 
@@ -42,13 +42,13 @@ class Work:
     def fault(self, fault: Fault) -> None:
         """Count, log and latch a handshake fault."""
         self.count("count_communication")
-        self.say(fault.value)
+        self.log(fault.value)
         if fault not in self.state.faults:
             self.state.faults = (*self.state.faults, fault)
 
-    def say(self, text: str, *, warning: bool = True) -> None:
+    def log(self, text: str, *, warning: bool = True) -> None:
         """Write one line into the log."""
-        self.actions.append(Say(text, warning))
+        self.actions.append(Log(text, warning))
 
     def start(self, timer: Signal, after_s: float) -> None:
         """Start or restart a timer."""

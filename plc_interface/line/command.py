@@ -142,7 +142,7 @@ async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, c
             asyncio.get_running_loop().add_signal_handler(number, told.set)
         ending = asyncio.ensure_future(told.wait())
         with LineDisplay(console, simulator.summary) as display:
-            simulator.on_passage, simulator.on_scan = display.passed, display.doing
+            simulator.on_passage, simulator.on_scan = display.passed, display.show_activity
             await asyncio.wait([running, ending], return_when=asyncio.FIRST_COMPLETED)
             ending.cancel()
             while not running.done():  # Python 3.11's wait_for loses a cancellation that comes with its answer

@@ -35,7 +35,7 @@ class LineDisplay:
     def __init__(self, console: Console, summary: Summary, sketch: Sketch = lambda _: "") -> None:
         self._console, self._summary, self._sketch = console, summary, sketch
         self._rows: deque[tuple[tuple[str, ...], str]] = deque(maxlen=_ROWS)
-        self._doing = ""
+        self._activity = ""
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
 
     def __enter__(self) -> Self:
@@ -63,14 +63,14 @@ class LineDisplay:
         else:
             self._print(row)
 
-    def doing(self, what: str) -> None:
+    def show_activity(self, what: str) -> None:
         """Show the line's activity when it changes.
 
         Args:
             what: one sentence, or the program's stage.
         """
-        if what != self._doing:
-            self._doing = what
+        if what != self._activity:
+            self._activity = what
             self._refresh()
 
     def _print(self, row: tuple[str, ...]) -> None:
@@ -84,7 +84,7 @@ class LineDisplay:
         for row, style in self._rows:
             outcome = Text(row[4], style)
             table.add_row(*row[:4], outcome, *row[5:])
-        self._live.update(Group(table, Text(f"{summary_line(self._summary)}\n{self._doing}")), refresh=True)
+        self._live.update(Group(table, Text(f"{summary_line(self._summary)}\n{self._activity}")), refresh=True)
 
 
 def summary_line(summary: Summary) -> str:

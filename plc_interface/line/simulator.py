@@ -52,7 +52,7 @@ class LineSimulator:
         self._program, self._scanner, self._nest, self._pace = program, scanner, nest, pace
         self.on_passage: Callable[[Passage, LaidFruit], None] = lambda _passage, _fruit: None
         """Gets each fruit when it is decided."""
-        self.on_scan: Callable[[str], None] = lambda _doing: None
+        self.on_scan: Callable[[str], None] = lambda _activity: None
         """Receives after each scan the line's activity, or its obstacle."""
         self.summary = Summary()
 

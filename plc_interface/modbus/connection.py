@@ -11,7 +11,7 @@ from plc_interface.modbus.mbap import LONGEST_FRAME, framed, frames
 from plc_interface.modbus.peer import Peer
 
 if TYPE_CHECKING:
-    from plc_interface.modbus.hub import Hub
+    from plc_interface.modbus.hub import ConnectionManager
 
 _BUFFER_BYTES = 4 * LONGEST_FRAME
 """Taken from the kernel at one time. What a client sends beyond it waits there, so that others have their turn."""
@@ -23,7 +23,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     pymodbus' own path from bytes to response is replaced, see decision 0012.
     """
 
-    def __init__(self, listener: ModbusBaseServer, hub: "Hub") -> None:
+    def __init__(self, listener: ModbusBaseServer, hub: "ConnectionManager") -> None:
         super().__init__(listener, None, None, None)
         self._hub = hub
         self._buffer = bytearray(_BUFFER_BYTES)

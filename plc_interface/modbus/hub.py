@@ -7,10 +7,10 @@ from typing import Protocol
 from plc_interface.modbus.access import AllowList, plain_address
 from plc_interface.modbus.exceptions import ExceptionCode, RequestError, Trouble
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import OnWriter, WriterChange, WriterLease
+from plc_interface.modbus.lease import OnWriter, WriteLock, WriterChange
 from plc_interface.modbus.log_limit import LimitedLog
 from plc_interface.modbus.peer import Peer
-from plc_interface.modbus.responder import OnWrite, Responder
+from plc_interface.modbus.responder import OnWrite, RequestHandler
 from plc_interface.modbus.statistics import Statistics
 from plc_interface.modbus.tls import Right, identity_of
 from station.settings.modbus import ModbusSettings
@@ -34,7 +34,7 @@ class Member(Protocol):
         """Close the connection at once."""
 
 
-class Hub:
+class ConnectionManager:
     """Manages all connections. Belongs to the event loop; nothing in it waits."""
 
     def __init__(self, settings: ModbusSettings, image: RegisterImage, on_write: OnWrite, on_writer: OnWriter) -> None:
@@ -45,8 +45,8 @@ class Hub:
         self._members: dict[Peer, Member] = {}
         self._log = LimitedLog(log)
         self._sweeping: asyncio.TimerHandle | None = None
-        self.lease = WriterLease(settings.writer_lease_s, self._tell_writer)
-        self._responder = Responder(settings.unit, image, on_write, self._claim, self.lease.release)
+        self.write_lock = WriteLock(settings.writer_lease_s, self._report_writer)
+        self._handler = RequestHandler(settings.unit, image, on_write, self._claim, self.write_lock.release)
         self.statistics = Statistics()
 
     @property
@@ -100,13 +100,13 @@ class Hub:
             return
         if why:
             self._log.write("disconnects", self.now_s(), logging.INFO, "%s: %s", peer, why)
-        self.lease.disconnected(peer)
+        self.write_lock.disconnected(peer)
 
     def answer(self, peer: Peer, unit: int, message: bytes) -> bytes:
         """Return the response to a request, from its function code on; an exception response to a bad one."""
         self.statistics.requests += 1
         try:
-            return self._responder.respond(peer, unit, message)
+            return self._handler.respond(peer, unit, message)
         except RequestError as error:
             code = error.code
             self.note(error.trouble, peer, f"function {message[0]} answered with exception {code:02}: {error}")
@@ -121,10 +121,10 @@ class Hub:
         self._log.write(trouble, self.now_s(), logging.WARNING, "%s: %s", peer, why)
 
     def _claim(self, peer: Peer) -> bool:
-        holder = self._members.get(self.lease.holder) if self.lease.holder else None
-        return self.lease.claim(peer, self.now_s(), holder.heard_s if holder else 0.0)
+        holder = self._members.get(self.write_lock.holder) if self.write_lock.holder else None
+        return self.write_lock.claim(peer, self.now_s(), holder.heard_s if holder else 0.0)
 
-    def _tell_writer(self, peer: Peer | None, change: WriterChange) -> None:
+    def _report_writer(self, peer: Peer | None, change: WriterChange) -> None:
         who = f"{peer} is the writer" if peer else "there is no writer"
         self._log.write("changes of the writer", self.now_s(), logging.INFO, "%s: %s", who, change)
         try:
@@ -135,8 +135,8 @@ class Hub:
     def _has_reserve(self, peer: Peer) -> bool:
         if len(self._members) >= self._settings.max_connections + RESERVED_PLACES or not peer.may_write:
             return False
-        if self.lease.last_address:
-            return peer.address == self.lease.last_address
+        if self.write_lock.last_address:
+            return peer.address == self.write_lock.last_address
         return all(other.address != peer.address for other in self._members)
 
     def _sweep(self) -> None:
@@ -150,7 +150,7 @@ class Hub:
                 member.drop(Trouble.UNFINISHED, f"no whole request in {settings.frame_timeout_s:g} s")
             elif _older(member.heard_s, now_s - settings.idle_timeout_s):
                 member.drop(Trouble.IDLE, f"no request in {settings.idle_timeout_s:g} s")
-        self.lease.expire(now_s)
+        self.write_lock.expire(now_s)
         self._log.sum_up(now_s)
 
 

@@ -24,7 +24,7 @@ OnWriter = Callable[[Peer | None, WriterChange], None]
 """Called with the writer, or None, and the reason."""
 
 
-class WriterLease:
+class WriteLock:
     """Grants the right to write to the first client that claims it, and withdraws it when that one is gone."""
 
     def __init__(self, lease_s: float, on_writer: OnWriter) -> None:

@@ -29,7 +29,7 @@ _WRITING: Mapping[int, writing.Parser] = {
 _KEY = "write_key"
 
 
-class Responder:
+class RequestHandler:
     """Handles the requests to one unit."""
 
     def __init__(

@@ -12,7 +12,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pymodbus.transport import CommParams, CommType
 
 from plc_interface.modbus.connection import Connection
-from plc_interface.modbus.hub import Hub
+from plc_interface.modbus.hub import ConnectionManager
 from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.lease import OnWriter
 from plc_interface.modbus.peer import Peer
@@ -33,7 +33,9 @@ class ModbusServerError(StationError):
 class Listener(ModbusTcpServer):
     """Accepts connections on one port."""
 
-    def __init__(self, hub: Hub, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None) -> None:
+    def __init__(
+        self, hub: ConnectionManager, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None
+    ) -> None:
         self._hub = hub
         if context is not None:
             self.tls_setup = CommParams(comm_name="modbus over TLS", comm_type=CommType.TLS, sslctx=context)
@@ -68,7 +70,7 @@ class ModbusServer:
             on_writer: called when the right to write is granted or withdrawn.
         """
         self._settings = settings
-        self._hub = Hub(settings, image, on_write, on_writer)
+        self._hub = ConnectionManager(settings, image, on_write, on_writer)
         self._listeners: list[Listener] = []
 
     @property
@@ -84,7 +86,7 @@ class ModbusServer:
     @property
     def writer(self) -> Peer | None:
         """The client with the right to write, if any."""
-        return self._hub.lease.holder
+        return self._hub.write_lock.holder
 
     async def start(self) -> None:
         """Listen on the port, and on the second one where TLS is enabled.

@@ -8,13 +8,13 @@ import pytest
 from plc_interface.can.errors import (
     EchoMissingError,
     EchoWrongError,
-    LateShotError,
+    LateRejectError,
     NotReadyError,
-    ShotLostError,
-    ShotRefusedError,
+    RejectLostError,
+    RejectRefusedError,
 )
 from plc_interface.can.link import ORDER
-from plc_interface.can.shots import Order, Report, Shots
+from plc_interface.can.shots import Order, PendingRejects, Report
 
 
 def test_shots_are_fired_at_their_counts_and_echoed_by_sequence(on_bus):
@@ -57,7 +57,7 @@ def test_a_count_that_is_past_is_refused_and_nothing_is_sent(on_bus):
     async def scenario(rig):
         await rig.ready()
         count = rig.io.encoder_count().value
-        with pytest.raises(LateShotError, match=f"shot 9: count {count} is past, the belt is at") as raised:
+        with pytest.raises(LateRejectError, match=f"shot 9: count {count} is past, the belt is at") as raised:
             await rig.io.divert(9, 1, count)
         assert raised.value.sequence == 9
         assert "shots_ordered" not in rig.io.counters
@@ -98,7 +98,7 @@ def test_the_ninth_order_finds_no_place(on_bus):
         await rig.ready()
         shots = [await rig.order(sequence, 500 + sequence) for sequence in range(1, 9)]
         ninth = await rig.order(9, 600)
-        with pytest.raises(ShotRefusedError, match="shot 9: the gate has no place left"):
+        with pytest.raises(RejectRefusedError, match="shot 9: the gate has no place left"):
             await ninth
         rig.run_belt()
         assert [(await shot).sequence for shot in shots] == list(range(1, 9))
@@ -174,7 +174,7 @@ def test_a_belt_that_does_not_come_ends_the_wait(on_bus):
 @pytest.mark.parametrize(("sequence", "lane", "count"), [(0, 1, 5), (2**32, 1, 5), (1, 0, 5), (1, 9, 5), (1, 1, 2**32)])
 def test_an_order_beyond_its_bounds_is_refused(on_bus, sequence, lane, count):
     async def scenario(rig):
-        with pytest.raises(ShotRefusedError, match="expected a sequence from 1"):
+        with pytest.raises(RejectRefusedError, match="expected a sequence from 1"):
             await rig.io.divert(sequence, lane, count)
 
     on_bus(scenario, start=False)
@@ -186,7 +186,7 @@ def test_no_order_without_a_bus_and_no_sequence_twice(on_bus):
             await rig.io.divert(1, 1, 5000)
         await rig.ready()
         first = await rig.order(65_537, 400)
-        with pytest.raises(ShotRefusedError, match="ordered already"):
+        with pytest.raises(RejectRefusedError, match="ordered already"):
             await rig.io.divert(1, 1, (rig.nodes.encoder.count + 500) % 2**32)
         rig.run_belt()
         assert (await first).sequence == 65_537
@@ -199,7 +199,7 @@ def test_a_gate_lost_under_way_ends_the_shot(on_bus):
         await rig.ready()
         shot = await rig.order(6, 400)
         rig.faults.set("gate_silent")
-        with pytest.raises(ShotLostError, match=r"shot 6: the gate was lost before it reported .* has fallen silent"):
+        with pytest.raises(RejectLostError, match=r"shot 6: the gate was lost before it reported .* has fallen silent"):
             await shot
         assert not rig.nodes.gate.fired
 
@@ -209,14 +209,14 @@ def test_a_gate_lost_under_way_ends_the_shot(on_bus):
 def test_the_gates_late_answer_is_a_late_shot():
     async def scenario():
         counters: Counter[str] = Counter()
-        shots = Shots(counters, tolerance_counts=10)
+        shots = PendingRejects(counters, tolerance_counts=10)
 
         async def ordered():
             with shots.under_way(Order(65_540, 1, 500)) as shot:
                 shots.on_report(Report(4, 2, 510))
                 await shot.next()
 
-        with pytest.raises(LateShotError, match="count 500 was past when the gate got the order, at 510"):
+        with pytest.raises(LateRejectError, match="count 500 was past when the gate got the order, at 510"):
             await ordered()
         assert counters["shots_failed"] == 1
 

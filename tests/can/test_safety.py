@@ -6,7 +6,7 @@ import struct
 import can
 import pytest
 
-from plc_interface.can.errors import NotReadyError, ShotLostError
+from plc_interface.can.errors import NotReadyError, RejectLostError
 from plc_interface.can.link import ORDER
 
 
@@ -19,7 +19,7 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         shot = await rig.order(1, 400)
         assert gate.output == 0
         rig.io.renew_health(0)
-        with pytest.raises(ShotLostError, match="the station is not healthy"):
+        with pytest.raises(RejectLostError, match="the station is not healthy"):
             await shot
         await rig.until(lambda: gate.output == 0b101)
         assert not gate.operational

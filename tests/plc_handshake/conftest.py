@@ -411,11 +411,11 @@ class Bench:
     def link(self, opened: Open | None = None, **changes: Any) -> tuple[do.Action, ...]:
         """A beat, and the answer to what it asks."""
         self.feed(ev.Beat, self.station_state(**changes))
-        assert self.state.open_asked is not None
-        return self.feed(ev.OpenTold, self.state.open_asked, opened or Open(running=None, outcomes=()))
+        assert self.state.open_request is not None
+        return self.feed(ev.OpenAnswered, self.state.open_request, opened or Open(running=None, outcomes=()))
 
     def armed(self, *bits: str) -> None:
-        self.feed(ev.WriterCame)
+        self.feed(ev.WriterGranted)
         self.link()
         self.write()
         self.write("enable", *bits)
@@ -424,8 +424,8 @@ class Bench:
         """An accepted trigger."""
         self.armed()
         self.write("enable", "trigger", trigger_id=trigger_id)
-        assert self.state.asked is not None
-        self.feed(ev.BeginAnswered, self.state.asked.number, Begun(sequence=sequence, deadline_s=2.0))
+        assert self.state.pending is not None
+        self.feed(ev.BeginAnswered, self.state.pending.number, Begun(sequence=sequence, deadline_s=2.0))
 
     def of(self, kind: type[Any]) -> list[Any]:
         return [action for action in self.actions if isinstance(action, kind)]

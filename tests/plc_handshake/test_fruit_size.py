@@ -16,18 +16,18 @@ NONE = (0, 0)
 
 def asked(made):
     """Sizes of the inspections that the station was asked for."""
-    return [(ask.fruit_length_mm_x10, ask.size_class) for ask in made.of(do.AskBegin)]
+    return [(ask.fruit_length_mm_x10, ask.size_class) for ask in made.of(do.RequestBegin)]
 
 
 def end(made, sequence):
     """Have the inspection under way end, and its result acknowledged."""
-    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=sequence, deadline_s=2.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=sequence, deadline_s=2.0))
     made.write("enable")
     trigger_id, size = made.state.running.trigger_id, made.state.running
     outcome = made.outcome(sequence=sequence, trigger_id=trigger_id).model_copy(
         update={"fruit_length_mm_x10": size.fruit_length_mm_x10, "size_class": size.size_class}
     )
-    made.feed(ev.OutcomeCame, outcome)
+    made.feed(ev.OutcomeReceived, outcome)
     made.write("enable", acknowledged_sequence=sequence)
 
 
@@ -72,14 +72,14 @@ def test_a_size_of_another_writer_is_forgotten(bench, written):
     made.armed()
     if written == "before":
         made.write("enable", fruit_length_mm_x10=300)
-        made.feed(ev.WriterWent)
-        made.feed(ev.WriterCame)
+        made.feed(ev.WriterWithdrawn)
+        made.feed(ev.WriterGranted)
         made.write()
     else:
         made.write("enable", "trigger", trigger_id=1)
         end(made, 101)
-        made.feed(ev.WriterWent)
-        made.feed(ev.WriterCame)
+        made.feed(ev.WriterWithdrawn)
+        made.feed(ev.WriterGranted)
         made.write("trigger", trigger_id=1, fruit_length_mm_x10=300)
         made.write()
     made.write("enable")

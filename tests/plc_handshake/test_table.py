@@ -52,7 +52,7 @@ def test_a_pair_that_is_not_listed_changes_nothing_and_is_counted(bench):
     before = made.state.inspection
     made.feed(ev.Tick)
     assert (made.state.unlisted, made.state.inspection) == (1, before)
-    assert "not foreseen" in made.of(do.Say)[-1].text
+    assert "not foreseen" in made.of(do.Log)[-1].text
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_a_pair_that_is_not_listed_changes_nothing_and_is_counted(bench):
 def test_an_outcome_that_contradicts_itself_is_no_outcome(bench, name, reasons, changes):
     made = bench()
     made.run()
-    made.feed(ev.OutcomeCame, made.outcome(name, *reasons, **changes))
+    made.feed(ev.OutcomeReceived, made.outcome(name, *reasons, **changes))
     (shown,) = made.state.queue
     assert (shown.sequence, shown.trigger_id, shown.outcome) == (41, 7, "NO_RESULT")
     assert shown.reasons == (Reason.INTERNAL_FAULT,)
@@ -79,7 +79,7 @@ def test_a_sequence_given_twice_is_refused(bench):
     made = bench(Journal(highest=41))
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=1.0))
     assert (made.state.inspection, made.state.last_refusal) == (Inspection.NONE, Refusal.NOT_READY)
     assert made.state.trigger is Trigger.ANSWERED
 
@@ -88,7 +88,7 @@ def test_an_inspection_that_the_station_does_not_know_any_more_is_no_result(benc
     made = bench()
     made.run()
     made.feed(ev.Beat, made.station_state(boot="2"))
-    made.feed(ev.OpenTold, made.state.open_asked, Open(running=None, outcomes=()))
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
     assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
     assert made.state.link is Link.UP
 
@@ -102,8 +102,8 @@ def test_an_outcome_that_comes_late_is_answered_with_what_stands(bench):
     (late,) = made.state.queue
     assert (late.outcome, late.reasons, late.late) == ("NO_RESULT", (Reason.LATE,), True)
     assert late.duration_ms == 2300
-    actions = made.feed(ev.OutcomeCame, made.outcome())
-    assert [action.outcome for action in actions if isinstance(action, do.TellPublished)] == [late]
+    actions = made.feed(ev.OutcomeReceived, made.outcome())
+    assert [action.outcome for action in actions if isinstance(action, do.NotifyPublished)] == [late]
     assert made.state.queue == (late,)
     made.feed(ev.OutcomeNoted, 41)
     assert made.state.journal.verdicts == ()
@@ -114,25 +114,25 @@ def test_what_the_interface_says_by_itself_is_on_the_disk_before_anything_else(b
     made.run()
     made.now_s += 10.0
     first, *rest = made.feed(ev.Tick)
-    assert isinstance(first, do.Keep)
+    assert isinstance(first, do.SaveJournal)
     assert first.durable
     assert first.journal.verdicts == made.state.queue
-    assert not any(isinstance(action, do.Keep) for action in rest)
+    assert not any(isinstance(action, do.SaveJournal) for action in rest)
 
 
 def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     made = bench()
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    actions = made.feed(ev.BeginFailed, made.state.asked.number)
-    assert isinstance(actions[0], do.Keep)
+    actions = made.feed(ev.BeginFailed, made.state.pending.number)
+    assert isinstance(actions[0], do.SaveJournal)
     assert actions[0].durable
     assert (made.state.last_refusal, made.state.link) == (Refusal.STATION_LOST, Link.RESUMING)
     made.feed(ev.BeginAnswered, 1, Begun(sequence=41, deadline_s=1.0))
     assert made.state.running is None
     actions = made.link(Open(running=(41, 7), outcomes=()))
-    told, taken = [action for action in actions if not isinstance(action, do.Keep | do.Say)]
-    assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.TellAcknowledged(41))
+    told, taken = [action for action in actions if not isinstance(action, do.SaveJournal | do.Log)]
+    assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.NotifyAcknowledged(41))
     assert view(made.state)["result_sequence"] == 0
     assert made.state.journal.acknowledged == 41
 
@@ -141,10 +141,10 @@ def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_onli
     made = bench()
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(refusal=Refusal.BUSY))
+    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(refusal=Refusal.BUSY))
     assert (made.state.last_refusal, made.state.link) == (Refusal.BUSY, Link.UP)
-    made.feed(ev.OpenTold, made.state.open_asked, Open(running=(41, 6), outcomes=()))
-    assert [action.outcome.sequence for action in made.of(do.TellPublished)] == [41]
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=(41, 6), outcomes=()))
+    assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
     assert (made.state.queue, made.state.journal.acknowledged) == ((), 41)
 
 
@@ -152,13 +152,13 @@ def test_the_answer_to_another_begin_accepts_nothing(bench):
     made = bench()
     made.armed("buffer_results")
     made.write("enable", "trigger", trigger_id=7)
-    first = made.state.asked.number
+    first = made.state.pending.number
     made.feed(ev.BeginFailed, first)
     made.link()
     made.write("enable")
     made.write("enable", "trigger", trigger_id=8)
     made.feed(ev.BeginAnswered, first, Begun(sequence=41, deadline_s=1.0))
-    assert (made.state.running, made.state.asked.trigger_id, made.state.stale) == (None, 8, 1)
+    assert (made.state.running, made.state.pending.trigger_id, made.state.stale) == (None, 8, 1)
 
 
 def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
@@ -167,9 +167,9 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
     made.write("enable", "trigger", trigger_id=7)
     made.feed(ev.RequestFailed, "a note was lost")
     made.feed(ev.Beat, made.station_state())
-    asked_before = made.state.open_asked
-    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=1.0))
-    made.feed(ev.OpenTold, asked_before, Open(running=None, outcomes=()))
+    asked_before = made.state.open_request
+    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.OpenAnswered, asked_before, Open(running=None, outcomes=()))
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
     made.link(Open(running=(41, 7), outcomes=()))
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
@@ -178,14 +178,14 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
 def test_what_is_hidden_is_acknowledged_only_behind_what_still_waits(bench):
     made = bench()
     made.run()
-    made.feed(ev.OutcomeCame, made.outcome())
+    made.feed(ev.OutcomeReceived, made.outcome())
     made.write("enable", "buffer_results")
     made.write("enable", "buffer_results", "trigger", trigger_id=8)
-    made.feed(ev.BeginFailed, made.state.asked.number)
+    made.feed(ev.BeginFailed, made.state.pending.number)
     made.link(Open(running=(42, 8), outcomes=made.state.queue))
-    assert (made.state.journal.hidden, made.of(do.TellAcknowledged)) == ((42,), [])
+    assert (made.state.journal.hidden, made.of(do.NotifyAcknowledged)) == ((42,), [])
     made.write("enable", acknowledged_sequence=41)
-    assert [action.sequence for action in made.of(do.TellAcknowledged)] == [41, 42]
+    assert [action.sequence for action in made.of(do.NotifyAcknowledged)] == [41, 42]
     assert made.state.journal.hidden == ()
 
 
@@ -193,7 +193,7 @@ def test_a_trigger_that_a_restart_interrupts_is_refused_and_what_it_began_is_nev
     made = bench()
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    again = bench(made.of(do.Keep)[-1].journal)
+    again = bench(made.of(do.SaveJournal)[-1].journal)
     assert (again.state.last_refusal, again.state.last_refused_id) == (Refusal.STATION_LOST, 7)
     again.link(Open(running=(41, 7), outcomes=()))
     assert (again.state.queue, again.state.running, again.state.journal.acknowledged) == ((), None, 41)
@@ -206,18 +206,18 @@ def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench
     made.feed(ev.Tick)
     assert Signal.RESULT_DEADLINE not in made.state.timers
     told = made.link(Open(running=(41, 7), outcomes=()))
-    assert [action.outcome for action in told if isinstance(action, do.TellPublished)] == list(made.state.queue)
+    assert [action.outcome for action in told if isinstance(action, do.NotifyPublished)] == list(made.state.queue)
 
 
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
     made = bench()
-    made.feed(ev.WriterCame)
+    made.feed(ev.WriterGranted)
     ended = made.outcome("FAIL", Reason.AREA_OVER_LIMIT, sequence=40, trigger_id=6)
     made.link(Open(running=(41, 7), outcomes=(ended,)))
     seen = view(made.state)
     assert (seen["result_sequence"], seen["result_trigger_id"], seen["accepted_trigger_id"]) == (40, 6, 7)
-    assert [action.sequence for action in made.of(do.AskOutcome)] == [41]
-    made.feed(ev.OutcomeCame, made.outcome())
+    assert [action.sequence for action in made.of(do.RequestOutcome)] == [41]
+    made.feed(ev.OutcomeReceived, made.outcome())
     assert [outcome.sequence for outcome in made.state.queue] == [40, 41]
 
 
@@ -226,15 +226,15 @@ def test_a_doubled_command_of_the_run_before_is_not_carried_out_again(bench):
     made = bench(Journal(command_sequence=5, command_result=executing))
     made.armed()
     made.write("enable", "execute_command", command_code=3, command_sequence=5)
-    assert made.of(do.AskCommand) == []
+    assert made.of(do.RequestCommand) == []
     assert view(made.state)["command_result"] == BY_NAME["command_result"].code("timed_out")
 
 
 def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench):
     made = bench()
     made.run()
-    made.feed(ev.WriterWent)
-    made.feed(ev.WriterCame)
+    made.feed(ev.WriterWithdrawn)
+    made.feed(ev.WriterGranted)
     assert made.state.arming is Arming.DISARMED
     made.write("enable", "trigger")
     assert made.state.trigger is Trigger.ANSWERED
@@ -244,7 +244,7 @@ def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench):
 def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid_fall(bench):
     made = bench()
     made.run()
-    made.feed(ev.OutcomeCame, made.outcome())
+    made.feed(ev.OutcomeReceived, made.outcome())
     made.write("enable")
     made.feed(ev.PlcWrote, made.inputs, frozenset())
     assert made.state.result is Result.SHOWN
@@ -259,12 +259,12 @@ def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid
 def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
     made = bench()
     made.run()
-    made.feed(ev.OutcomeCame, made.outcome())
+    made.feed(ev.OutcomeReceived, made.outcome())
     made.write("enable", "acknowledge")
     assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
     made.write("enable", acknowledged_sequence=41 << 16)
     assert made.state.counters["count_communication"] == 2
-    assert (made.state.result, made.of(do.TellAcknowledged)) == (Result.SHOWN, [])
+    assert (made.state.result, made.of(do.NotifyAcknowledged)) == (Result.SHOWN, [])
     made.write("enable", "clear_error")
     assert made.state.faults == ()
     assert len(made.of(do.ClearFaults)) == 1
@@ -275,22 +275,22 @@ def test_an_enable_left_high_over_a_loss_never_arms_again(bench, lost):
     made = bench()
     made.armed()
     if lost == "writer":
-        made.feed(ev.WriterWent)
-        made.feed(ev.WriterCame)
+        made.feed(ev.WriterWithdrawn)
+        made.feed(ev.WriterGranted)
     elif lost == "heartbeat":
         made.write("enable", plc_heartbeat=1)
         made.now_s += made.settings.plc_heartbeat_timeout_s
         made.feed(ev.Tick)
     else:
         made = bench(made.state.journal)
-        made.feed(ev.WriterCame)
+        made.feed(ev.WriterGranted)
         made.write("enable")
     made.link(boot="2")
     for trigger_id in (7, 8):
         made.write("enable")
         made.write("enable", "trigger", trigger_id=trigger_id)
         assert (made.state.last_refusal, made.state.last_refused_id) == (Refusal.NOT_ENABLED, trigger_id)
-    assert made.of(do.AskBegin) == []
+    assert made.of(do.RequestBegin) == []
     made.write()
     made.write("enable")
     assert made.state.arming is Arming.ARMED
@@ -303,16 +303,16 @@ def test_a_lost_station_gives_one_outcome_and_what_it_says_later_does_not_replac
     made.feed(ev.Tick)
     (lost,) = made.state.queue
     assert (lost.sequence, lost.outcome, lost.reasons) == (41, "NO_RESULT", (Reason.STATION_LOST,))
-    assert made.of(do.PassOn) == [do.PassOn(lost)]
-    made.feed(ev.OutcomeCame, made.outcome())
+    assert made.of(do.ForwardOutcome) == [do.ForwardOutcome(lost)]
+    made.feed(ev.OutcomeReceived, made.outcome())
     made.link(Open(running=None, outcomes=(made.outcome(),)), boot="2")
-    made.feed(ev.OutcomeCame, made.outcome())
+    made.feed(ev.OutcomeReceived, made.outcome())
     assert made.state.queue == (lost,)
     assert view(made.state)["result_outcome"] == BY_NAME["result_outcome"].code("NO_RESULT")
-    assert made.of(do.PassOn) == [do.PassOn(lost)]
-    assert {action.outcome for action in made.of(do.TellPublished)} == {lost}
+    assert made.of(do.ForwardOutcome) == [do.ForwardOutcome(lost)]
+    assert {action.outcome for action in made.of(do.NotifyPublished)} == {lost}
     made.write("enable", acknowledged_sequence=41)
-    made.feed(ev.OutcomeCame, made.outcome())
+    made.feed(ev.OutcomeReceived, made.outcome())
     assert made.state.queue == ()
 
 
@@ -324,9 +324,9 @@ def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while
     made.write("enable", acknowledged_sequence=41)
     made.actions.clear()
     made.link(Open(running=(41, 7), outcomes=()))
-    told = [action for action in made.actions if isinstance(action, do.TellPublished | do.TellAcknowledged)]
-    assert [type(action) for action in told] == [do.TellPublished, do.TellAcknowledged]
-    assert told[-1] == do.TellAcknowledged(41)
+    told = [action for action in made.actions if isinstance(action, do.NotifyPublished | do.NotifyAcknowledged)]
+    assert [type(action) for action in told] == [do.NotifyPublished, do.NotifyAcknowledged]
+    assert told[-1] == do.NotifyAcknowledged(41)
 
 
 def status(made):
@@ -338,16 +338,16 @@ def status(made):
 def test_a_trigger_is_accepted_only_while_its_fruit_could_be_diverted(bench):
     made = bench()
     made.armed()
-    made.feed(ev.OutputTold, False)
+    made.feed(ev.OutputChanged, False)
     made.write("enable", "trigger", trigger_id=7)
-    assert made.of(do.AskBegin) == []
+    assert made.of(do.RequestBegin) == []
     assert made.state.last_refusal is Refusal.NOT_READY
     assert "trigger_ready" not in status(made)
-    made.feed(ev.OutputTold, True)
+    made.feed(ev.OutputChanged, True)
     assert "trigger_ready" in status(made)
     made.write("enable")
     made.write("enable", "trigger", trigger_id=7)
-    assert len(made.of(do.AskBegin)) == 1
+    assert len(made.of(do.RequestBegin)) == 1
 
 
 def test_timers_that_ran_out_together_go_in_a_fixed_order(bench):
@@ -390,14 +390,14 @@ def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(
     made = bench()
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    made.feed(ev.WriterWent)
-    assert made.state.asked is not None
-    made.feed(ev.BeginAnswered, made.state.asked.number, Begun(sequence=41, deadline_s=2.0))
+    made.feed(ev.WriterWithdrawn)
+    assert made.state.pending is not None
+    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=2.0))
     assert made.state.trigger is Trigger.HELD
-    made.feed(ev.WriterCame)
+    made.feed(ev.WriterGranted)
     made.write("trigger", trigger_id=7)
     assert (made.state.trigger, made.state.unlisted) == (Trigger.ANSWERED, 0)
     made.now_s += made.settings.handshake_timeout_s
     made.feed(ev.Tick)
     assert made.state.trigger is Trigger.STUCK
-    assert Fault.TRIGGER_FORGOTTEN in made.state.faults
+    assert Fault.TRIGGER_NOT_RESET in made.state.faults

@@ -94,26 +94,26 @@ class Rig:
         self.handle(events.PlcWrote(now(), Inputs(control=control, **written), frozenset(values)))
 
     def _writer(self, peer: Peer | None, _change: WriterChange) -> None:
-        self.handle(events.WriterCame(now()) if peer else events.WriterWent(now()))
+        self.handle(events.WriterGranted(now()) if peer else events.WriterWithdrawn(now()))
 
     def _act(self, action: actions.Action) -> None:
         match action:
-            case actions.AskBegin():
+            case actions.RequestBegin():
                 begun = Begun(refusal=self.refusal)
                 if self.refusal is None:
                     self.begun.append((action.trigger_id, action.encoder, action.lot))
                     self.sizes.append((action.fruit_length_mm_x10, action.size_class))
                     begun = Begun(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
                 self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, begun))
-            case actions.AskOutcome():
-                self.soon(self.inspection_s, lambda: events.OutcomeCame(now(), self._made(action.sequence)))
-            case actions.AskOpen():
-                self.soon(0, lambda: events.OpenTold(now(), action.number, Open(running=None, outcomes=())))
-            case actions.AskCommand():
+            case actions.RequestOutcome():
+                self.soon(self.inspection_s, lambda: events.OutcomeReceived(now(), self._made(action.sequence)))
+            case actions.RequestOpen():
+                self.soon(0, lambda: events.OpenAnswered(now(), action.number, Open(running=None, outcomes=())))
+            case actions.RequestCommand():
                 self.commands.append((action.command.value, action.argument))
                 done, why = not self.command_fails, self.command_fails
                 self.soon(0.02, lambda: events.CommandAnswered(now(), action.number, done, why))
-            case actions.TellPublished():
+            case actions.NotifyPublished():
                 self.soon(0, lambda: events.OutcomeNoted(now(), action.outcome.sequence))
             case _:
                 pass

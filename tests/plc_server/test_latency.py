@@ -5,16 +5,16 @@ import sys
 
 SCRIPT = """
 import gc, logging, os
-from plc_interface.latency import favour_latency
+from plc_interface.latency import request_real_time_priority
 logging.basicConfig(format="%(message)s")
-got = favour_latency()
+got = request_real_time_priority()
 policy = os.sched_getscheduler(0)
 assert got == (policy == os.SCHED_RR | os.SCHED_RESET_ON_FORK), policy
 assert gc.get_freeze_count() > 0
 if got:
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.setuid(65534)
-assert not favour_latency()
+assert not request_real_time_priority()
 """
 
 

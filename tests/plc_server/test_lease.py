@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from plc_interface.modbus.exceptions import Trouble
-from plc_interface.modbus.lease import SILENCE_S, WriterChange, WriterLease
+from plc_interface.modbus.lease import SILENCE_S, WriteLock, WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_map import BY_NAME
@@ -20,48 +20,48 @@ class TestLease:
         return []
 
     @pytest.fixture
-    def lease(self, changes):
-        return WriterLease(10.0, lambda peer, change: changes.append((peer, change)))
+    def lock(self, changes):
+        return WriteLock(10.0, lambda peer, change: changes.append((peer, change)))
 
-    def test_the_first_has_it_until_it_is_gone(self, lease, changes):
+    def test_the_first_has_it_until_it_is_gone(self, lock, changes):
         one, other = Peer("10.0.0.1", 1, may_write=True), Peer("10.0.0.2", 2, may_write=True)
-        assert lease.claim(one, 0.0, 0.0)
-        assert lease.claim(one, 1.0, 1.0)
-        assert not lease.claim(other, 5.0, 1.0)
-        lease.disconnected(other)
-        assert lease.holder is one
-        lease.disconnected(one)
-        assert lease.claim(other, 6.0, 0.0)
+        assert lock.claim(one, 0.0, 0.0)
+        assert lock.claim(one, 1.0, 1.0)
+        assert not lock.claim(other, 5.0, 1.0)
+        lock.disconnected(other)
+        assert lock.holder is one
+        lock.disconnected(one)
+        assert lock.claim(other, 6.0, 0.0)
         assert changes == [
             (one, WriterChange.CLAIMED),
             (None, WriterChange.DISCONNECTED),
             (other, WriterChange.CLAIMED),
         ]
 
-    def test_it_ends_without_writes(self, lease, changes):
+    def test_it_ends_without_writes(self, lock, changes):
         one = Peer("10.0.0.1", 1, may_write=True)
-        lease.claim(one, 0.0, 0.0)
-        lease.claim(one, 5.0, 5.0)
-        lease.expire(14.9)
-        assert lease.holder is one
-        lease.expire(15.1)
-        lease.expire(16.0)
+        lock.claim(one, 0.0, 0.0)
+        lock.claim(one, 5.0, 5.0)
+        lock.expire(14.9)
+        assert lock.holder is one
+        lock.expire(15.1)
+        lock.expire(16.0)
         assert changes[1:] == [(None, WriterChange.TIMED_OUT)]
 
-    def test_the_same_client_takes_over_from_its_silent_connection(self, lease, changes):
+    def test_the_same_client_takes_over_from_its_silent_connection(self, lock, changes):
         old, new = Peer("10.0.0.1", 1, may_write=True), Peer("10.0.0.1", 2, may_write=True)
-        lease.claim(old, 0.0, 0.0)
-        assert not lease.claim(new, 3.0, 3.0 - SILENCE_S / 2)
-        assert lease.claim(new, 3.0, 3.0 - 2 * SILENCE_S)
-        lease.disconnected(old)
-        assert lease.holder is new
+        lock.claim(old, 0.0, 0.0)
+        assert not lock.claim(new, 3.0, 3.0 - SILENCE_S / 2)
+        assert lock.claim(new, 3.0, 3.0 - 2 * SILENCE_S)
+        lock.disconnected(old)
+        assert lock.holder is new
         assert changes[1:] == [(new, WriterChange.TAKEN_OVER)]
 
-    def test_another_certificate_is_another_client(self, lease):
+    def test_another_certificate_is_another_client(self, lock):
         old = Peer("10.0.0.1", 1, may_write=True, name="CN=plc")
         new = Peer("10.0.0.1", 2, may_write=True, name="CN=laptop")
-        lease.claim(old, 0.0, 0.0)
-        assert not lease.claim(new, 9.0, 0.0)
+        lock.claim(old, 0.0, 0.0)
+        assert not lock.claim(new, 9.0, 0.0)
 
 
 class TestOnTheWire:

@@ -9,7 +9,7 @@ import pytest
 from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import COMMAND_RESULT
-from plc_interface.handshake.modes import Arming, Link, Order, Result
+from plc_interface.handshake.modes import Arming, Command, Link, Result
 from plc_interface.handshake.state import Fault, State
 from plc_interface.handshake.view import view
 from plc_interface.register_map import BY_NAME
@@ -122,10 +122,10 @@ class Station:
 
 
 FORGOTTEN = {
-    "trigger_acknowledged": ("trigger", Fault.TRIGGER_FORGOTTEN),
-    "lot_latched": ("latch_lot", Fault.LATCH_FORGOTTEN),
-    "command_done": ("execute_command", Fault.EXECUTE_FORGOTTEN),
-    "command_failed": ("execute_command", Fault.EXECUTE_FORGOTTEN),
+    "trigger_acknowledged": ("trigger", Fault.TRIGGER_NOT_RESET),
+    "lot_latched": ("latch_lot", Fault.LATCH_NOT_RESET),
+    "command_done": ("execute_command", Fault.EXECUTE_NOT_RESET),
+    "command_failed": ("execute_command", Fault.EXECUTE_NOT_RESET),
 }
 """Bits that stand no longer than the handshake's time-out: the PLC's bit that takes them back, and the fault if not."""
 
@@ -154,7 +154,7 @@ class Laws:
         self._counters(before, after)
 
     def _link(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
-        asks = [action for action in actions if isinstance(action, do.AskOpen)]
+        asks = [action for action in actions if isinstance(action, do.RequestOpen)]
         up = before.link is Link.UP and not silent
         beats = False
         if isinstance(event, ev.Beat):
@@ -166,16 +166,16 @@ class Laws:
                 assert asks, "a new start of the station is not asked what is open"
                 assert after.link is Link.RESUMING
             elif not up:
-                assert after.open_asked is not None, "a station that is heard again is not asked what is open"
-                assert not asks or silent or before.open_asked is None, "it is asked twice at once"
+                assert after.open_request is not None, "a station that is heard again is not asked what is open"
+                assert not asks or silent or before.open_request is None, "it is asked twice at once"
         elif silent:
-            assert (after.link, after.open_asked) == (Link.LOST, None)
+            assert (after.link, after.open_request) == (Link.LOST, None)
         elif isinstance(event, ev.RequestFailed):
             assert after.link is not Link.UP
-            assert after.open_asked is None, "a question that failed is not asked anew"
-        elif isinstance(event, ev.OpenTold) and event.number == before.open_asked:
-            assert (after.link, after.open_asked) == (Link.UP, None)
-        elif isinstance(event, ev.BeginAnswered) and before.asked and before.asked.number == event.number:
+            assert after.open_request is None, "a question that failed is not asked anew"
+        elif isinstance(event, ev.OpenAnswered) and event.number == before.open_request:
+            assert (after.link, after.open_request) == (Link.UP, None)
+        elif isinstance(event, ev.BeginAnswered) and before.pending and before.pending.number == event.number:
             assert asks or not up or event.begun.refusal is not Refusal.BUSY, "what keeps the station busy is not asked"
         seen = view(after)
         assert seen["station_heartbeat"] == (before.heartbeat + beats) % 2**16
@@ -183,33 +183,33 @@ class Laws:
         assert seen["active_recipe"] == (0 if self.heard_s is None else RECIPE), "a lost station's words are used"
 
     def _commands(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
-        asks = any(isinstance(action, do.AskCommand) for action in actions)
-        assert asks == (after.command_asked not in {before.command_asked, None}), "a command is not carried out"
-        assert asks or after.order is before.order or after.order is not Order.EXECUTING
+        asks = any(isinstance(action, do.RequestCommand) for action in actions)
+        assert asks == (after.command_request not in {before.command_request, None}), "a command is not carried out"
+        assert asks or after.command is before.command or after.command is not Command.EXECUTING
         result = after.journal.command_result
-        mine = before.command_asked is not None
-        if before.order is Order.EXECUTING and (
+        mine = before.command_request is not None
+        if before.command is Command.EXECUTING and (
             silent or (isinstance(event, ev.Beat) and before.last_boot != self.boot)
         ):
-            assert (after.order, result) == (Order.FAILED, COMMAND_RESULT.code("station_lost"))
-        elif isinstance(event, ev.CommandAnswered) and mine and event.number == before.command_asked:
-            expected = (Order.DONE, "done") if event.done else (Order.FAILED, "failed")
-            assert (after.order, result) == (expected[0], COMMAND_RESULT.code(expected[1]))
-        elif isinstance(event, ev.CommandFailed) and mine and event.number == before.command_asked:
-            assert (after.order, result) == (Order.FAILED, COMMAND_RESULT.code("timed_out"))
+            assert (after.command, result) == (Command.FAILED, COMMAND_RESULT.code("station_lost"))
+        elif isinstance(event, ev.CommandAnswered) and mine and event.number == before.command_request:
+            expected = (Command.DONE, "done") if event.done else (Command.FAILED, "failed")
+            assert (after.command, result) == (expected[0], COMMAND_RESULT.code(expected[1]))
+        elif isinstance(event, ev.CommandFailed) and mine and event.number == before.command_request:
+            assert (after.command, result) == (Command.FAILED, COMMAND_RESULT.code("timed_out"))
         elif self._rises(event, before, "execute_command"):
             self._command_given(event.inputs, before, after)  # type: ignore[union-attr]
 
     def _command_given(self, inputs: ev.Inputs, before: State, after: State) -> None:
         new = inputs.command_sequence != before.journal.command_sequence
-        if before.order is Order.EXECUTING:
+        if before.command is Command.EXECUTING:
             assert not new or Fault.COMMAND_BUSY in after.faults
         elif new:
             assert after.journal.command_sequence == inputs.command_sequence
             good = inputs.command_code in BY_NAME["command_code"].codes and inputs.command_code != 0
             name = "no_command" if not good else "executing" if before.link is Link.UP else "station_lost"
             assert after.journal.command_result == COMMAND_RESULT.code(name)
-            assert after.order is (Order.EXECUTING if name == "executing" else Order.FAILED)
+            assert after.command is (Command.EXECUTING if name == "executing" else Command.FAILED)
 
     def _enable(self, event: ev.Event, before: State, after: State, actions: Any) -> None:
         quiet = (
@@ -220,7 +220,7 @@ class Laws:
             self.plc_beat_s = None
             assert Fault.PLC_SILENT in after.faults or self._cleared(actions)
             assert after.arming is not Arming.ARMED or isinstance(event, ev.PlcWrote)
-        if isinstance(event, ev.WriterWent):
+        if isinstance(event, ev.WriterWithdrawn):
             self.plc_beat_s = None
             assert after.arming is not Arming.ARMED
             assert after.counters["count_communication"] > before.counters["count_communication"]
@@ -256,7 +256,7 @@ class Laws:
         else:
             self.since_s.pop("waiting", None)
         if before.result is Result.TAKEN and after.result is not Result.TAKEN and "acknowledge" in (after.seen or ()):
-            assert Fault.ACKNOWLEDGE_FORGOTTEN in after.faults
+            assert Fault.ACKNOWLEDGE_NOT_RESET in after.faults
         if due:
             return
         if after.result is Result.SHOWN and (before.result is not Result.SHOWN or before.shown != after.shown):

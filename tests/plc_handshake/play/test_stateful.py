@@ -45,7 +45,7 @@ class Request:
 
 @dataclass(frozen=True)
 class AcknowledgementNoted:
-    """The station's answer to `TellAcknowledged`, of which the core is not told."""
+    """The station's answer to `NotifyAcknowledged`, of which the core is not told."""
 
     at: ev.Moment
     sequence: int
@@ -89,7 +89,7 @@ class Handshake(RuleBasedStateMachine):
         self.laws = self.make_laws(SETTINGS)
         self.seen = view(self.state)
         self.observe()
-        self.feed(ev.WriterCame(self.at()))
+        self.feed(ev.WriterGranted(self.at()))
 
     def at(self) -> ev.Moment:
         return ev.Moment(self.now_s, round(1000 * self.now_s))
@@ -100,8 +100,8 @@ class Handshake(RuleBasedStateMachine):
         assert self.state == before, "a step changed the state that it was given"
         self.laws.hold(event, before, after, todo)
         self.state = after
-        keeps = [action for action in todo if isinstance(action, do.Keep)]
-        rest = [action for action in todo if not isinstance(action, do.Keep)]
+        keeps = [action for action in todo if isinstance(action, do.SaveJournal)]
+        rest = [action for action in todo if not isinstance(action, do.SaveJournal)]
         for number, action in enumerate([*keeps, None, *rest]):
             if self.crash_after is not None and number >= self.crash_after:
                 self.crash_after = None
@@ -115,19 +115,19 @@ class Handshake(RuleBasedStateMachine):
 
     def carry_out(self, action: Any) -> None:
         match action:
-            case do.Keep(journal=journal):
+            case do.SaveJournal(journal=journal):
                 self.disk = Journal.model_validate_json(journal.model_dump_json())
-            case do.AskBegin():
+            case do.RequestBegin():
                 self.send(action, SETTINGS.begin_deadline_s)
-            case do.AskOutcome(within_s=within_s):
+            case do.RequestOutcome(within_s=within_s):
                 self.send(action, within_s)
-            case do.AskOpen():
+            case do.RequestOpen():
                 self.send(action, 1.0)
-            case do.AskCommand():
+            case do.RequestCommand():
                 assert self.state.journal.command_sequence not in self.commands, "a command is carried out twice"
                 self.commands.add(self.state.journal.command_sequence)
                 self.send(action, 2.0)
-            case do.TellPublished() | do.TellAcknowledged():
+            case do.NotifyPublished() | do.NotifyAcknowledged():
                 self.tells.append(action)
                 self.next_tell()
 
@@ -137,20 +137,20 @@ class Handshake(RuleBasedStateMachine):
         self.pending.append(request)
 
     def next_tell(self) -> None:
-        telling = any(isinstance(r.action, do.TellPublished | do.TellAcknowledged) for r in self.pending)
+        telling = any(isinstance(r.action, do.NotifyPublished | do.NotifyAcknowledged) for r in self.pending)
         if self.tells and not telling:
             self.send(self.tells.pop(0), 1.0)
 
     def failed(self, request: Request) -> None:
         match request.action:
-            case do.AskBegin(number=number):
+            case do.RequestBegin(number=number):
                 self.feed(ev.BeginFailed(self.at(), number))
-            case do.AskCommand(number=number):
+            case do.RequestCommand(number=number):
                 self.feed(ev.CommandFailed(self.at(), number))
-            case do.TellPublished() | do.TellAcknowledged():
+            case do.NotifyPublished() | do.NotifyAcknowledged():
                 self.tells.clear()
                 self.feed(ev.RequestFailed(self.at(), "a note"))
-            case do.AskOutcome(sequence=sequence):
+            case do.RequestOutcome(sequence=sequence):
                 self.feed(ev.OutcomeFailed(self.at(), sequence, "no answer"))
             case _:
                 self.feed(ev.RequestFailed(self.at(), "a question"))
@@ -159,20 +159,20 @@ class Handshake(RuleBasedStateMachine):
         """An answer reaches the core, with the time at which it does; also one that nobody waits for any more."""
         if isinstance(event, AcknowledgementNoted):
             sequence = event.sequence
-            self.settle(lambda a: isinstance(a, do.TellAcknowledged) and a.sequence == sequence)
+            self.settle(lambda a: isinstance(a, do.NotifyAcknowledged) and a.sequence == sequence)
             event = ev.Tick(self.at())
         event = replace(event, at=self.at())
         match event:
             case ev.BeginAnswered(number=number):
-                self.settle(lambda a: isinstance(a, do.AskBegin) and a.number == number)
-            case ev.OpenTold(number=number):
-                self.settle(lambda a: isinstance(a, do.AskOpen) and a.number == number)
-            case ev.OutcomeCame(outcome=told):
-                self.settle(lambda a: isinstance(a, do.AskOutcome) and a.sequence == told.sequence)
+                self.settle(lambda a: isinstance(a, do.RequestBegin) and a.number == number)
+            case ev.OpenAnswered(number=number):
+                self.settle(lambda a: isinstance(a, do.RequestOpen) and a.number == number)
+            case ev.OutcomeReceived(outcome=told):
+                self.settle(lambda a: isinstance(a, do.RequestOutcome) and a.sequence == told.sequence)
             case ev.CommandAnswered(number=number):
-                self.settle(lambda a: isinstance(a, do.AskCommand) and a.number == number)
+                self.settle(lambda a: isinstance(a, do.RequestCommand) and a.number == number)
             case ev.OutcomeNoted(sequence=sequence):
-                self.settle(lambda a: isinstance(a, do.TellPublished) and a.outcome.sequence == sequence)
+                self.settle(lambda a: isinstance(a, do.NotifyPublished) and a.outcome.sequence == sequence)
         self.feed(event)
         self.next_tell()
 
@@ -186,19 +186,19 @@ class Handshake(RuleBasedStateMachine):
         if not station.up or request.expires_s < self.now_s:
             return
         match request.action:
-            case do.AskBegin(number=number, trigger_id=trigger_id):
+            case do.RequestBegin(number=number, trigger_id=trigger_id):
                 self.answers.append(ev.BeginAnswered(at, number, station.begin(trigger_id)))
-            case do.AskOutcome(sequence=sequence):
+            case do.RequestOutcome(sequence=sequence):
                 station.waiting.add(sequence)
                 self.tell_outcomes()
-            case do.AskCommand(number=number, argument=argument):
+            case do.RequestCommand(number=number, argument=argument):
                 self.answers.append(ev.CommandAnswered(at, number, done=argument % 2 == 0, why="no"))
-            case do.AskOpen(number=number):
-                self.answers.append(ev.OpenTold(at, number, station.open()))
-            case do.TellPublished(outcome=told):
+            case do.RequestOpen(number=number):
+                self.answers.append(ev.OpenAnswered(at, number, station.open()))
+            case do.NotifyPublished(outcome=told):
                 station.publish(told)
                 self.answers.append(ev.OutcomeNoted(at, told.sequence))
-            case do.TellAcknowledged(sequence=sequence):
+            case do.NotifyAcknowledged(sequence=sequence):
                 for number, record in station.records.items():
                     record.acknowledged |= number <= sequence
                 self.answers.append(AcknowledgementNoted(at, sequence))
@@ -210,7 +210,7 @@ class Handshake(RuleBasedStateMachine):
                 stands = record.judged or record.told
                 assert stands is not None
                 self.station.waiting.discard(sequence)
-                self.answers.append(ev.OutcomeCame(self.at(), stands))
+                self.answers.append(ev.OutcomeReceived(self.at(), stands))
 
     # what the PLC sees
 
@@ -265,7 +265,7 @@ class Handshake(RuleBasedStateMachine):
             self.control = set(values["control"])
             values["control"] = frozenset(self.control)
         if not self.state.writer:
-            self.feed(ev.WriterCame(self.at()))
+            self.feed(ev.WriterGranted(self.at()))
         self.inputs = replace(self.inputs, **values)
         shown = self.seen["result_sequence"]
         run = self.runs
@@ -416,12 +416,12 @@ class Handshake(RuleBasedStateMachine):
 
     @rule()
     def writer_goes(self) -> None:
-        self.feed(ev.WriterWent(self.at()))
+        self.feed(ev.WriterWithdrawn(self.at()))
 
     @rule()
     def reconnect(self) -> None:
-        self.feed(ev.WriterWent(self.at()))
-        self.feed(ev.WriterCame(self.at()))
+        self.feed(ev.WriterWithdrawn(self.at()))
+        self.feed(ev.WriterGranted(self.at()))
 
     # the wire's rules
 
@@ -483,7 +483,7 @@ class Handshake(RuleBasedStateMachine):
 
     @rule(ready=st.booleans())
     def output_told(self, ready: bool) -> None:
-        self.feed(ev.OutputTold(self.at(), ready))
+        self.feed(ev.OutputChanged(self.at(), ready))
 
     @rule()
     def whole_cycle(self) -> None:
