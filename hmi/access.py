@@ -9,7 +9,7 @@ from hmi.context import Hmi
 from hmi.problem import Problem
 from hmi.roles import Right, least_role
 from hmi.sessions import Caller
-from hmi.words import Wording, preferred
+from hmi.words import Locale, preferred
 
 SESSION_COOKIE, LANGUAGE_COOKIE = "station_session", "station_language"
 TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
@@ -29,10 +29,10 @@ def caller_of(request: Request) -> Caller:
     return hmi_of(request).sessions.caller(session)
 
 
-def wording_of(request: Request) -> Wording:
+def locale_of(request: Request) -> Locale:
     """Return the language to answer in."""
     cookie, accepted = request.cookies.get(LANGUAGE_COOKIE, ""), request.headers.get("accept-language", "")
-    return Wording(preferred(hmi_of(request).settings.languages, cookie, accepted))
+    return Locale(preferred(hmi_of(request).settings.languages, cookie, accepted))
 
 
 async def genuine(request: Request) -> Caller:
@@ -82,4 +82,4 @@ def _with_right(caller: Caller, right: Right) -> Caller:
 HmiNow = Annotated[Hmi, Depends(hmi_of)]
 CallerNow = Annotated[Caller, Depends(caller_of)]
 GenuineCaller = Annotated[Caller, Depends(genuine)]
-WordingNow = Annotated[Wording, Depends(wording_of)]
+LocaleNow = Annotated[Locale, Depends(locale_of)]

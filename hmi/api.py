@@ -66,14 +66,14 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 @router.get("/health", tags=["health"])
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     """Whether the station accepts fruit, and the state of each of its parts."""
-    told = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
     return HealthAnswer(
-        ready=told.ready,
-        why=told.why,
-        mode=told.mode,
-        simulated=told.simulated,
-        parts=[Part(**part.model_dump()) for part in told.parts],
-        versions=told.versions,
+        ready=reply.ready,
+        why=reply.why,
+        mode=reply.mode,
+        simulated=reply.simulated,
+        parts=[Part(**part.model_dump()) for part in reply.parts],
+        versions=reply.versions,
     )
 
 
@@ -110,24 +110,24 @@ async def inspections(
 async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionWhole:
     """One inspection with its curve."""
     try:
-        told = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
+        reply = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
     except RefusedError as error:
         raise HTTPException(404, str(error)) from error
-    return InspectionWhole.of(told)
+    return InspectionWhole.of(reply)
 
 
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
     """The state of every recipe."""
-    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    return RecipeList(recipes=[RecipeShort(**_short(row)) for row in told.rows])
+    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return RecipeList(recipes=[RecipeShort(**_short(row)) for row in reply.rows])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
 async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
     """One recipe, with the values in force."""
-    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    row = next((each for each in told.rows if each.name == name), None)
+    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    row = next((each for each in reply.rows if each.name == name), None)
     if row is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
     values = None
@@ -140,17 +140,17 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
 @router.get("/lots", tags=["lots"])
 async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
     """The latest lots."""
-    told = await hmi.gateway.ask(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
-    return LotList(lots=[LotAnswer.of(each) for each in told.lots])
+    reply = await hmi.gateway.ask(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
+    return LotList(lots=[LotAnswer.of(each) for each in reply.lots])
 
 
 @router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
 async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
     """One lot."""
-    told = await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
-    if not told.lots:
+    reply = await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
+    if not reply.lots:
         raise HTTPException(404, f"nobody told of a lot {name}")
-    return LotAnswer.of(told.lots[0])
+    return LotAnswer.of(reply.lots[0])
 
 
 @router.put("/lots/{name}", tags=["lots"])

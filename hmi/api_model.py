@@ -107,7 +107,9 @@ class InspectionWhole(Model):
     duration_s: float | None
     lot: str
     simulated: bool = Field(description="A twin's device took part.")
-    outcome: OutcomeName | None = Field(description="What the PLC was told, or is to be told; null while it runs.")
+    outcome: OutcomeName | None = Field(
+        description="The published outcome, or the one to be published; null while it runs."
+    )
     reasons: list[str]
     explanation: list[str]
     late: bool | None
@@ -122,43 +124,43 @@ class InspectionWhole(Model):
     devices: dict[str, str]
     versions: dict[str, str]
     images: list[str] = Field(description="SHA-256 of those kept.")
-    published: datetime | None = Field(description="When the PLC was told.")
+    published: datetime | None = Field(description="Time of publication to the PLC.")
     acknowledged: datetime | None = Field(description="When the PLC took it.")
     fruit_length_mm: float | None = Field(description="As the PLC gave it with the trigger; null where it did not.")
     size_class: int | None = Field(description="Likewise.")
 
     @classmethod
-    def of(cls, told: InspectionTold) -> "InspectionWhole":
+    def of(cls, reply: InspectionTold) -> "InspectionWhole":
         """Convert the station's answer."""
-        standing = told.standing
+        standing = reply.standing
         return cls(
-            sequence=told.sequence,
-            trigger_id=told.trigger_id,
-            encoder=told.encoder,
-            began=moment(told.began_utc_ms),
+            sequence=reply.sequence,
+            trigger_id=reply.trigger_id,
+            encoder=reply.encoder,
+            began=moment(reply.began_utc_ms),
             ended=None if standing is None else moment(standing.ended_utc_ms),
             duration_s=None if standing is None else standing.duration_ms / 1000,
-            lot=told.lot,
-            simulated=told.simulated,
+            lot=reply.lot,
+            simulated=reply.simulated,
             outcome=None if standing is None else standing.outcome,
-            reasons=[name for name, _ in told.reasons],
-            explanation=list(told.explanation),
+            reasons=[name for name, _ in reply.reasons],
+            explanation=list(reply.explanation),
             late=None if standing is None else standing.late,
             partial=None if standing is None else standing.partial,
             area_mm2=None if standing is None else standing.area_mm2,
             closing_mm=None if standing is None else standing.closing_mm,
             confidence=None if standing is None else standing.confidence,
-            recipe=told.recipe_name,
-            recipe_revision=told.recipe_revision,
-            recipe_sha256=told.recipe_sha256,
-            curve=[Point(**{**point.model_dump(), "flags": list(point.flags)}) for point in told.curve],
-            devices=told.devices,
-            versions=told.versions,
-            images=[image.sha256 for image in told.images if image.there],
-            published=None if told.published_utc_ms is None else moment(told.published_utc_ms),
-            acknowledged=None if told.acknowledged_utc_ms is None else moment(told.acknowledged_utc_ms),
-            fruit_length_mm=told.fruit_length_mm,
-            size_class=told.size_class,
+            recipe=reply.recipe_name,
+            recipe_revision=reply.recipe_revision,
+            recipe_sha256=reply.recipe_sha256,
+            curve=[Point(**{**point.model_dump(), "flags": list(point.flags)}) for point in reply.curve],
+            devices=reply.devices,
+            versions=reply.versions,
+            images=[image.sha256 for image in reply.images if image.there],
+            published=None if reply.published_utc_ms is None else moment(reply.published_utc_ms),
+            acknowledged=None if reply.acknowledged_utc_ms is None else moment(reply.acknowledged_utc_ms),
+            fruit_length_mm=reply.fruit_length_mm,
+            size_class=reply.size_class,
         )
 
 
@@ -193,10 +195,10 @@ class LotAnswer(Model):
     ended: datetime | None = Field(description="Null while it runs.")
 
     @classmethod
-    def of(cls, told: LotTold) -> "LotAnswer":
+    def of(cls, reply: LotTold) -> "LotAnswer":
         """Convert the station's answer."""
-        ended = None if told.ended_utc_ms is None else moment(told.ended_utc_ms)
-        return cls(name=told.name, grower=told.grower, began=moment(told.began_utc_ms), ended=ended)
+        ended = None if reply.ended_utc_ms is None else moment(reply.ended_utc_ms)
+        return cls(name=reply.name, grower=reply.grower, began=moment(reply.began_utc_ms), ended=ended)
 
 
 class LotList(Model):

@@ -57,14 +57,14 @@ class ApiTokens:
         Raises:
             StationError: the file cannot be read.
         """
-        self._look()
+        self._refresh()
         return self._tokens
 
     def holder(self, token: str) -> tuple[str, Role] | None:
         """Return the owner of a token and its role; None if it is unknown, or the file cannot be read."""
         sha256 = hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
         try:
-            self._look()
+            self._refresh()
         except StationError:
             return None
         found = [(name, each.role) for name, each in self._tokens.items() if hmac.compare_digest(each.sha256, sha256)]
@@ -81,7 +81,7 @@ class ApiTokens:
             BadInputError: the name is in use.
             StationError: the file cannot be written.
         """
-        self._look()
+        self._refresh()
         if name in self._tokens:
             raise BadInputError(f"there is a token {name!r} already; remove it first, or give another name")
         if len(self._tokens) >= MOST_TOKENS:
@@ -99,13 +99,13 @@ class ApiTokens:
             BadInputError: there is no token of that name.
             StationError: the file cannot be written.
         """
-        self._look()
+        self._refresh()
         if name not in self._tokens:
             known = ", ".join(self._tokens) or "none"
             raise BadInputError(f"there is no token {name!r}; there are: {known}")
         self._write({key: each for key, each in self._tokens.items() if key != name})
 
-    def _look(self) -> None:
+    def _refresh(self) -> None:
         try:
             stat = self._path.stat()
             seen = (stat.st_mtime_ns, stat.st_ino, stat.st_size)

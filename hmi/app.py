@@ -13,16 +13,16 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from hmi.access import wording_of
+from hmi.access import locale_of
 from hmi.assets import Assets
 from hmi.context import Hmi
 from hmi.gateway import Gateway, actor_of
-from hmi.guard import Guard
+from hmi.guard import SecurityMiddleware
 from hmi.live import Live
 from hmi.navigation import modules, parts
 from hmi.page import show
-from hmi.people_file import PeopleFile
-from hmi.pin_limit import PinLimit
+from hmi.people_file import UserStore
+from hmi.pin_limit import LoginRateLimiter
 from hmi.problem import Problem
 from hmi.render import Renderer
 from hmi.sessions import Sessions
@@ -50,8 +50,8 @@ def make_context(site: Configuration) -> Hmi:
         settings=settings,
         gateway=gateway,
         sessions=Sessions(settings.idle_s),
-        people=PeopleFile(site.home / FOLDER),
-        pins=PinLimit(),
+        people=UserStore(site.home / FOLDER),
+        pins=LoginRateLimiter(),
         assets=assets,
         renderer=renderer,
         live=Live(parts(), renderer, gateway, boot),
@@ -59,7 +59,7 @@ def make_context(site: Configuration) -> Hmi:
     )
 
 
-def make_app(hmi: Hmi) -> Guard:
+def make_app(hmi: Hmi) -> SecurityMiddleware:
     """Make the application."""
 
     @contextlib.asynccontextmanager
@@ -90,7 +90,7 @@ def make_app(hmi: Hmi) -> Guard:
     app.state.hmi = hmi
     for module in modules():
         app.include_router(module.router, include_in_schema=getattr(module, "IN_SCHEMA", False))
-    return Guard(app, (*hmi.settings.names, hmi.settings.host), secure=hmi.settings.tls.enabled)
+    return SecurityMiddleware(app, (*hmi.settings.names, hmi.settings.host), secure=hmi.settings.tls.enabled)
 
 
 async def _sweep(hmi: Hmi) -> None:
@@ -103,16 +103,16 @@ async def _sweep(hmi: Hmi) -> None:
 async def _problem(request: Request, error: Exception) -> Response:
     assert isinstance(error, Problem)  # noqa: S101 (what it is registered for)
     values = dict(error.values)
-    wording = wording_of(request)
+    locale = locale_of(request)
     if "role" in values:
-        values["role"] = wording.text(f"role.{values['role']}")
-    return _told(request, error.status, wording.text(error.key, **values))
+        values["role"] = locale.text(f"role.{values['role']}")
+    return _problem_answer(request, error.status, locale.text(error.key, **values))
 
 
 async def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101 (what it is registered for)
     key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
-    answer = _told(request, error.status_code, wording_of(request).text(key) if key else str(error.detail))
+    answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else str(error.detail))
     answer.headers.update(error.headers or {})
     return answer
 
@@ -121,21 +121,21 @@ async def _bad_form(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101 (what it is registered for)
     if request.url.path.startswith("/api/"):
         return await request_validation_exception_handler(request, error)
-    return _told(request, 400, wording_of(request).text("problem.bad_form"))
+    return _problem_answer(request, 400, locale_of(request).text("problem.bad_form"))
 
 
 async def _away(request: Request, error: Exception) -> Response:
     """Answer that the station refused or did not answer, and state the result of an order where it is known."""
     if isinstance(error, DeadlineError):
-        return _told(request, 503, wording_of(request).text("problem.no_answer"), str(error))
-    return _told(request, 409, wording_of(request).text("problem.refused"), str(error))
+        return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), str(error))
+    return _problem_answer(request, 409, locale_of(request).text("problem.refused"), str(error))
 
 
 async def _broken(request: Request, _: Exception) -> Response:
-    return _told(request, 500, wording_of(request).text("problem.broken"))
+    return _problem_answer(request, 500, locale_of(request).text("problem.broken"))
 
 
-def _told(request: Request, status: int, text: str, detail: str = "") -> Response:
+def _problem_answer(request: Request, status: int, text: str, detail: str = "") -> Response:
     if request.url.path.startswith("/api/"):
         return JSONResponse({"detail": f"{text} {detail}".strip()}, status)
     return show(request, "problem.html.j2", status=status, text=text, detail=detail)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from markupsafe import Markup, escape
 
-from hmi.words import Wording
+from hmi.words import Locale
 from station.channel.panel_live import Fruit, FruitShort
 
 WIDTH, HEIGHT = 360, 290
@@ -33,7 +33,7 @@ def ticks(largest: float, most: int = 5) -> list[float]:
     return [step * each for each in range(count + 1)]
 
 
-def curve(fruit: Fruit, wording: Wording) -> Markup:
+def curve(fruit: Fruit, locale: Locale) -> Markup:
     """Draw a fruit's contact area over closing, with the recipe's limits."""
     closings = [point.closing_mm for point in fruit.curve] + [each.closing_mm for each in fruit.limits]
     areas = [point.area_mm2 for point in fruit.curve] + [each.area_mm2 for each in fruit.limits]
@@ -45,7 +45,7 @@ def curve(fruit: Fruit, wording: Wording) -> Markup:
     def y(area_mm2: float) -> float:
         return HEIGHT - _BOTTOM - area_mm2 / up[-1] * (HEIGHT - _TOP - _BOTTOM)
 
-    parts = [_axes(across, up, x, y, wording)]
+    parts = [_axes(across, up, x, y, locale)]
     for limit in fruit.limits:
         at = x(limit.closing_mm)
         parts.append(f'<path class="limit" d="M{at:.1f} {y(limit.area_mm2):.1f}V{_TOP}"/>')
@@ -57,10 +57,8 @@ def curve(fruit: Fruit, wording: Wording) -> Markup:
     for point in fruit.curve:
         shape = "doubtful" if point.flagged else "point"
         parts.append(f'<circle class="{shape}" cx="{x(point.closing_mm):.1f}" cy="{y(point.area_mm2):.1f}" r="4"/>')
-    label = escape(
-        wording.text("run.curve_label", area=wording.number(fruit.short.area_mm2, 1), points=len(fruit.curve))
-    )
-    below, beside = escape(wording.text("run.closing")), escape(wording.text("run.area"))
+    label = escape(locale.text("run.curve_label", area=locale.number(fruit.short.area_mm2, 1), points=len(fruit.curve)))
+    below, beside = escape(locale.text("run.closing")), escape(locale.text("run.area"))
     texts = (
         f'<text x="{WIDTH - _RIGHT}" y="{HEIGHT - 4}" text-anchor="end">{below} (mm)</text>'
         f'<text x="{_LEFT + 6}" y="{_TOP + 2}">{beside} (mm²)</text>'
@@ -68,7 +66,7 @@ def curve(fruit: Fruit, wording: Wording) -> Markup:
     return _svg(WIDTH, HEIGHT, label, "".join(parts) + texts)
 
 
-def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
+def trend(fruit: Sequence[FruitShort], locale: Locale) -> Markup:
     """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
     width, height, left, low = 300, 118, 46, 92
@@ -76,7 +74,7 @@ def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
     for share in (0.0, 0.5, 1.0):
         at = low - share * 80
         parts.append(f'<path class="grid-line" d="M{left} {at:.0f}H{width}"/>')
-        parts.append(f'<text x="{left - 6}" y="{at + 4:.0f}" text-anchor="end">{escape(wording.percent(share))}</text>')
+        parts.append(f'<text x="{left - 6}" y="{at + 4:.0f}" text-anchor="end">{escape(locale.percent(share))}</text>')
     step = (width - left) / max(8, len(buckets))
     for number, bucket in enumerate(buckets):
         failed = sum(each.outcome == "FAIL" for each in bucket) / len(bucket)
@@ -84,10 +82,10 @@ def trend(fruit: Sequence[FruitShort], wording: Wording) -> Markup:
         at, wide = width - (len(buckets) - number) * step + 2, step - 4
         parts.append(_bar("bar-fail", at, low - failed * 80, wide, failed * 80))
         parts.append(_bar("bar-unjudged", at, low - (failed + unjudged) * 80, wide, unjudged * 80))
-    note = wording.text("run.trend_axis", n=TREND_BUCKET)
+    note = locale.text("run.trend_axis", n=TREND_BUCKET)
     parts.append(f'<text x="{width}" y="{height - 6}" text-anchor="end">{escape(note)}</text>')
     rejected = [sum(each.outcome != "PASS" for each in bucket) for bucket in buckets]
-    label = wording.text("run.trend_label", figures=", ".join(map(str, rejected)) or "–")  # noqa: RUF001 (a dash)
+    label = locale.text("run.trend_label", figures=", ".join(map(str, rejected)) or "–")  # noqa: RUF001 (a dash)
     return _svg(width, height, escape(label), "".join(parts))
 
 
@@ -110,20 +108,20 @@ def bar(value: float, largest: float) -> Markup:
     return drawn.format(filled)
 
 
-def _axes(across: list[float], up: list[float], x: Scale, y: Scale, wording: Wording) -> str:
+def _axes(across: list[float], up: list[float], x: Scale, y: Scale, locale: Locale) -> str:
     parts = []
     for value in up:
         digits = 0 if up[1] >= 1 else 1
         parts.append(f'<path class="grid-line" d="M{_LEFT} {y(value):.1f}H{WIDTH - _RIGHT}"/>')
         parts.append(
-            f'<text x="{_LEFT - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{wording.number(value, digits)}</text>'
+            f'<text x="{_LEFT - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{locale.number(value, digits)}</text>'
         )
     for value in across:
         digits = 0 if across[1] >= 1 else 1
         parts.append(f'<path class="tick" d="M{x(value):.1f} {HEIGHT - _BOTTOM}v5"/>')
         parts.append(
             f'<text x="{x(value):.1f}" y="{HEIGHT - _BOTTOM + 20}" text-anchor="middle">'
-            f"{wording.number(value, digits)}</text>"
+            f"{locale.number(value, digits)}</text>"
         )
     return "".join(parts)
 

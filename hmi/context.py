@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from hmi.assets import Assets
 from hmi.gateway import Gateway
 from hmi.live import Live
-from hmi.people_file import PeopleFile
-from hmi.pin_limit import PinLimit
+from hmi.people_file import UserStore
+from hmi.pin_limit import LoginRateLimiter
 from hmi.render import Renderer
 from hmi.sessions import Sessions
 from station.settings.hmi import HmiSettings
@@ -19,8 +19,8 @@ class Hmi:
     settings: HmiSettings
     gateway: Gateway
     sessions: Sessions
-    people: PeopleFile
-    pins: PinLimit
+    people: UserStore
+    pins: LoginRateLimiter
     assets: Assets
     renderer: Renderer
     live: Live

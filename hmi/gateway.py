@@ -18,7 +18,7 @@ ReplyT = TypeVar("ReplyT", bound=Message)
 STALE_S = 2.0
 """An older state is not shown as live."""
 DEADLINE_S = 2.0
-_LOOK_DEADLINE_S = 1.0
+_POLL_DEADLINE_S = 1.0
 
 log = logging.getLogger(__name__)
 
@@ -34,8 +34,8 @@ class Gateway:
     def __init__(self, endpoint: str, period_s: float) -> None:
         self._endpoint, self._period_s = endpoint, period_s
         self._client: ChannelClient | None = None
-        self._looking: asyncio.Task[None] | None = None
-        self._looked = asyncio.Event()
+        self._polling: asyncio.Task[None] | None = None
+        self._polled = asyncio.Event()
         self._known: tuple[str, int | None] | None = None
         """The station's start and last fruit of `last` and `recent`."""
         self.state: PanelState | None = None
@@ -49,13 +49,13 @@ class Gateway:
 
     async def __aenter__(self) -> Self:
         self._client = ChannelClient(self._endpoint, "the station")
-        self._looking = asyncio.create_task(self._look(), name="looking at the station")
+        self._polling = asyncio.create_task(self._poll(), name="polling the station")
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        if self._looking is not None:
-            self._looking.cancel()
-            await asyncio.gather(self._looking, return_exceptions=True)
+        if self._polling is not None:
+            self._polling.cancel()
+            await asyncio.gather(self._polling, return_exceptions=True)
         if self._client is not None:
             await self._client.close()
 
@@ -93,21 +93,21 @@ class Gateway:
         except StationError as error:
             log.warning("the audit trail does not have it: %s", error)
 
-    async def looked(self) -> None:
+    async def polled(self) -> None:
         """Wait for the end of the next poll, with or without an answer."""
-        await self._looked.wait()
+        await self._polled.wait()
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         while True:
             began_s = time.monotonic()
             with contextlib.suppress(ChannelError):
-                state = await self.ask(AskPanel(), PanelState, deadline_s=_LOOK_DEADLINE_S)
+                state = await self.ask(AskPanel(), PanelState, deadline_s=_POLL_DEADLINE_S)
                 if (newest := (state.boot, state.last_sequence)) != self._known:
                     self.recent = await self.ask(AskRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()
-            looked, self._looked = self._looked, asyncio.Event()
-            looked.set()
+            polled, self._polled = self._polled, asyncio.Event()
+            polled.set()
             await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
 
     async def _fruit(self, sequence: int | None) -> Fruit | None:

@@ -28,7 +28,7 @@ class TooLargeError(Exception):
     """A request body above the limit."""
 
 
-class Guard:
+class SecurityMiddleware:
     """Refuses requests for a foreign host's name, from a foreign page, or too large, before they are read.
 
     Args:
@@ -48,7 +48,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
 
-        async def told(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
@@ -57,9 +57,9 @@ class Guard:
             await send(message)
 
         if refused := self._refusal(Headers(scope=scope), scope["method"]):
-            await refused(scope, receive, told)
+            await refused(scope, receive, send_with_headers)
         else:
-            await self._within_size(scope, receive, told)
+            await self._within_size(scope, receive, send_with_headers)
 
     async def _within_size(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request whose body may be larger than its header states."""
@@ -73,12 +73,12 @@ class Guard:
                 raise TooLargeError
             return message
 
-        async def tell(message: Message) -> None:
+        async def send_if_small(message: Message) -> None:
             if taken <= LARGEST_BODY_BYTES:  # else the framework's answer hides the cause
                 await send(message)
 
         with contextlib.suppress(TooLargeError):
-            await self._app(scope, take, tell)
+            await self._app(scope, take, send_if_small)
         if taken > LARGEST_BODY_BYTES:
             await _too_large()(scope, receive, send)
 

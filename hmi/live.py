@@ -12,7 +12,7 @@ from hmi.gateway import Gateway
 from hmi.render import Renderer
 from hmi.roles import RIGHTS, Right, Role
 from hmi.sessions import Caller
-from hmi.words import Wording
+from hmi.words import Locale
 from station.settings.hmi import Language
 
 BEAT_S = 0.5
@@ -25,7 +25,7 @@ class Part(NamedTuple):
     template: str
     depends_on: Callable[[Gateway], object]
     """Filled in anew when this is no longer equal to what it was; cheap."""
-    values: Callable[[Gateway, Wording], Mapping[str, Any]]
+    values: Callable[[Gateway, Locale], Mapping[str, Any]]
     """The template's values, beside `may(right)`; `gateway.state` may be None, or old: the page shows its age."""
 
 
@@ -58,51 +58,51 @@ class Live:
         """Return whether any of the names is not a part."""
         return any(name not in self._parts for name in names)
 
-    def part(self, name: str, wording: Wording, role: Role) -> Filled:
+    def part(self, name: str, locale: Locale, role: Role) -> Filled:
         """Return a part's present content.
 
         Args:
             name: a known one.
-            wording: the language.
+            locale: the language.
             role: of the reader; an order within the part has no token, which the page's script fills in.
         """
         part = self._parts[name]
         depends_on = part.depends_on(self._gateway)
-        known = self._filled.get((name, wording.language, role))
+        known = self._filled.get((name, locale.language, role))
         if known is not None and known[0] == depends_on:
             return known[1]
-        values = {**part.values(self._gateway, wording), "may": RIGHTS[role].__contains__, "Right": Right}
-        html = self._renderer.render(part.template, wording, values)
+        values = {**part.values(self._gateway, locale), "may": RIGHTS[role].__contains__, "Right": Right}
+        html = self._renderer.render(part.template, locale, values)
         filled = Filled(hashlib.sha256(html.encode()).hexdigest()[:12], html)
-        self._filled[name, wording.language, role] = depends_on, filled
+        self._filled[name, locale.language, role] = depends_on, filled
         return filled
 
     async def stream(
-        self, names: tuple[str, ...], wording: Wording, caller: Callable[[], Caller]
+        self, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
     ) -> AsyncIterator[bytes]:
         """Send server-sent events to one page until it closes. A slow browser gets fewer.
 
         Args:
             names: the page's parts.
-            wording: its language.
+            locale: its language.
             caller: returns who is logged in there now; the page reloads itself when that changes.
         """
         sent: dict[str, str] = {}
         loop, beat_at_s = asyncio.get_running_loop(), 0.0
         while not self.ending:
             who = caller()
-            filled = {name: self.part(name, wording, who.role) for name in names}
+            filled = {name: self.part(name, locale, who.role) for name in names}
             news = {name: each for name, each in filled.items() if sent.get(name) != each.digest}
             if news or loop.time() >= beat_at_s:
                 beat_at_s = loop.time() + BEAT_S
                 age_s = self._gateway.age_s
-                told = {
+                reply = {
                     "age_ms": None if age_s is None else round(1000 * age_s),
                     "utc_ms": 0 if self._gateway.state is None else self._gateway.state.utc_ms,
                     "boot": self._boot,
                     "caller": f"{who.name}|{who.role}",
                     "parts": {name: [each.digest, each.html] for name, each in news.items()},
                 }
-                yield f"data: {json.dumps(told, ensure_ascii=False)}\n\n".encode()
+                yield f"data: {json.dumps(reply, ensure_ascii=False)}\n\n".encode()
                 sent |= {name: each.digest for name, each in news.items()}
-            await self._gateway.looked()
+            await self._gateway.polled()

@@ -7,11 +7,11 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from markupsafe import Markup
 from starlette.responses import Response
 
-from hmi.access import SESSION_COOKIE, caller_of, hmi_of, wording_of
+from hmi.access import SESSION_COOKIE, caller_of, hmi_of, locale_of
 from hmi.context import Hmi
 from hmi.navigation import entries
 from hmi.roles import Right, Role
-from hmi.words import Wording
+from hmi.words import Locale
 
 FRAME_PARTS = ("frame.alarm", "frame.state")
 """On every page."""
@@ -27,7 +27,7 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         values: the page's own, in addition to those of every page: `caller`, `Right`, `state` (the station's, or None),
             `token()` for a form, and `live(name)`, which inserts a live part.
     """
-    hmi, caller, wording = hmi_of(request), caller_of(request), wording_of(request)
+    hmi, caller, locale = hmi_of(request), caller_of(request), locale_of(request)
     age_s = hmi.gateway.age_s
     frame = {
         "caller": caller,
@@ -41,9 +41,9 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         "path": request.url.path,
         "first_start": hmi.people.first_start,
         "token": lambda: hmi.sessions.token(caller.session),
-        "live": lambda name: _live(hmi, wording, caller.role, name),
+        "live": lambda name: _live(hmi, locale, caller.role, name),
     }
-    answer = HTMLResponse(hmi.renderer.render(template, wording, {**frame, **values}), status)
+    answer = HTMLResponse(hmi.renderer.render(template, locale, {**frame, **values}), status)
     give_session(request, answer, getattr(request.state, "new_session", ""))
     if caller.name and request.method == "GET":
         hmi.sessions.touch(caller.session)
@@ -62,6 +62,6 @@ def go_to(address: str) -> RedirectResponse:
     return RedirectResponse(address, 303)
 
 
-def _live(hmi: Hmi, wording: Wording, role: Role, name: str) -> Markup:
-    filled = hmi.live.part(name, wording, role)
+def _live(hmi: Hmi, locale: Locale, role: Role, name: str) -> Markup:
+    filled = hmi.live.part(name, locale, role)
     return Markup('<div data-live="{}" data-digest="{}">{}</div>').format(name, filled.digest, filled.html)

@@ -26,7 +26,7 @@ _UNUSED_PIN = "000000"
 log = logging.getLogger(__name__)
 
 
-class PeopleError(StationError):
+class UserStoreError(StationError):
     """The user store cannot be read or changed; `key` is of the catalogue."""
 
     def __init__(self, key: str, detail: str = "") -> None:
@@ -60,7 +60,7 @@ def pin_problem(pin: str, role: Role) -> str:
     return "people.pin_simple" if steps in ({0}, {1}, {-1}) else ""
 
 
-class PeopleFile:
+class UserStore:
     """Users by their names. Its methods block: `check` for some 20 ms, which slows guessing down.
 
     Args:
@@ -99,18 +99,18 @@ class PeopleFile:
         """Add the first user, an administrator.
 
         Raises:
-            PeopleError: there is a user already, or the name or the PIN is invalid.
+            UserStoreError: there is a user already, or the name or the PIN is invalid.
         """
         with self._turn:
             if not self.first_start:
-                raise PeopleError("people.begun")
+                raise UserStoreError("people.begun")
             self._put(name, Role.ADMIN, pin)
 
     def put(self, name: str, role: Role, pin: str) -> None:
         """Add a user, or change a user's role or PIN.
 
         Raises:
-            PeopleError: the name or the PIN is invalid, or no administrator would be left.
+            UserStoreError: the name or the PIN is invalid, or no administrator would be left.
         """
         with self._turn:
             self._put(name, role, pin)
@@ -119,7 +119,7 @@ class PeopleFile:
         """Remove a user; does nothing for an unknown name.
 
         Raises:
-            PeopleError: no administrator would be left.
+            UserStoreError: no administrator would be left.
         """
         with self._turn:
             self._write({key: each for key, each in self._people.items() if key != name})
@@ -127,24 +127,24 @@ class PeopleFile:
     def _put(self, name: str, role: Role, pin: str) -> None:
         known = self._people.get(name)
         if not name.strip() or name != name.strip() or len(name) > 40 or not name.isprintable():
-            raise PeopleError("people.bad_name")
+            raise UserStoreError("people.bad_name")
         if role is Role.VIEWER:
-            raise PeopleError("people.bad_role")
+            raise UserStoreError("people.bad_role")
         if not pin and known is not None and least_digits(role) <= least_digits(known.role):
             person = _Person(role=role, pin=known.pin)
         elif wrong := pin_problem(pin, role):
-            raise PeopleError(wrong, str(least_digits(role)))
+            raise UserStoreError(wrong, str(least_digits(role)))
         else:
             person = _Person(role=role, pin=self._hasher.hash(pin))
         self._write({**self._people, name: person})
 
     def _write(self, people: dict[str, _Person]) -> None:
         if self.broken:
-            raise PeopleError("people.broken", self.broken)
+            raise UserStoreError("people.broken", self.broken)
         if not any(each.role is Role.ADMIN for each in people.values()):
-            raise PeopleError("people.last_admin")
+            raise UserStoreError("people.last_admin")
         if len(people) > MOST_PEOPLE:
-            raise PeopleError("people.too_many")
+            raise UserStoreError("people.too_many")
         data = _File(version=1, people=people).model_dump_json(indent=1).encode()
         try:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -155,7 +155,7 @@ class PeopleFile:
                 os.fsync(file.fileno())
             Path(unfinished).replace(self.path)
         except OSError as error:
-            raise PeopleError("people.not_written", f"{self.path}: {error.strerror}") from error
+            raise UserStoreError("people.not_written", f"{self.path}: {error.strerror}") from error
         self._people = people
 
     def _read(self) -> dict[str, _Person]:

@@ -11,7 +11,7 @@ FORGOTTEN_AFTER_S = 3600.0
 _MOST_KEYS = 1000
 
 
-class PinLimit:
+class LoginRateLimiter:
     """Wrong PINs by name and by browser's address; a right PIN clears the count of its keys.
 
     Args:

@@ -118,7 +118,7 @@ def parsed(field: Field, text: str) -> Any:
         raise BadFieldError(field) from None
 
 
-def shown(field: Field, decimal: str) -> str:
+def formatted(field: Field, decimal: str) -> str:
     """Format a field's value for typing.
 
     Args:

@@ -7,13 +7,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hmi.assets import Assets
-from hmi.words import Wording
+from hmi.words import Locale
 
 
 class Renderer:
     """Templates of the folder `templates`; inserted values are text, never markup.
 
-    In every template: `t(key, **values)` a text of the catalogue, `w` the `Wording` with numbers and times,
+    In every template: `t(key, **values)` a text of the catalogue, `w` the `Locale` with numbers and times,
     `static(name)` a file's address.
 
     Args:
@@ -32,16 +32,16 @@ class Renderer:
         )
         self._environment.globals["static"] = assets.address
 
-    def render(self, template: str, wording: Wording, values: Mapping[str, Any]) -> Markup:
+    def render(self, template: str, locale: Locale, values: Mapping[str, Any]) -> Markup:
         """Render a template.
 
         Args:
             template: its file name.
-            wording: the language.
+            locale: the language.
             values: the template's values.
 
         Raises:
             jinja2.UndefinedError: a value is missing.
         """
-        filled = self._environment.get_template(template).render({**values, "t": wording.text, "w": wording})
+        filled = self._environment.get_template(template).render({**values, "t": locale.text, "w": locale})
         return Markup(filled)  # noqa: S704 (a template's output, escaped as it was filled in)

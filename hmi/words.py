@@ -38,7 +38,7 @@ def catalogue(language: Language) -> Mapping[str, str]:
 
 
 @cache
-def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
+def sentence_patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     """Return the station's own sentences, `said.*` of the English catalogue, as patterns; the most specific first.
 
     A device's fault, `said.fault_of_*`, encloses an observation and a remedy: these patterns come first.
@@ -46,8 +46,8 @@ def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
     texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("said.")}
     parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
     patterns = {
-        key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in told)
-        for key, told in parts.items()
+        key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in pieces)
+        for key, pieces in parts.items()
     }
     order = sorted(
         parts, key=lambda key: (not key.startswith("said.fault_of_"), -sum(len(literal) for literal, *_ in parts[key]))
@@ -56,7 +56,7 @@ def sayings() -> tuple[tuple[str, re.Pattern[str]], ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Wording:
+class Locale:
     """Texts, numbers and times in one language."""
 
     language: Language
@@ -79,15 +79,15 @@ class Wording:
         """Translate a text that the station sends in English; unchanged if the catalogue has none."""
         return catalogue(self.language).get(key, english)
 
-    def said(self, english: str) -> str:
+    def sentence(self, english: str) -> str:
         """Translate a sentence of the station; unchanged and marked as English if no pattern matches."""
         if self.language == SOURCE:
             return english
-        told = self._told(english)
-        return Markup('<span lang="en">{}</span>').format(english) if told is None and english else told or ""
+        found = self._translated(english)
+        return Markup('<span lang="en">{}</span>').format(english) if found is None and english else found or ""
 
-    def _told(self, english: str) -> str | None:
-        for key, pattern in sayings():
+    def _translated(self, english: str) -> str | None:
+        for key, pattern in sentence_patterns():
             if (found := pattern.fullmatch(english)) is not None:
                 return self.text(key, **{name: self._value(value) for name, value in found.groupdict().items()})
         return None
@@ -95,8 +95,8 @@ class Wording:
     def _value(self, text: str) -> str:
         """Translate a part of a sentence: a number, another sentence, or a name."""
         lead = text.removesuffix(" ")
-        if (told := self._told(lead)) is not None:
-            return told + text[len(lead) :]
+        if (found := self._translated(lead)) is not None:
+            return found + text[len(lead) :]
         return _NUMBER.sub(rf"\1{_DECIMAL[self.language]}\2", text)
 
     def number(self, value: float | None, digits: int = 0) -> str:

@@ -13,7 +13,7 @@ from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Wording
+from hmi.words import Locale
 from station.channel.line import CommandDone
 from station.channel.messages import Message, RefusedError
 from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
@@ -33,7 +33,7 @@ def _alarms(gateway: Gateway) -> object:
     return None if gateway.state is None else gateway.state.alarms
 
 
-def _alarms_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _alarms_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     alarms = () if gateway.state is None else gateway.state.alarms
     return {
         "heard": gateway.state is not None,

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Form, Path, Request
 from pydantic import ValidationError
 from starlette.responses import Response
 
-from hmi.access import HmiNow, WordingNow, orders
+from hmi.access import HmiNow, LocaleNow, orders
 from hmi.gateway import Gateway, actor_of
 from hmi.live import Part
 from hmi.navigation import Entry
@@ -16,7 +16,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import NO_VALUE, Wording
+from hmi.words import NO_VALUE, Locale
 from station.channel.panel_live import AskRecipes, OrderName, OrderShown, PanelOrder, Recipes, RecipeShown
 from station.settings.recipe import Recipe
 
@@ -43,7 +43,7 @@ def _order(gateway: Gateway) -> object:
     )
 
 
-def _order_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _order_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
     order = next((each for each in state.orders if each.order is OrderName.CHOOSE_RECIPE), None) if state else None
     return {"state": state, "order": order}
@@ -67,7 +67,7 @@ async def progress(request: Request) -> Response:
 
 @router.get("/change/{number}")
 async def confirm(
-    request: Request, hmi: HmiNow, wording: WordingNow, number: Annotated[int, Path(ge=1, le=65_535)]
+    request: Request, hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]
 ) -> Response:
     """Show the differences from the active recipe."""
     found = await hmi.gateway.ask(AskRecipes(), Recipes)
@@ -79,7 +79,7 @@ async def confirm(
         "change_confirm.html.j2",
         chosen=chosen,
         active=found.active,
-        changes=changes(found.active, chosen, wording),
+        changes=changes(found.active, chosen, locale),
     )
 
 
@@ -95,20 +95,20 @@ async def carry_out(
     return go_to("/change/progress")
 
 
-def changes(now: RecipeShown | None, then: RecipeShown, wording: Wording) -> list[Change]:
+def changes(now: RecipeShown | None, then: RecipeShown, locale: Locale) -> list[Change]:
     """Return the differences that matter at the line; all values if no recipe is active.
 
     Args:
         now: the active recipe.
         then: the selected recipe.
-        wording: for numbers.
+        locale: for numbers.
     """
-    before, after = {} if now is None else _told(now, wording), _told(then, wording)
+    before, after = {} if now is None else _values(now, locale), _values(then, locale)
     lines = [Change(key, before.get(key, NO_VALUE), value) for key, value in after.items()]
     return [line for line in lines if line.now != line.then]
 
 
-def _told(shown: RecipeShown, w: Wording) -> dict[str, str]:
+def _values(shown: RecipeShown, w: Locale) -> dict[str, str]:
     try:
         recipe = Recipe.model_validate_json(json.dumps(json.loads(shown.values)))
     except (ValueError, ValidationError):  # of another form of the program

@@ -6,12 +6,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hmi.access import LANGUAGE_COOKIE, GenuineCaller, HmiNow, WordingNow, caller_of
+from hmi.access import LANGUAGE_COOKIE, GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.gateway import Gateway
 from hmi.live import Part
 from hmi.page import go_to
 from hmi.problem import Problem
-from hmi.words import Wording
+from hmi.words import Locale
 
 router = APIRouter()
 MOST_PARTS = 20
@@ -23,7 +23,7 @@ def _alarms(gateway: Gateway) -> object:
     return None if gateway.state is None else gateway.state.alarms
 
 
-def _alarm_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _alarm_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
     shown = [] if state is None else [each for each in state.alarms if each.shelved_until_utc_ms is None]
     return {"alarms": sorted(shown, key=lambda each: not each.active), "heard": state is not None}
@@ -34,7 +34,7 @@ def _state(gateway: Gateway) -> object:
     return None if state is None else (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)
 
 
-def _state_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _state_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     return {"state": gateway.state}
 
 
@@ -46,7 +46,7 @@ PARTS = {
 
 @router.get("/live")
 async def live(
-    request: Request, hmi: HmiNow, wording: WordingNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
+    request: Request, hmi: HmiNow, locale: LocaleNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
 ) -> Response:
     """Send server-sent events with a page's parts; see `hmi.live`."""
     if hmi.live.unknown(part):
@@ -59,7 +59,7 @@ async def live(
         hmi.live.open += 1
         try:
             async for event in hmi.live.stream(
-                tuple(dict.fromkeys(part)), wording, lambda: hmi.sessions.caller(session)
+                tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(session)
             ):
                 yield event
         finally:

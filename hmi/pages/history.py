@@ -146,46 +146,46 @@ async def report(
 async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
     """Show the latest rows of the audit trail."""
     asked = ReadAudit(limit=100, action=action, subject=subject)
-    told = await hmi.gateway.ask(asked, AuditRows, deadline_s=DEADLINE_S)
-    return show(request, "history_audit.html.j2", rows=told.rows, action=action, subject=subject)
+    reply = await hmi.gateway.ask(asked, AuditRows, deadline_s=DEADLINE_S)
+    return show(request, "history_audit.html.j2", rows=reply.rows, action=action, subject=subject)
 
 
 @router.get("/image/{sha256}.png")
 async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
     """Send a stored image; its address is its content hash, so the browser fetches it once."""
-    told = await hmi.gateway.ask(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
-    return Response(told.data, media_type=told.media_type, headers=_FOR_EVER)
+    reply = await hmi.gateway.ask(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
+    return Response(reply.data, media_type=reply.media_type, headers=_FOR_EVER)
 
 
 @router.get("/{sequence}")
 async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
     """Show one inspection in full."""
-    told = await _inspection(hmi, sequence)
+    reply = await _inspection(hmi, sequence)
     return show(
         request,
         "inspection.html.j2",
-        told=told,
-        drawn=_drawn(told),
-        steps=_steps(told),
-        reference=next((each for each in told.images if each.kind == "reference" and each.there), None),
+        reply=reply,
+        drawn=_drawn(reply),
+        steps=_steps(reply),
+        reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),
     )
 
 
 @router.get("/{sequence}/step/{step}")
 async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Response:
     """Show one step: its image, its mask, and the stages of its measurement."""
-    told = await _inspection(hmi, sequence)
-    steps = _steps(told)
+    reply = await _inspection(hmi, sequence)
+    steps = _steps(reply)
     found = next((each for each in steps if each["point"].step == step), None)
     if found is None:
         raise Problem(404, "problem.not_found")
     stages = None
-    if found["image"] and any(each.kind == "reference" and each.there for each in told.images):
+    if found["image"] and any(each.kind == "reference" and each.there for each in reply.images):
         stages = await _stages(hmi, sequence, step)
     return show(
         request,
         "inspection_step.html.j2",
-        told=told,
+        reply=reply,
         step=found,
         stages=stages,
         before=step - 1 if any(each["point"].step == step - 1 for each in steps) else None,
@@ -213,11 +213,11 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
         return known
     if not (0 < sequence < 2**32 and 0 <= step <= 1000):
         raise Problem(404, "problem.not_found")
-    told = await hmi.gateway.ask(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
-    _STAGES[sequence, step] = told
+    reply = await hmi.gateway.ask(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
+    _STAGES[sequence, step] = reply
     while len(_STAGES) > _KEPT_STAGES:
         _STAGES.popitem(last=False)
-    return told
+    return reply
 
 
 async def _inspection(hmi: Hmi, sequence: int) -> InspectionTold:
@@ -226,32 +226,32 @@ async def _inspection(hmi: Hmi, sequence: int) -> InspectionTold:
     return await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
 
 
-def _steps(told: InspectionTold) -> list[dict[str, Any]]:
+def _steps(reply: InspectionTold) -> list[dict[str, Any]]:
     """Return every point of the curve, with its image and mask where these are stored."""
-    kept = {(each.kind, each.step): each for each in told.images if each.there}
+    kept = {(each.kind, each.step): each for each in reply.images if each.there}
     return [
         {"point": point, "image": kept.get(("step", point.step)), "mask": kept.get(("mask", point.step))}
-        for point in told.curve
+        for point in reply.curve
     ]
 
 
-def _drawn(told: InspectionTold) -> dict[str, Any] | None:
+def _drawn(reply: InspectionTold) -> dict[str, Any] | None:
     """Return the curve with the limits of the recipe at that time."""
     points = [
         (point.closing_mm, point.area_mm2)
-        for point in told.curve
+        for point in reply.curve
         if point.closing_mm is not None and point.area_mm2 is not None and point.closing_mm >= 0
     ]
-    if told.recipe is None:
+    if reply.recipe is None:
         return None
     limits, early = [], None
-    factor = float(told.measures.get("limit_factor") or 1.0)  # for the fruit's size
+    factor = float(reply.measures.get("limit_factor") or 1.0)  # for the fruit's size
     try:
         limits = [
             Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
-            for each in told.recipe["damage"]["area"]
+            for each in reply.recipe["damage"]["area"]
         ]
-        early = factor * told.recipe["early_stop"]["area_mm2"]
+        early = factor * reply.recipe["early_stop"]["area_mm2"]
     except (KeyError, TypeError):  # of a form that this program does not know
         pass
     return {"area": area_chart([Curve("own", points)], limits, early)}

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from pydantic import StringConstraints
 from starlette.responses import Response, StreamingResponse
 
-from hmi.access import GenuineCaller, HmiNow, WordingNow, caller_of
+from hmi.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.context import Hmi
 from hmi.page import go_to, show
 from hmi.problem import Problem
@@ -23,7 +23,7 @@ FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 Back = Annotated[str, Query(max_length=200, pattern=r"^/([A-Za-z0-9_][A-Za-z0-9_/-]*)?$")]
 
 
-async def somebody(request: Request) -> None:
+async def logged_in(request: Request) -> None:
     """Require a log-in for files: an export holds all data of the station."""
     if not caller_of(request).name:
         raise Problem(403, "problem.not_allowed", role="operator")
@@ -32,17 +32,17 @@ async def somebody(request: Request) -> None:
 @router.get("/{job}")
 async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
     """Show a job."""
-    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
-    return show(request, "job.html.j2", job=told, back=back)
+    reply = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    return show(request, "job.html.j2", job=reply, back=back)
 
 
 @router.get("/{job}/part")
-async def part(hmi: HmiNow, wording: WordingNow, job: JobId) -> Response:
+async def part(hmi: HmiNow, locale: LocaleNow, job: JobId) -> Response:
     """Render the same as a part of the page, for polling."""
-    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
-    html = hmi.renderer.render("job_part.html.j2", wording, {"job": told})
+    reply = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    html = hmi.renderer.render("job_part.html.j2", locale, {"job": reply})
     return Response(
-        html, media_type="text/html", headers={"x-over": "" if told.state in {"waiting", "running"} else "1"}
+        html, media_type="text/html", headers={"x-over": "" if reply.state in {"waiting", "running"} else "1"}
     )
 
 
@@ -55,14 +55,14 @@ async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
     return go_to(f"/jobs/{job}")
 
 
-@router.get("/{job}/file/{name}", dependencies=[Depends(somebody)])
+@router.get("/{job}/file/{name}", dependencies=[Depends(logged_in)])
 async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
     """Send one of its files for download."""
     return await _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
 
 
-@router.get("/{job}/show/{name}", dependencies=[Depends(somebody)])
-async def shown(hmi: HmiNow, job: JobId, name: FileName) -> Response:
+@router.get("/{job}/show/{name}", dependencies=[Depends(logged_in)])
+async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
     """Send one of its documents for display in the browser."""
     if not name.endswith((".html", ".pdf")):
         raise Problem(404, "problem.not_found")
@@ -71,8 +71,8 @@ async def shown(hmi: HmiNow, job: JobId, name: FileName) -> Response:
 
 async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
     """Send a file in pieces; each is fetched after the browser has taken the one before."""
-    told = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
-    found = next((each for each in told.files if each.name == name), None)
+    reply = await hmi.gateway.ask(AskJob(job=job), JobTold, deadline_s=DEADLINE_S)
+    found = next((each for each in reply.files if each.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
 

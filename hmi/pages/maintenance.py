@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Form, Query, Request
 from pydantic import StringConstraints
 from starlette.responses import Response
 
-from hmi.access import HmiNow, WordingNow, orders
+from hmi.access import HmiNow, LocaleNow, orders
 from hmi.context import Hmi
 from hmi.gateway import actor_of
 from hmi.limit_chart import histogram
@@ -19,7 +19,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Wording
+from hmi.words import Locale
 from station.channel.messages import ChannelError, RefusedError
 from station.channel.panel_live import OrderName, OrderShown, PanelOrder
 from station.channel.panel_maintenance_queries import (
@@ -65,23 +65,23 @@ async def health(request: Request, hmi: HmiNow) -> Response:
 
 
 @router.get("/health/part")
-async def health_part(hmi: HmiNow, wording: WordingNow) -> Response:
+async def health_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling."""
-    return await _part(hmi, wording, "maintenance_health.html.j2", await _health(hmi))
+    return await _part(hmi, locale, "maintenance_health.html.j2", await _health(hmi))
 
 
 @router.get("/hand")
 async def hand(
     request: Request,
     hmi: HmiNow,
-    wording: WordingNow,
+    locale: LocaleNow,
     at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
     lit: Annotated[Literal["yes"] | None, Query()] = None,
 ) -> Response:
     """Show the manual control of fingers and light."""
-    done = wording.text("maintenance.lit") if lit else ""
+    done = locale.text("maintenance.lit") if lit else ""
     if at_mm is not None:
-        done = wording.text("maintenance.jogged", width=wording.number(at_mm, 1))
+        done = locale.text("maintenance.jogged", width=locale.number(at_mm, 1))
     return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
 
 
@@ -132,9 +132,9 @@ async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response
 
 
 @router.get("/image/part")
-async def image_part(hmi: HmiNow, wording: WordingNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+async def image_part(hmi: HmiNow, locale: LocaleNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
     """Render the next image with its contact; requested after the one before was taken."""
-    return await _part(hmi, wording, "maintenance_live.html.j2", await _live(hmi, contact=contact))
+    return await _part(hmi, locale, "maintenance_live.html.j2", await _live(hmi, contact=contact))
 
 
 @router.get("/image/{place}.jpg")
@@ -152,13 +152,13 @@ async def sensor(request: Request, hmi: HmiNow) -> Response:
 
 
 @router.get("/sensor/part")
-async def sensor_part(hmi: HmiNow, wording: WordingNow) -> Response:
+async def sensor_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the state of the calibration run."""
-    told = await _calibration(hmi)
-    run = told["now"].run
+    reply = await _calibration(hmi)
+    run = reply["now"].run
     over = run is None or run.state not in {"running", "waiting"}
     state = "" if run is None else run.state
-    return await _part(hmi, wording, "maintenance_run.html.j2", told, {"x-over": "1" if over else "", "x-state": state})
+    return await _part(hmi, locale, "maintenance_run.html.j2", reply, {"x-over": "1" if over else "", "x-state": state})
 
 
 @router.get("/sensor/{kind}/{name}")
@@ -168,8 +168,8 @@ async def sensor_picture(
     name: Literal["area.png", "field.png", "reference.png"],
 ) -> Response:
     """Send a plot of the calibration in force."""
-    told = await hmi.gateway.ask(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
-    return Response(told.data, media_type=told.media_type)
+    reply = await hmi.gateway.ask(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
+    return Response(reply.data, media_type=reply.media_type)
 
 
 @router.post("/sensor/begin")
@@ -206,20 +206,20 @@ async def end(hmi: HmiNow, caller: Maintainer) -> Response:
 @router.get("/registers")
 async def registers(request: Request, hmi: HmiNow) -> Response:
     """Show the PLC's registers by name."""
-    return show(request, "maintenance_registers.html.j2", tab="registers", told=await _registers(hmi))
+    return show(request, "maintenance_registers.html.j2", tab="registers", reply=await _registers(hmi))
 
 
 @router.get("/registers/part")
-async def registers_part(hmi: HmiNow, wording: WordingNow) -> Response:
+async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling."""
-    return await _part(hmi, wording, "maintenance_register_table.html.j2", {"told": await _registers(hmi)})
+    return await _part(hmi, locale, "maintenance_register_table.html.j2", {"reply": await _registers(hmi)})
 
 
 @router.get("/log")
 async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
     """Show the last lines of the station's log."""
-    told = await hmi.gateway.ask(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
-    return show(request, "maintenance_log.html.j2", tab="log", lines=told.lines[::-1], level=level)
+    reply = await hmi.gateway.ask(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
+    return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
 
 
 _FRAMES: OrderedDict[str, Picture] = OrderedDict()
@@ -232,15 +232,15 @@ async def _health(hmi: Hmi) -> dict[str, Any]:
 
 async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     try:
-        told = await hmi.gateway.ask(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
+        reply = await hmi.gateway.ask(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
     except ChannelError as error:
         return {"live_image": None, "why": str(error), "histograms": (), "place": ""}
-    place = str(round(1e6 * told.captured_s)) + ("1" if contact else "0")
-    _FRAMES[place] = told.picture
+    place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
+    _FRAMES[place] = reply.picture
     while len(_FRAMES) > _KEPT_FRAMES:
         _FRAMES.popitem(last=False)
-    drawn = tuple(zip(("red", "green", "blue"), map(histogram, told.histogram), strict=True))
-    return {"live_image": told, "why": "", "histograms": drawn, "place": place}
+    drawn = tuple(zip(("red", "green", "blue"), map(histogram, reply.histogram), strict=True))
+    return {"live_image": reply, "why": "", "histograms": drawn, "place": place}
 
 
 async def _calibration(hmi: Hmi) -> dict[str, Any]:
@@ -252,9 +252,9 @@ async def _registers(hmi: Hmi) -> Registers:
 
 
 async def _part(
-    hmi: Hmi, wording: Wording, template: str, values: dict[str, Any], headers: dict[str, str] | None = None
+    hmi: Hmi, locale: Locale, template: str, values: dict[str, Any], headers: dict[str, str] | None = None
 ) -> Response:
-    return Response(hmi.renderer.render(template, wording, values), media_type="text/html", headers=headers)
+    return Response(hmi.renderer.render(template, locale, values), media_type="text/html", headers=headers)
 
 
 def _mm(text: str) -> float:

@@ -11,7 +11,7 @@ from hmi.context import Hmi
 from hmi.gateway import actor_of
 from hmi.navigation import Entry
 from hmi.page import give_session, go_to, show
-from hmi.people_file import PeopleError, least_digits
+from hmi.people_file import UserStoreError, least_digits
 from hmi.problem import Problem
 from hmi.roles import Right, Role
 from hmi.sessions import Caller
@@ -44,7 +44,7 @@ async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin
     try:
         async with _CHECKING:
             await asyncio.to_thread(hmi.people.begin, name, pin)
-    except PeopleError as error:
+    except UserStoreError as error:
         return _page(request, hmi, "/", error.key, error.detail)
     await _note(hmi, Caller(name, Role.ADMIN, ""), "added", name)
     return _logged_in(request, hmi, name, Role.ADMIN, "/people")
@@ -94,7 +94,7 @@ async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin
         hmi.pins.right(key)
         try:
             await asyncio.to_thread(hmi.people.put, caller.name, caller.role, pin)
-        except PeopleError as error:
+        except UserStoreError as error:
             return _page(request, hmi, "/", error.key, error.detail)
     await _note(hmi, caller, "changed", caller.name)
     return go_to("/people")
@@ -109,7 +109,7 @@ async def put(
     try:
         async with _CHECKING:
             await asyncio.to_thread(hmi.people.put, name, role, pin)
-    except PeopleError as error:
+    except UserStoreError as error:
         return _page(request, hmi, "/", error.key, error.detail)
     if name != caller.name:
         hmi.sessions.forget(name)
@@ -122,7 +122,7 @@ async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Re
     """Remove a user."""
     try:
         await asyncio.to_thread(hmi.people.remove, name)
-    except PeopleError as error:
+    except UserStoreError as error:
         return _page(request, hmi, "/", error.key, error.detail)
     hmi.sessions.forget(name)
     await _note(hmi, caller, "removed", name)

@@ -7,17 +7,17 @@ from fastapi import APIRouter, Depends, File, Form, Query, Request, UploadFile
 from pydantic import StringConstraints
 from starlette.responses import Response
 
-from hmi.access import HmiNow, WordingNow, caller_of, orders
+from hmi.access import HmiNow, LocaleNow, caller_of, orders
 from hmi.context import Hmi
 from hmi.gateway import actor_of
 from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.problem import Problem
-from hmi.recipe_form import BadFieldError, Group, changed, groups, shown, with_changes
+from hmi.recipe_form import BadFieldError, Group, changed, formatted, groups, with_changes
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Wording
+from hmi.words import Locale
 from station.channel.messages import RefusedError
 from station.channel.panel_queries import JobTold
 from station.channel.panel_recipe_queries import (
@@ -61,7 +61,7 @@ Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
 @router.get("")
 async def recipes(request: Request, hmi: HmiNow) -> Response:
     """Show the state of all recipes."""
-    return show(request, "recipes.html.j2", told=await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S))
+    return show(request, "recipes.html.j2", reply=await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S))
 
 
 @router.get("/{name}")
@@ -78,49 +78,49 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
 
 
 @router.get("/{name}/edit")
-async def edit(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
+async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show the form."""
-    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
-    return await _form(request, hmi, wording, told, {}, "")
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    return await _form(request, hmi, locale, reply, {}, "")
 
 
 @router.get("/{name}/chart")
-async def chart(request: Request, hmi: HmiNow, wording: WordingNow, name: Name) -> Response:
+async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
-    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
     typed: dict[str, Any] = {}
     for path, text in _typed(request.query_params).items():
         try:
-            typed |= changed(told.values, {path: text})
+            typed |= changed(reply.values, {path: text})
         except BadFieldError:
             continue
-    drawn = await _drawn(hmi, name, with_changes(told.values, typed))
-    html = hmi.renderer.render("recipe_chart.html.j2", wording, {"drawn": drawn})
+    drawn = await _drawn(hmi, name, with_changes(reply.values, typed))
+    html = hmi.renderer.render("recipe_chart.html.j2", locale, {"drawn": drawn})
     return Response(html, media_type="text/html")
 
 
 @router.post("/{name}/draft")
 async def save(
-    request: Request, hmi: HmiNow, wording: WordingNow, name: Name, caller: Editor, reason: Reason
+    request: Request, hmi: HmiNow, locale: LocaleNow, name: Name, caller: Editor, reason: Reason
 ) -> Response:
     """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
-    told = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
     typed = _typed(texts)
     try:
-        changes = changed(told.values, typed)
+        changes = changed(reply.values, typed)
     except BadFieldError as error:
-        why = wording.text("recipes.bad_field", field=_title(wording, error.field.key, error.field.title),
-                           expected=wording.said(error.field.expected))  # fmt: skip
-        return await _form(request, hmi, wording, told, typed, why, reason)
+        why = locale.text("recipes.bad_field", field=_title(locale, error.field.key, error.field.title),
+                           expected=locale.sentence(error.field.expected))  # fmt: skip
+        return await _form(request, hmi, locale, reply, typed, why, reason)
     if not changes:
-        return await _form(request, hmi, wording, told, typed, wording.text("recipes.nothing_changed"), reason)
+        return await _form(request, hmi, locale, reply, typed, locale.text("recipes.nothing_changed"), reason)
     try:
         asked = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
         await hmi.gateway.ask(asked, RecipeRow, deadline_s=DEADLINE_S)
     except RefusedError as error:
-        return await _form(request, hmi, wording, told, typed, str(error), reason)
+        return await _form(request, hmi, locale, reply, typed, str(error), reason)
     return go_to(f"/recipes/{name}")
 
 
@@ -164,8 +164,8 @@ async def history(
 ) -> Response:
     """Show the revisions: author, approver, dates, differences."""
     asked = GetRecipeHistory(name=name, below=below)
-    told = await hmi.gateway.ask(asked, RecipeHistory, deadline_s=DEADLINE_S)
-    return show(request, "recipe_history.html.j2", row=await _row(hmi, name), told=told, tab="history")
+    reply = await hmi.gateway.ask(asked, RecipeHistory, deadline_s=DEADLINE_S)
+    return show(request, "recipe_history.html.j2", row=await _row(hmi, name), reply=reply, tab="history")
 
 
 @router.get("/{name}/text")
@@ -173,16 +173,16 @@ async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the file's text, with its comments."""
-    told = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeTold, deadline_s=DEADLINE_S)
-    return show(request, "recipe_text.html.j2", row=told.row, text=told.text, revision=revision, tab="text")
+    reply = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeTold, deadline_s=DEADLINE_S)
+    return show(request, "recipe_text.html.j2", row=reply.row, text=reply.text, revision=revision, tab="text")
 
 
 @router.get("/{name}/export")
 async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
     """Send the file, to be edited elsewhere and imported again."""
-    told = await hmi.gateway.ask(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
     headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
-    return Response(told.text, media_type="application/yaml", headers=headers)
+    return Response(reply.text, media_type="application/yaml", headers=headers)
 
 
 @router.post("/import")
@@ -221,29 +221,29 @@ async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | 
 async def _form(
     request: Request,
     hmi: Hmi,
-    wording: Wording,
-    told: RecipeTold,
+    locale: Locale,
+    reply: RecipeTold,
     typed: Mapping[str, str],
     wrong: str,
     reason: str = "",
 ) -> Response:
-    decimal = wording.number(0.5, 1)[1]
-    made = groups(told.values)
-    texts = {field.path: typed.get(field.path, shown(field, decimal)) for group in made for field in group.fields}
+    decimal = locale.number(0.5, 1)[1]
+    made = groups(reply.values)
+    texts = {field.path: typed.get(field.path, formatted(field, decimal)) for group in made for field in group.fields}
     caller, known = caller_of(request), await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,
         "recipe_edit.html.j2",
         status=400 if wrong else 200,
-        row=told.row,
+        row=reply.row,
         groups=_sorted(made),
         texts=texts,
         prefix=_PREFIX,
         wrong=wrong,
         reason=reason,
-        drawn=await _drawn(hmi, told.row.name, told.values),
-        title=lambda each: _title(wording, each.key, each.title),
-        told=known,
+        drawn=await _drawn(hmi, reply.row.name, reply.values),
+        title=lambda each: _title(locale, each.key, each.title),
+        reply=known,
         editable=known.editable and caller.may(Right.EDIT_RECIPES),
         tab="edit",
     )
@@ -256,8 +256,8 @@ def _sorted(made: list[Group]) -> list[tuple[Group, bool]]:
     return [*((each, True) for each in order), *((each, False) for each in made if each not in order)]
 
 
-def _title(wording: Wording, key: str, english: str) -> str:
-    return wording.own(key, english)
+def _title(locale: Locale, key: str, english: str) -> str:
+    return locale.own(key, english)
 
 
 def _typed(texts: Mapping[str, str]) -> dict[str, str]:
@@ -265,8 +265,8 @@ def _typed(texts: Mapping[str, str]) -> dict[str, str]:
 
 
 async def _row(hmi: Hmi, name: str) -> RecipeRow:
-    told = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    found = next((row for row in told.rows if row.name == name), None)
+    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    found = next((row for row in reply.rows if row.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
     return found

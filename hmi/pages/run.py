@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Form, Path, Request
 from starlette.responses import Response
 
 from hmi import charts
-from hmi.access import HmiNow, WordingNow, orders
+from hmi.access import HmiNow, LocaleNow, orders
 from hmi.gateway import Gateway, actor_of
 from hmi.live import Part
 from hmi.navigation import Entry
@@ -17,7 +17,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Wording
+from hmi.words import Locale
 from station.channel.messages import RefusedError
 from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
 
@@ -33,12 +33,12 @@ _KEPT_FOR_EVER = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
-def _doing(gateway: Gateway) -> object:
+def _activity(gateway: Gateway) -> object:
     state = gateway.state
     return None if state is None else state.model_copy(update={"utc_ms": 0, "devices": ()})
 
 
-def _doing_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _activity_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
     order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
     return {"state": state, "order": order}
@@ -49,7 +49,7 @@ def _buttons(gateway: Gateway) -> object:
     return None if state is None else (state.may, state.recoveries, state.needs_person)
 
 
-def _buttons_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _buttons_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     return {"state": gateway.state, "OrderName": OrderName}
 
 
@@ -57,8 +57,8 @@ def _fruit(gateway: Gateway) -> object:
     return gateway.last
 
 
-def _fruit_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
-    return fruit_values(gateway.last, wording)
+def _fruit_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
+    return fruit_values(gateway.last, locale)
 
 
 def _figures(gateway: Gateway) -> object:
@@ -68,7 +68,7 @@ def _figures(gateway: Gateway) -> object:
     return gateway.last, state.recipe, state.lot, state.named_lot, state.lot_counts, state.plc_names_lots
 
 
-def _figures_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
+def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
     fruit = gateway.recent.fruit
     reasons = Counter(reason for each in fruit for reason in each.reasons[:1])
     times_s = [each.duration_ms / 1000 for each in fruit[:SHOWN]]
@@ -78,7 +78,7 @@ def _figures_values(gateway: Gateway, wording: Wording) -> Mapping[str, Any]:
         "looked_at": len(fruit),
         "rejected": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
         "reasons": reasons.most_common(_MOST_REASONS),
-        "trend": charts.trend(fruit, wording),
+        "trend": charts.trend(fruit, locale),
         "bar": charts.bar,
         "longest_s": max(times_s, default=None),
     }
@@ -88,12 +88,12 @@ def _recent(gateway: Gateway) -> object:
     return gateway.recent
 
 
-def _recent_values(gateway: Gateway, _: Wording) -> Mapping[str, Any]:
+def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     return {"fruit": gateway.recent.fruit[:SHOWN], "sketch": charts.sketch}
 
 
 PARTS = {
-    "run.doing": Part("run_doing.html.j2", _doing, _doing_values),
+    "run.activity": Part("run_activity.html.j2", _activity, _activity_values),
     "run.buttons": Part("run_buttons.html.j2", _buttons, _buttons_values),
     "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
     "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
@@ -101,9 +101,9 @@ PARTS = {
 }
 
 
-def fruit_values(fruit: Fruit | None, wording: Wording) -> Mapping[str, Any]:
+def fruit_values(fruit: Fruit | None, locale: Locale) -> Mapping[str, Any]:
     """Return the values that `run_fruit.html.j2` needs for a fruit."""
-    return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, wording)}
+    return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, locale)}
 
 
 @router.get("/")
@@ -113,13 +113,13 @@ async def run(request: Request) -> Response:
 
 
 @router.get("/fruit/{sequence}")
-async def fruit(request: Request, hmi: HmiNow, wording: WordingNow, sequence: Sequence) -> Response:
+async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequence) -> Response:
     """Show one of the latest fruit; an older one is in the history."""
     try:
         found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
     except RefusedError:
         return go_to(f"/history/{sequence}")
-    return show(request, "fruit.html.j2", **fruit_values(found, wording))
+    return show(request, "fruit.html.j2", **fruit_values(found, locale))
 
 
 @router.get("/fruit/{sequence}/picture.svg")

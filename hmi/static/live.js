@@ -16,17 +16,17 @@
 
   const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
 
-  function take(told) {
-    if (told.boot !== body.dataset.boot || told.caller !== body.dataset.caller) {
+  function take(reply) {
+    if (reply.boot !== body.dataset.boot || reply.caller !== body.dataset.caller) {
       location.reload();
       return;
     }
     heardAt = performance.now();
-    ageThen = told.age_ms === null ? -1 : told.age_ms;
-    if (told.utc_ms) {
-      clockOffset = told.utc_ms + Math.max(0, ageThen) - Date.now();
+    ageThen = reply.age_ms === null ? -1 : reply.age_ms;
+    if (reply.utc_ms) {
+      clockOffset = reply.utc_ms + Math.max(0, ageThen) - Date.now();
     }
-    for (const [name, part] of Object.entries(told.parts)) {
+    for (const [name, part] of Object.entries(reply.parts)) {
       coming.set(name, part);
     }
     renew();

@@ -192,7 +192,7 @@ def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, opera
     assert after.stopping
     counted = before.lot_counts.model_copy(update={"unjudged": before.lot_counts.unjudged + 1})
     assert after.lot_counts == counted, "the fruit under way is counted with what became of it"
-    operator.until(".run-doing", "Stopped")
+    operator.until(".run-activity", "Stopped")
     time.sleep(1.0)
     assert stands(ready.state()), "it does not begin by itself"
     operator.page.locator(f".tile[href='/fruit/{soft.sequence}']").click()
@@ -206,7 +206,7 @@ def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, opera
     operator.open("/")
     operator.page.get_by_role("button", name="Start").click()
     ready.until(lambda state: state.ready)
-    operator.until(".run-doing", "Ready")
+    operator.until(".run-activity", "Ready")
 
 
 @pytest.mark.timeout(240)
@@ -267,10 +267,10 @@ def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventu
         operator.page.keyboard.down("Enter")
     operator.page.keyboard.up("Enter")
     ready.until(lambda state: state.state == "stopped" and state.stopping)
-    operator.until(".run-doing", "Stopped")
+    operator.until(".run-activity", "Stopped")
     operator.page.get_by_role("button", name="Start").click()
     ready.until(lambda state: state.ready)
-    operator.until(".run-doing", "Ready")
+    operator.until(".run-activity", "Ready")
     # A touch that is too short, by the page's own clock: on a busy machine the browser's hand may be slow.
     clock, mouse = operator.page.clock, operator.page.mouse
     clock.install()

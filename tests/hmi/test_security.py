@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmi.guard import LARGEST_BODY_BYTES
-from hmi.people_file import FILE_NAME, PeopleError, PeopleFile, pin_problem
-from hmi.pin_limit import FREE_TRIES, LONGEST_WAIT_S, PinLimit
+from hmi.people_file import FILE_NAME, UserStore, UserStoreError, pin_problem
+from hmi.pin_limit import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
 from hmi.roles import RIGHTS, Right, Role, least_role
 from hmi.sessions import TOKEN_LIFE_S, Sessions
 
@@ -245,7 +245,7 @@ class TestSessions:
 class TestPinLimit:
     def test_waits_grow_and_end(self):
         clock = Clock()
-        limit = PinLimit(clock)
+        limit = LoginRateLimiter(clock)
         waits = []
         for _ in range(40):
             limit.tried("name")
@@ -258,7 +258,7 @@ class TestPinLimit:
         assert limit.wait_s("name") == 0.0
 
     def test_an_address_that_tries_many_names_waits_too(self):
-        limit = PinLimit(Clock())
+        limit = LoginRateLimiter(Clock())
         for number in range(FREE_TRIES + 1):
             limit.tried(f"name {number}", "address")
         assert limit.wait_s("name 99", "address") > 0
@@ -267,20 +267,20 @@ class TestPinLimit:
 
 class TestPeopleFile:
     def test_it_is_the_stations_alone_and_holds_no_pin(self, tmp_path):
-        people = PeopleFile(tmp_path / "hmi")
+        people = UserStore(tmp_path / "hmi")
         people.begin("admin", PIN)
         path = tmp_path / "hmi" / FILE_NAME
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         text = path.read_text()
         assert PIN not in text
         assert "$argon2id$" in text
-        again = PeopleFile(tmp_path / "hmi")
+        again = UserStore(tmp_path / "hmi")
         assert again.check("admin", PIN) is Role.ADMIN
         assert again.check("admin", OTHER_PIN) is None
         assert again.check("nobody", "000000") is None
 
     def test_a_write_that_fails_leaves_what_was(self, tmp_path, monkeypatch):
-        people = PeopleFile(tmp_path)
+        people = UserStore(tmp_path)
         people.begin("admin", PIN)
         before = people.path.read_bytes()
 
@@ -288,28 +288,28 @@ class TestPeopleFile:
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr("hmi.people_file.os.fsync", full)
-        with pytest.raises(PeopleError, match="No space left"):
+        with pytest.raises(UserStoreError, match="No space left"):
             people.put("Ana", Role.OPERATOR, "7391")
         assert people.path.read_bytes() == before
         assert list(people.names()) == ["admin"]
 
     def test_a_broken_file_is_no_first_start(self, tmp_path):
         (tmp_path / FILE_NAME).write_text('{"version": 1, "people": {"admin": {"role": "admin"}}}')
-        people = PeopleFile(tmp_path)
+        people = UserStore(tmp_path)
         assert not people.first_start
         assert FILE_NAME in people.broken
-        with pytest.raises(PeopleError):
+        with pytest.raises(UserStoreError):
             people.begin("eve", PIN)
         assert "admin" in json.loads((tmp_path / FILE_NAME).read_text())["people"]
 
     def test_one_administrator_stays(self, tmp_path):
-        people = PeopleFile(tmp_path)
+        people = UserStore(tmp_path)
         people.begin("admin", PIN)
         people.put("Ana", Role.OPERATOR, "7391")
         for wrong in (lambda: people.remove("admin"), lambda: people.put("admin", Role.OPERATOR, "")):
-            with pytest.raises(PeopleError, match="last_admin"):
+            with pytest.raises(UserStoreError, match="last_admin"):
                 wrong()
-        with pytest.raises(PeopleError, match="pin_length"):
+        with pytest.raises(UserStoreError, match="pin_length"):
             people.put("Ana", Role.ADMIN, "")
         people.put("Ana", Role.ADMIN, OTHER_PIN)
         people.remove("admin")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hmi import charts
 from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import field_keys, groups
-from hmi.words import FOLDER, NO_VALUE, Wording, catalogue, preferred
+from hmi.words import FOLDER, NO_VALUE, Locale, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
@@ -102,7 +102,7 @@ IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}"}
 STATIONS_OWN = ("station.", "recipe_what.")
 """The catalogues of what the station says in English itself."""
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
-IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |PeopleError\()["']([a-z_]+\.[a-z_]+)["']""")
+IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |UserStoreError\()["']([a-z_]+\.[a-z_]+)["']""")
 
 
 def fields(text):
@@ -197,7 +197,7 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
     ],
 )  # fmt: skip
 def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
-    assert Wording(language).said(english) == said
+    assert Locale(language).sentence(english) == said
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_what_the_station_says_is_said_in_the_language_of_the_page(language, eng
     ],
 )  # fmt: skip
 def test_a_fault_is_said_whole_with_what_to_do(language, fault, what, remedy):
-    assert Wording(language).said(str(fault)) == what + remedy
+    assert Locale(language).sentence(str(fault)) == what + remedy
 
 
 @pytest.mark.parametrize("language", ["de", "es"])
@@ -228,7 +228,7 @@ def test_every_value_of_a_recipe_is_explained_in_every_language(language):
     assert explained == {key.replace("recipe_field", "recipe_what") for key in field_keys()} - {"recipe_what.general"}
     made = groups(load_recipes()["strawberry"].model_dump(mode="json"))
     for field in (field for group in made for field in group.fields):
-        assert "lang=" not in Wording(language).said(field.expected), field.path
+        assert "lang=" not in Locale(language).sentence(field.expected), field.path
 
 
 def test_no_text_that_a_page_uses_is_missing():
@@ -283,13 +283,13 @@ def test_catalogues_are_sorted_by_page():
     ],
 )
 def test_numbers_are_written_as_the_language_does(language, value, digits, text):
-    assert Wording(language).number(value, digits) == text
+    assert Locale(language).number(value, digits) == text
 
 
 def test_a_percentage_and_a_date():
-    assert Wording("de").percent(0.375, 1) == "37,5\u00a0%"
-    assert Wording("en").percent(0.375) == "38%"
-    assert re.fullmatch(r"\d\d\.\d\d\.\d{4}", Wording("de").day(1_700_000_000_000))
+    assert Locale("de").percent(0.375, 1) == "37,5\u00a0%"
+    assert Locale("en").percent(0.375) == "38%"
+    assert re.fullmatch(r"\d\d\.\d\d\.\d{4}", Locale("de").day(1_700_000_000_000))
 
 
 @given(st.text(max_size=60), st.text(max_size=60))
@@ -342,7 +342,7 @@ def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 
 
 @pytest.mark.parametrize("areas", [(), (5.0,), (1.0, 20.5, 60.0)])
 def test_a_curve_is_drawn_with_every_point_and_limit(areas):
-    drawn = ET.fromstring(charts.curve(fruit(areas=areas), Wording("de")))
+    drawn = ET.fromstring(charts.curve(fruit(areas=areas), Locale("de")))
     circles = [each for each in drawn.iter() if each.tag.endswith("circle")]
     assert len(circles) == len(areas)
     assert drawn.get("role") == "img"
@@ -354,7 +354,7 @@ def test_a_trend_counts_tens():
     outcomes: list[OutcomeName] = ["PASS", "PASS", "FAIL", "FAIL", "NO_RESULT"]
     outcomes.extend(outcomes[0] for _ in range(19))
     many = [fruit(outcome).short for outcome in outcomes]
-    drawn = ET.fromstring(charts.trend(many, Wording("en")))
+    drawn = ET.fromstring(charts.trend(many, Locale("en")))
     assert drawn.attrib["aria-label"].endswith("0, 3")
     ET.fromstring(charts.sketch(()))
 

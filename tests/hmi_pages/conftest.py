@@ -25,7 +25,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from hmi.api_tokens import ApiTokens
-from hmi.people_file import PeopleFile
+from hmi.people_file import UserStore
 from hmi.roles import Role
 from station.channel.client import ChannelClient
 from station.channel.line import (
@@ -243,7 +243,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow"},
     }
     file.write_text(json.dumps(values))
-    people = PeopleFile(folder / "h" / "hmi")
+    people = UserStore(folder / "h" / "hmi")
     people.begin("Ada", PIN)
     for name, role in PEOPLE.items():
         people.put(name, role, PIN)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmi.limit_chart import Curve, Limit, area_chart, strip
-from hmi.recipe_form import BadFieldError, changed, groups, shown
+from hmi.recipe_form import BadFieldError, changed, formatted, groups
 from station.channel.panel_queries import JobTold
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.service.panel_jobs import MOST_WAITING, JobError, PanelJobs
@@ -138,7 +138,7 @@ def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: 
 def test_a_form_sent_back_as_it_was_shown_changes_nothing(decimal: str) -> None:
     for recipe in load_recipes().values():
         values = recipe.model_dump(mode="json")
-        form = {field.path: shown(field, decimal) for group in groups(values) for field in group.fields}
+        form = {field.path: formatted(field, decimal) for group in groups(values) for field in group.fields}
         assert changed(values, form) == {}
 
 
