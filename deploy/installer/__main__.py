@@ -15,8 +15,8 @@ from installer.installing import Installation
 from installer.layout import Layout
 from installer.release import Packages, Source
 from installer.services import ScratchRoot, Services, Systemd
-from installer.undoing import installed, undo
-from installer.words import Failed, Refused, say
+from installer.undoing import installed, uninstall
+from installer.words import Failed, Refused, print_progress
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -29,13 +29,13 @@ def main(arguments: list[str] | None = None) -> int:
         with _alone(layout):
             _act(chosen, layout, services)
     except Refused as refusal:
-        say(f"refused, and nothing was changed: {refusal}")
+        print_progress(f"refused, and nothing was changed: {refusal}")
         return 2
     except (Failed, OSError) as error:
-        say(f"failed: {error}")
+        print_progress(f"failed: {error}")
         return 1
     except KeyboardInterrupt:
-        say("interrupted: run it again, it goes on from here")
+        print_progress("interrupted: run it again, it goes on from here")
         return 130
     return 0
 
@@ -74,9 +74,9 @@ def _act(chosen: argparse.Namespace, layout: Layout, services: Services) -> None
         precautions.check_machine(layout)
         if chosen.dry_run:
             kept = "" if chosen.purge else "; configuration, records, copies and user are kept"
-            say(f"would stop the station and take away what was installed{kept}")
+            print_progress(f"would stop the station and take away what was installed{kept}")
         else:
-            undo(layout, services, purge=chosen.purge)
+            uninstall(layout, services, purge=chosen.purge)
         return
     if chosen.rollback:
         _roll_back(chosen, layout, services)
@@ -88,19 +88,19 @@ def _act(chosen: argparse.Namespace, layout: Layout, services: Services) -> None
     installation.check(during_lot=chosen.during_lot)
     if chosen.dry_run:
         for step in installation.steps():
-            say(f"would {step.sentence}")
+            print_progress(f"would {step.sentence}")
         return
     installation.run()
-    say(f"{installation.release.name} is installed; configure it in {layout.configuration}")
+    print_progress(f"{installation.release.name} is installed; configure it in {layout.configuration}")
 
 
 def _roll_back(chosen: argparse.Namespace, layout: Layout, services: Services) -> None:
     precautions.check_machine(layout)
     rolling_back.check(layout)
     if not chosen.during_lot:
-        precautions.check_quiet(layout, layout.current)
+        precautions.check_no_lot(layout, layout.current)
     if chosen.dry_run:
-        say(f"would go back to {layout.previous.resolve().name}")
+        print_progress(f"would go back to {layout.previous.resolve().name}")
     else:
         rolling_back.roll_back(layout, services)
 

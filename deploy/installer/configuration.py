@@ -6,7 +6,7 @@ from pathlib import Path
 
 from installer.layout import Layout
 from installer.programs import run
-from installer.words import Failed, Refused, say
+from installer.words import Failed, Refused, print_progress
 
 
 def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
@@ -40,4 +40,4 @@ def migrate(layout: Layout, release: Path) -> None:
     """Migrate the configuration to a release. Idempotent."""
     program = release / "venv" / "bin" / "station"
     for line in run(program, "config", "migrate", "--write", layout.configuration).splitlines():
-        say(line)
+        print_progress(line)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from installer.layout import Layout
 from installer.programs import LONG_S, own, station
-from installer.words import say
+from installer.words import print_progress
 
 LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs"})
 """Of the home folder: the records are copied by the station itself, the rest is of the moment."""
@@ -18,7 +18,7 @@ DAILY = "daily-"
 _DATABASE = Path("records.sqlite3")
 
 
-def make_copy(layout: Layout, release: Path, kind: str) -> Path:
+def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     """Back up records, state and configuration into a new folder; the station may run meanwhile.
 
     Args:
@@ -49,21 +49,21 @@ def make_copy(layout: Layout, release: Path, kind: str) -> Path:
     return copy
 
 
-def thin_out(layout: Layout, kind: str, keep: int) -> None:
+def prune(layout: Layout, kind: str, keep: int) -> None:
     """Remove all backups of a kind but the newest.
 
     Args:
         layout: the installation.
-        kind: as for `make_copy`.
+        kind: as for `make_backup`.
         keep: number of remaining ones.
     """
     found = sorted(path for path in layout.backups.glob(f"{kind}*") if path.is_dir())
     for path in found[: max(0, len(found) - keep)]:
         shutil.rmtree(path)
-        say(f"removed {path}, which was older than the last {keep}")
+        print_progress(f"removed {path}, which was older than the last {keep}")
 
 
-def form(folder: Path) -> str:
+def schema_version(folder: Path) -> str:
     """Return the schema version of a records' database, as its migrations name it; empty for none.
 
     Args:

@@ -17,7 +17,7 @@ _ASK_S = 3.0
 def ready(layout: Layout, release: Path) -> bool:
     """Return whether it would accept a trigger now; also False if it does not answer."""
     try:
-        return _asked(*_address(layout, release), "/readyz")[0] == http.HTTPStatus.OK
+        return _get(*_address(layout, release), "/readyz")[0] == http.HTTPStatus.OK
     except (Failed, OSError, http.client.HTTPException):
         return False
 
@@ -50,13 +50,13 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
 
 
 def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
-    status, _ = _asked(*address, "/livez")
+    status, _ = _get(*address, "/livez")
     if status != http.HTTPStatus.OK:
         return "/livez says that it stands still"
-    found = _asked(*address, "/version")[1].get("fruit-station")
+    found = _get(*address, "/version")[1].get("fruit-station")
     if found != version:
         return f"version {found} answers, not {version}"
-    status, answer = _asked(*address, "/readyz")
+    status, answer = _get(*address, "/readyz")
     return (
         f"it was ready before and is not now: {answer.get('why')}" if was_ready and status != http.HTTPStatus.OK else ""
     )
@@ -69,7 +69,7 @@ def _address(layout: Layout, release: Path) -> tuple[str, int]:
     return asked, metrics["port"]
 
 
-def _asked(host: str, port: int, path: str) -> tuple[int, dict[str, Any]]:
+def _get(host: str, port: int, path: str) -> tuple[int, dict[str, Any]]:
     connection = http.client.HTTPConnection(host, port, timeout=_ASK_S)
     try:
         connection.request("GET", path)

@@ -10,7 +10,7 @@ from installer.layout import Layout, point, read_note, target, write_note
 from installer.release import STAMP, Packages, Source, complete, make
 from installer.rolling_back import roll_back
 from installer.services import Services
-from installer.words import Failed, say
+from installer.words import Failed, print_progress
 
 BEFORE = "before-upgrade-"
 _COPIES_KEPT = 3
@@ -61,16 +61,16 @@ class Installation:
         precautions.check_machine(self._layout)
         self._source.check()
         if not complete(self.release):
-            precautions.check_room(self._layout)
+            precautions.check_disk_space(self._layout)
         if self.is_upgrade and self._old is not None and not during_lot:
-            precautions.check_quiet(self._layout, self._old)
+            precautions.check_no_lot(self._layout, self._old)
 
     def steps(self) -> list[Step]:
         """Return the steps in order. Each may be repeated; together they lead to the goal from any state between."""
         layout, name = self._layout, self.release.name
         upgrading = [
             Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),
-            Step(f"copy records, state and configuration to {layout.backups}", self._make_copy),
+            Step(f"copy records, state and configuration to {layout.backups}", self._make_backup),
             Step("end the running station in order", self._stop),
             Step(f"bring {layout.configuration} into the words of {name}", self._migrate),
         ]
@@ -93,7 +93,7 @@ class Installation:
         """
         under_way = False
         for step in self.steps():
-            say(step.sentence)
+            print_progress(step.sentence)
             under_way |= self.is_upgrade and step.do == self._stop
             try:
                 step.do()
@@ -101,7 +101,7 @@ class Installation:
             except (Failed, OSError) as error:
                 if not under_way:
                     raise
-                say(str(error))
+                print_progress(str(error))
                 roll_back(self._layout, self._services, self._limit_s)
                 raise Failed(
                     f"{self.release.name} is not in use: {self._describe_old()} is again; mend the cause"
@@ -117,11 +117,11 @@ class Installation:
     def _try_configuration(self) -> None:
         self._changes = configuration.try_with(self._layout, self.release)
 
-    def _make_copy(self) -> None:
+    def _make_backup(self) -> None:
         assert self._old is not None  # noqa: S101 (an upgrade has one)
         self._was_ready = self._services.running() and ready(self._layout, self._old)
-        copy = copies.make_copy(self._layout, self._old, BEFORE)
-        copies.thin_out(self._layout, BEFORE, _COPIES_KEPT)
+        copy = copies.make_backup(self._layout, self._old, BEFORE)
+        copies.prune(self._layout, BEFORE, _COPIES_KEPT)
         note = {"from": self._old.name, "to": self.release.name}
         before = read_note(self._layout.upgrade)
         # An interrupted upgrade has perhaps changed the file already: what it was before is in the earlier note.
@@ -160,4 +160,4 @@ class Installation:
             if release not in kept:
                 (release / STAMP).unlink(missing_ok=True)
                 shutil.rmtree(release)
-                say(f"removed {release.name}")
+                print_progress(f"removed {release.name}")

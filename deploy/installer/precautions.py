@@ -33,7 +33,7 @@ def check_machine(layout: Layout) -> None:
         raise Refused(f"programs are missing: apt-get install {' '.join(sorted(missing))}")
 
 
-def check_room(layout: Layout) -> None:
+def check_disk_space(layout: Layout) -> None:
     """Check that the disks have room for a release, and for a backup of the records.
 
     Raises:
@@ -55,7 +55,7 @@ def check_room(layout: Layout) -> None:
             )
 
 
-def check_quiet(layout: Layout, release: Path) -> None:
+def check_no_lot(layout: Layout, release: Path) -> None:
     """Check that no lot is in progress.
 
     Args:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from installer.layout import Layout, read_note, write_note
 from installer.programs import LONG_S, run
-from installer.words import Refused, say
+from installer.words import Refused, print_progress
 
 LOCKS = ("requirements-build.lock", "requirements.lock")
 PACKAGES = ("station", "plc_interface", "hmi", "recipes")
@@ -113,7 +113,7 @@ def make(layout: Layout, source: Source, packages: Packages) -> Path:
     size_bytes = sum(file.lstat().st_size for file in release.rglob("*") if file.is_file() and not file.is_symlink())
     stamp = {"version": source.version, "fingerprint": source.fingerprint, "python": sys.version, "bytes": size_bytes}
     write_note(release / STAMP, stamp)
-    say(f"made {release.name}: {size_bytes / 1e6:.0f} MB in {time.monotonic() - began:.0f} s")
+    print_progress(f"made {release.name}: {size_bytes / 1e6:.0f} MB in {time.monotonic() - began:.0f} s")
     return release
 
 

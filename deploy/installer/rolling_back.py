@@ -8,7 +8,7 @@ from installer.layout import Layout, point, read_note, target
 from installer.programs import own, station
 from installer.release import STAMP, complete
 from installer.services import Services
-from installer.words import Refused, say
+from installer.words import Refused, print_progress
 
 
 def check(layout: Layout) -> None:
@@ -35,7 +35,7 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     check(layout)
     old, note = target(layout.previous), read_note(layout.upgrade)
     assert old is not None  # noqa: S101 (checked)
-    say(f"back to {old.name}")
+    print_progress(f"back to {old.name}")
     services.stop()
     copy = layout.backups / str(note["copy"])
     if note["configuration"] is not None:
@@ -44,12 +44,14 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
         )
         layout.configuration.write_text(note["configuration"], encoding="utf-8")
         own(layout, layout.configuration, "root", "fruit-station")
-        say(f"{layout.configuration} is as before the upgrade")
-    if (copy / copies.RECORDS).is_dir() and copies.form(layout.home / copies.RECORDS) != copies.form(
-        copy / copies.RECORDS
-    ):
+        print_progress(f"{layout.configuration} is as before the upgrade")
+    if (copy / copies.RECORDS).is_dir() and copies.schema_version(
+        layout.home / copies.RECORDS
+    ) != copies.schema_version(copy / copies.RECORDS):
         station(layout, old, "records", "restore", copy / copies.RECORDS, limit_s=4 * 3600.0)
-        say(f"the records are as before the upgrade; what came since is in {layout.home / copies.RECORDS / 'aside'}")
+        print_progress(
+            f"the records are as before the upgrade; what came since is in {layout.home / copies.RECORDS / 'aside'}"
+        )
     site_files.put(layout, old)
     point(layout.current, old)
     services.reload()
@@ -58,4 +60,4 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
         wait_until_well(layout, old, str(read_note(old / STAMP)["version"]), was_ready=False, limit_s=limit_s)
     layout.upgrade.unlink()
     layout.previous.unlink()
-    say(f"{old.name} is in use again")
+    print_progress(f"{old.name} is in use again")

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from installer.layout import NAME, TIMER, UNIT, Layout
 from installer.programs import run
-from installer.words import Failed, say
+from installer.words import Failed, print_progress
 
 START_LIMIT_S = 200.0
 STOP_LIMIT_S = 200.0
@@ -102,7 +102,7 @@ class Systemd:
 
     def start(self) -> bool:
         if not self._booted:
-            say("systemd does not run here: the station starts when it does")
+            print_progress("systemd does not run here: the station starts when it does")
             return False
         run("systemctl", "reset-failed", UNIT)
         run("systemctl", "start", UNIT, limit_s=START_LIMIT_S)
@@ -139,7 +139,7 @@ class ScratchRoot:
         return
 
     def start(self) -> bool:
-        say(f"nothing is started in {self._layout.root}")
+        print_progress(f"nothing is started in {self._layout.root}")
         return False
 
     def _systemctl(self, verb: str) -> None:

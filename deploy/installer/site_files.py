@@ -6,7 +6,7 @@ from pathlib import Path
 
 from installer.layout import NAME, Layout, read_note, write_note
 from installer.programs import own
-from installer.words import say
+from installer.words import print_progress
 
 PLACES = {
     "systemd": "/etc/systemd/system",
@@ -44,7 +44,7 @@ def put(layout: Layout, release: Path) -> None:
     known = dict(read_note(layout.manifest).get("files", {}))
     files = wanted(release)
     for path in known.keys() - files.keys():
-        _take_away(layout, path, known.pop(path))
+        _remove_file(layout, path, known.pop(path))
     for path, source in files.items():
         file, content = layout.place(path), source.read_bytes()
         _keep_changed(file, known.get(path), content)
@@ -66,7 +66,7 @@ def make_folders(layout: Layout) -> None:
         own(layout, path, user, NAME)
     if not layout.configuration.exists():
         shutil.copyfile(layout.settings / "station.example.yaml", layout.configuration)
-        say(f"{layout.configuration}: the site's own from now on; all of it is commented out")
+        print_progress(f"{layout.configuration}: the site's own from now on; all of it is commented out")
     layout.configuration.chmod(0o640)
     own(layout, layout.configuration, "root", NAME)
 
@@ -89,14 +89,14 @@ def make_folder(layout: Layout, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
 
 
-def take_away(layout: Layout) -> None:
+def remove_files(layout: Layout) -> None:
     """Remove every installed file."""
     note = read_note(layout.manifest)
     for path, digest in note.get("files", {}).items():
-        _take_away(layout, path, digest)
+        _remove_file(layout, path, digest)
 
 
-def take_away_folders(layout: Layout, folders: list[str]) -> None:
+def remove_folders(layout: Layout, folders: list[str]) -> None:
     """Remove created folders that are empty.
 
     Args:
@@ -117,10 +117,10 @@ def _keep_changed(file: Path, digest: str | None, content: bytes) -> None:
     if there != content and hashlib.sha256(there).hexdigest() != digest:
         saved = file.with_name(file.name + SAVED)
         file.replace(saved)
-        say(f"{file} was changed by hand: kept as {saved}; put your changes into a drop-in (systemctl edit)")
+        print_progress(f"{file} was changed by hand: kept as {saved}; put your changes into a drop-in (systemctl edit)")
 
 
-def _take_away(layout: Layout, path: str, digest: str) -> None:
+def _remove_file(layout: Layout, path: str, digest: str) -> None:
     file = layout.place(path)
     _keep_changed(file, digest, b"")
     file.unlink(missing_ok=True)

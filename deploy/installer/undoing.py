@@ -5,7 +5,7 @@ import shutil
 from installer import site_files
 from installer.layout import NAME, Layout, read_note
 from installer.services import Services
-from installer.words import say
+from installer.words import print_progress
 
 
 def installed(layout: Layout) -> bool:
@@ -13,7 +13,7 @@ def installed(layout: Layout) -> bool:
     return layout.program.exists()
 
 
-def undo(layout: Layout, services: Services, *, purge: bool) -> None:
+def uninstall(layout: Layout, services: Services, *, purge: bool) -> None:
     """Stop the station and remove all that the installer has put there. Idempotent.
 
     Args:
@@ -25,7 +25,7 @@ def undo(layout: Layout, services: Services, *, purge: bool) -> None:
     if installed(layout) and note.get("files"):
         services.stop()
         services.disable()
-        site_files.take_away(layout)
+        site_files.remove_files(layout)
         services.reload()
     shutil.rmtree(layout.cache, ignore_errors=True)
     if purge:
@@ -33,7 +33,9 @@ def undo(layout: Layout, services: Services, *, purge: bool) -> None:
         for folder in (layout.settings, layout.home, layout.backups):
             shutil.rmtree(folder, ignore_errors=True)
     shutil.rmtree(layout.program, ignore_errors=True)
-    site_files.take_away_folders(layout, note.get("folders", []))
+    site_files.remove_folders(layout, note.get("folders", []))
     if not purge:
         kept = [str(path) for path in (layout.settings, layout.home, layout.backups) if path.exists()]
-        say(f"kept: {', '.join([*kept, f'the user {NAME}']) if kept else 'nothing'}; --undo --purge removes them")
+        print_progress(
+            f"kept: {', '.join([*kept, f'the user {NAME}']) if kept else 'nothing'}; --undo --purge removes them"
+        )

@@ -11,7 +11,7 @@ class Failed(Exception):  # noqa: N818 (as above; the text is for a person)
     """An operation that did not complete. The text states the present state, and what to do."""
 
 
-def say(sentence: str) -> None:
+def print_progress(sentence: str) -> None:
     """Print one line about the progress."""
     sys.stdout.write(f"install: {sentence}\n")
     sys.stdout.flush()

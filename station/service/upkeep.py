@@ -171,7 +171,7 @@ class Upkeep:
 
     def _show_restarts(self) -> None:
         many: list[str] = []
-        for name, program in restarts.told().items():
+        for name, program in restarts.read().items():
             for _ in range(program.total - self._restarts_counted.get(name, 0)):
                 self._metrics.restarted(name)
             self._restarts_counted[name] = program.total

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from station.settings.problems import Path, Problem, SettingsError, dotted, shortened
-from station.settings.schema import Leaf, Node, branches, expectation, leaves, shown
+from station.settings.schema import Leaf, Node, branches, expectation, formatted, leaves
 from station.settings.yaml_loader import parse_document
 
 PREFIX = "STATION_"
@@ -80,7 +80,7 @@ def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], 
             values[leaf.path] = _value(environ[name], leaf.node, root)
         except SettingsError:
             wanted = expectation(leaf.node, root)
-            problems.append(Problem(PLACE, name, f"expected {wanted}, got {shown(environ[name])}"))
+            problems.append(Problem(PLACE, name, f"expected {wanted}, got {formatted(environ[name])}"))
     return values, problems
 
 

@@ -118,12 +118,12 @@ def expectation(node: Node, root: Node) -> str:
         node: the field's node.
         root: the whole schema.
     """
-    words = [_words(branch, root) for branch in branches(node, root)]
+    words = [_alternative(branch, root) for branch in branches(node, root)]
     nullable = any(resolved(each, root).get("type") == "null" for each in node.get("anyOf", ()))
     return " or ".join([*dict.fromkeys(words), *(["null"] if nullable else [])])
 
 
-def _words(node: Node, root: Node) -> str:
+def _alternative(node: Node, root: Node) -> str:
     """Describe one alternative."""
     if "const" in node or "enum" in node:
         choices = node.get("enum", [node.get("const")])
@@ -198,7 +198,7 @@ def figure(value: float) -> str:
     return str(int(value)) if value == int(value) else f"{value:.6g}"
 
 
-def shown(value: Any) -> str:
+def formatted(value: Any) -> str:
     """Format a value for a message.
 
     Args:

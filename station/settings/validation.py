@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from station.settings.model import Settings
 from station.settings.problems import Contradiction, Problem, SettingsError, shortened
 from station.settings.problems import Path as Where
-from station.settings.schema import Node, expectation, find, names, schema_of, shown
+from station.settings.schema import Node, expectation, find, formatted, names, schema_of
 from station.settings.yaml_loader import MOST_PROBLEMS, Document, read_document
 
 Model = TypeVar("Model", bound=Settings)
@@ -92,7 +92,7 @@ def _problems(
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, Contradiction):
         return [Problem(*locate(path + inner), text) for inner, text in cause.parts]
-    return [Problem(*locate(path), _words(details, path, root, cause))]
+    return [Problem(*locate(path), _difference(details, path, root, cause))]
 
 
 def _cleaned(location: tuple[str | int, ...], value: Any) -> Where:
@@ -117,7 +117,7 @@ def _inside(value: Any, part: str | int) -> tuple[Any] | None:
     return None
 
 
-def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str:
+def _difference(details: ErrorDetails, path: Where, root: Node, cause: object) -> str:
     """Describe the expected and the actual value."""
     if details["type"] == "extra_forbidden":
         return _unknown(str(path[-1]), names(root, path[:-1]))
@@ -126,8 +126,8 @@ def _words(details: ErrorDetails, path: Where, root: Node, cause: object) -> str
     if details["type"] == "missing" and not isinstance(details["input"], list):
         return f"expected {wanted}, got nothing"
     if cause is not None:
-        return f"{cause}, got {shown(details['input'])}"
-    return f"expected {wanted}, got {shown(details['input'])}"
+        return f"{cause}, got {formatted(details['input'])}"
+    return f"expected {wanted}, got {formatted(details['input'])}"
 
 
 def _unknown(name: str, known: list[str]) -> str:

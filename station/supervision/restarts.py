@@ -27,7 +27,7 @@ class Restarts(NamedTuple):
         return sum(time.monotonic() - at_s < seconds for at_s in self.times_s)
 
 
-def tell(file: Path, programs: Mapping[str, Restarts]) -> None:
+def publish(file: Path, programs: Mapping[str, Restarts]) -> None:
     """Write the file atomically; a write error is logged.
 
     Args:
@@ -42,7 +42,7 @@ def tell(file: Path, programs: Mapping[str, Restarts]) -> None:
         log.warning("%s cannot be written: %s", file, error.strerror)
 
 
-def told() -> dict[str, Restarts]:
+def read() -> dict[str, Restarts]:
     """Read the supervisor's counts; empty without a supervisor of ours."""
     name = os.environ.get(RESTARTS_VARIABLE, "")
     try:

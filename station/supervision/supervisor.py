@@ -21,12 +21,12 @@ from pathlib import Path
 
 from station.errors import StationError
 from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
-from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, tell
+from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 
 RESTARTS = 5
 RESTARTS_WITHIN_S = 60.0
 _LONGEST_MESSAGE_BYTES = 4096
-_LOOK_S = 0.1
+_POLL_S = 0.1
 
 log = logging.getLogger(__name__)
 
@@ -126,7 +126,7 @@ class _Child:
             os.killpg(process.pid, signal.SIGKILL)
         await process.wait()
 
-    def last_words(self) -> str:
+    def last_output(self) -> str:
         """Return the process's last output, or the place of its log."""
         if self.program.output is None:
             return "see its messages above"
@@ -180,7 +180,7 @@ class Supervisor:
             self._restarts_file = Path(folder) / "restarts.json"
             environment = {**self._environment, RESTARTS_VARIABLE: str(self._restarts_file)}
             self._children = [_Child(program, Path(folder), environment) for program in self._programs]
-            self._tell_restarts()
+            self._publish_restarts()
             try:
                 for child in self._children:
                     await child.start()
@@ -200,11 +200,11 @@ class Supervisor:
             child.listen()
             if child.process is not None and child.process.returncode is not None:
                 raise SupervisionError(
-                    f"the process {child.program.name} {child.trouble()} before it was ready: {child.last_words()}"
+                    f"the process {child.program.name} {child.trouble()} before it was ready: {child.last_output()}"
                 )
             if trouble := child.trouble():
-                raise SupervisionError(f"the process {child.program.name} {trouble}: {child.last_words()}")
-            await self._look(self._children, ended)
+                raise SupervisionError(f"the process {child.program.name} {trouble}: {child.last_output()}")
+            await self._poll(self._children, ended)
 
     async def _keep(self, ended: asyncio.Event) -> None:
         while not ended.is_set() and not all(child.given_up for child in self._children):
@@ -213,7 +213,7 @@ class Supervisor:
                 if not child.given_up and (trouble := child.trouble()):
                     await self._restart(child, trouble)
             self._feed()
-            await self._look((), ended)
+            await self._poll((), ended)
 
     def _feed(self) -> None:
         """Feed systemd's watchdog once all running programs, if there are any, have notified since the last time."""
@@ -222,9 +222,9 @@ class Supervisor:
             notify("WATCHDOG=1")
             self._fed_s = time.monotonic()
 
-    async def _look(self, children: Iterable[_Child], ended: asyncio.Event) -> None:
+    async def _poll(self, children: Iterable[_Child], ended: asyncio.Event) -> None:
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_LOOK_S):
+            async with asyncio.timeout(_POLL_S):
                 await ended.wait()
         for child in children:
             child.listen()
@@ -236,7 +236,7 @@ class Supervisor:
         await child.stop(0.0)
         if len(child.restarts) >= RESTARTS:
             child.given_up = True
-            self._tell_restarts()
+            self._publish_restarts()
             notify(f"STATUS=given up: {child.program.name}, which {trouble}; mend the cause and start again")
             log.critical(
                 "the process %s %s, after %d restarts within %g s: it is given up; mend the cause and start again",
@@ -246,13 +246,13 @@ class Supervisor:
         log.error("the process %s %s: it is started again", child.program.name, trouble)
         child.restarts.append(now_s)
         child.restarts_in_all += 1
-        self._tell_restarts()
+        self._publish_restarts()
         notify(f"STATUS=running; {child.program.name} {trouble}: restart {child.restarts_in_all} since the start")
         await child.start()
 
-    def _tell_restarts(self) -> None:
-        told = {c.program.name: Restarts(c.restarts_in_all, tuple(c.restarts), c.given_up) for c in self._children}
-        tell(self._restarts_file, told)
+    def _publish_restarts(self) -> None:
+        counts = {c.program.name: Restarts(c.restarts_in_all, tuple(c.restarts), c.given_up) for c in self._children}
+        publish(self._restarts_file, counts)
 
     async def _stop(self) -> None:
         for child in reversed(self._children):

@@ -50,7 +50,11 @@ def test_all_that_cannot_be_made_again_is_copied_and_the_oldest_goes(root, insta
     assert (newest / "state/active_recipe.json").exists()
     assert not (newest / "state/run").exists()
     assert json.loads((newest / "records/backup.json").read_text())["sequence"] == 41
-    assert installer("copies").form(newest / "records") == installer("copies").form(installed.home / "records") != ""
+    assert (
+        installer("copies").schema_version(newest / "records")
+        == installer("copies").schema_version(installed.home / "records")
+        != ""
+    )
 
 
 def test_a_copy_that_failed_leaves_nothing_that_looks_like_one(root, installed):

@@ -109,20 +109,20 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
     with monkeypatch.context() as patch:
         patch.setattr(checks.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**9, 9 * 10**8, 10**8))
         with pytest.raises(refused, match="has 100 MB of free space, 1500 MB are needed"):
-            checks.check_room(layout(tmp_path))
+            checks.check_disk_space(layout(tmp_path))
 
 
 def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monkeypatch):
     checks, layout = installer("precautions"), installer("layout").Layout(tmp_path)
-    checks.check_quiet(layout, tmp_path)  # nothing was ever recorded
+    checks.check_no_lot(layout, tmp_path)  # nothing was ever recorded
     (layout.home / "records").mkdir(parents=True)
     (layout.home / "records/records.sqlite3").touch()
     rows = ["number  begun (UTC)"]
     monkeypatch.setattr(checks, "station", lambda *words: "\n".join(rows) if "--from" in words else "A-16: M, ended")
-    checks.check_quiet(layout, tmp_path)
+    checks.check_no_lot(layout, tmp_path)
     rows.append("4711    2026-06-30")
     with pytest.raises(installer("words").Refused, match="inspected within the last 10 minutes: stop the line"):
-        checks.check_quiet(layout, tmp_path)
+        checks.check_no_lot(layout, tmp_path)
 
 
 def test_no_python_is_said_by_the_shell(tmp_path, root):

@@ -10,7 +10,7 @@ from station.channel.line import CommandName
 from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED
 from station.inspection.states import State
-from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, tell
+from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
 WATCHED = {
@@ -112,18 +112,18 @@ def test_what_the_supervisor_tells_of_restarts_is_counted_and_many_are_an_alarm(
                 text = cell.station.service._metrics.exposition()[0].decode()
                 return 'station_process_restarts_total{process="plc"} 3.0' in text
 
-            tell(file, {"plc": Restarts(2, (now_s, now_s), given_up=False)})
+            publish(file, {"plc": Restarts(2, (now_s, now_s), given_up=False)})
             await asyncio.sleep(1.2)
             assert AlarmId.PROCESS_RESTARTS not in active(cell)
-            tell(file, {"plc": Restarts(3, (now_s, now_s, now_s), given_up=False)})
+            publish(file, {"plc": Restarts(3, (now_s, now_s, now_s), given_up=False)})
             await until(lambda: AlarmId.PROCESS_RESTARTS in active(cell))
             assert counted()
-            tell(file, {"plc": Restarts(3, (now_s - 100,) * 3, given_up=False)})
+            publish(file, {"plc": Restarts(3, (now_s - 100,) * 3, given_up=False)})
             await until(lambda: AlarmId.PROCESS_RESTARTS not in active(cell))
             file.write_text("rubbish")
             await asyncio.sleep(1.2)
             assert counted()
-            tell(file, {"plc": Restarts(3, (), given_up=True)})
+            publish(file, {"plc": Restarts(3, (), given_up=True)})
             await until(lambda: AlarmId.PROCESS_RESTARTS in active(cell))
 
     asyncio.run(scenario())

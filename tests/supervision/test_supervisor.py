@@ -36,7 +36,7 @@ def test_what_dies_is_started_again_and_the_others_go_on(bench, until, number, m
         await until(lambda: len(bench.pids("second")) == 2)
         assert supervisor.restarts == {"first": 0, "second": 1}
         monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
-        assert [(name, told.total, told.within(60)) for name, told in restarts.told().items()] == [
+        assert [(name, told.total, told.within(60)) for name, told in restarts.read().items()] == [
             ("first", 0, 0), ("second", 1, 1)
         ]  # fmt: skip
         await until(lambda: supervisor.ready("second"))
@@ -70,7 +70,7 @@ def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until
             os.kill(bench.pids("second")[-1], signal.SIGKILL)
         await until(lambda: "given up" in bench.caplog.text)
         monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
-        assert {name: told.given_up for name, told in restarts.told().items()} == {"first": False, "second": True}
+        assert {name: told.given_up for name, told in restarts.read().items()} == {"first": False, "second": True}
         assert psutil.pid_exists(bench.pids("first")[0])
         ended.set()
 

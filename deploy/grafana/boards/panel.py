@@ -144,7 +144,7 @@ def built(panel: Panel, number: int) -> Any:
         .links([link.target_blank(target_blank=True)]).span(panel.width).height(4 if panel.kind == "number" else HEIGHT)
     )  # fmt: skip
     for letter, ask in zip(_letters(), panel.asks, strict=False):
-        making = making.with_target(_asked(panel, letter, ask))
+        making = making.with_target(_with_query(panel, letter, ask))
     return making
 
 
@@ -199,7 +199,7 @@ def _letters() -> Iterator[str]:
     return (chr(number) for number in itertools.count(ord("A")))
 
 
-def _asked(panel: Panel, letter: str, ask: Prom | Sql) -> Builder[Any]:
+def _with_query(panel: Panel, letter: str, ask: Prom | Sql) -> Builder[Any]:
     if isinstance(ask, Sql):
         return _SqlBuilder(_SqlQuery(letter, ask.sql, over_time=panel.kind not in {"table", "number"}))
     query = prometheus.Dataquery().expr(ask.expr).ref_id(letter).datasource(PROMETHEUS)
