@@ -16,11 +16,11 @@ from plc_interface.handshake.view import Value, line, view
 from plc_interface.journal_file import JournalFile
 from plc_interface.line_output import LineOutput
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.statistics import Statistics
+from plc_interface.modbus.write_lock import WriterChange
 from plc_interface.register_map import BY_NAME
-from plc_interface.register_telling import formatted_registers
+from plc_interface.register_values import formatted_registers
 from plc_interface.station_link import StationLink, now
 from station.channel.line import Line
 from station.settings.plc import HandshakeSettings

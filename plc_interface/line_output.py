@@ -16,7 +16,7 @@ from plc_interface.can.errors import (
     RejectRefusedError,
 )
 from plc_interface.can.line_io import LineIo
-from plc_interface.shot_file import PendingRejectFile
+from plc_interface.pending_rejects_file import PendingRejectFile
 from station.channel.line import Outcome
 from station.settings.can import CanSettings
 

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from plc_interface.codec import WordOrder
 from plc_interface.interface import Interface
 from plc_interface.journal_file import JournalFile
-from plc_interface.latency import request_real_time_priority
 from plc_interface.line_output import make_output
 from plc_interface.modbus.image import RegisterImage
 from plc_interface.modbus.server import ModbusServer
+from plc_interface.real_time import request_real_time_priority
 from station.settings.configuration import Configuration
 from station.settings.plc import line_endpoint
 from station.supervision.notify import feed_watchdog, notify

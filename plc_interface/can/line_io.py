@@ -28,7 +28,7 @@ from plc_interface.can.errors import (
     RejectRefusedError,
 )
 from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
-from plc_interface.can.shots import DivertEcho, Fired, Order, PendingReject, PendingRejects
+from plc_interface.can.pending_rejects import DivertEcho, Fired, Order, PendingReject, PendingRejects
 from station.settings.can import CanSettings
 
 _LONGEST_PAUSE_S = 10.0

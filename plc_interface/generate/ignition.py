@@ -7,7 +7,7 @@ Ignition's documentation, "Modbus Addressing": one-based addresses; HR signed an
 import json
 from typing import Any
 
-from plc_interface.generate.wording import MADE_BY, UNTESTED
+from plc_interface.generate.notices import MADE_BY, UNTESTED
 from plc_interface.register import Access, Kind, Register
 from plc_interface.register_map import GROUPS
 

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterator
 
-from plc_interface.generate.wording import MADE_BY
+from plc_interface.generate.notices import MADE_BY
 from plc_interface.register import Kind, Register
 from plc_interface.register_map import GROUPS, MAP_VERSION, REGISTERS, bit_address, map_checksum
 

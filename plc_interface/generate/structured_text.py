@@ -5,7 +5,7 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from plc_interface.generate.wording import MADE_BY, UNTESTED
+from plc_interface.generate.notices import MADE_BY, UNTESTED
 from plc_interface.register import Kind, Register
 from plc_interface.register_bits import COMMAND_CODES, OUTCOME_CODES, WRITE_KEY
 from plc_interface.register_map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, map_checksum

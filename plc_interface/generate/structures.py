@@ -6,7 +6,7 @@ first, because its numbers are aligned in each block. Texts then have their char
 
 from xml.etree import ElementTree as ET
 
-from plc_interface.generate.wording import MADE_BY, UNTESTED
+from plc_interface.generate.notices import MADE_BY, UNTESTED
 from plc_interface.register import Kind, Register
 from plc_interface.register_map import GROUPS
 

@@ -3,7 +3,7 @@
 Telegraf's documentation, "Modbus Input Plugin", configuration type `request`.
 """
 
-from plc_interface.generate.wording import MADE_BY, UNTESTED
+from plc_interface.generate.notices import MADE_BY, UNTESTED
 from plc_interface.register import Kind
 from plc_interface.register_map import GROUPS
 

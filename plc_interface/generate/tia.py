@@ -7,7 +7,7 @@ numbers become two, because the S7-1200 has none.
 
 from collections.abc import Iterator
 
-from plc_interface.generate.wording import MADE_BY, UNTESTED
+from plc_interface.generate.notices import MADE_BY, UNTESTED
 from plc_interface.register import Kind, Register
 from plc_interface.register_map import GROUPS
 

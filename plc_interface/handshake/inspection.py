@@ -6,9 +6,9 @@ from plc_interface.handshake.actions import RequestBegin, RequestOutcome
 from plc_interface.handshake.events import BeginAnswered, Moment
 from plc_interface.handshake.journal import Running
 from plc_interface.handshake.modes import Inspection, Signal
+from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_other, publish_own, queue
 from plc_interface.handshake.state import PendingTrigger
 from plc_interface.handshake.trigger import note_refusal
-from plc_interface.handshake.verdict import is_sound, no_result, publish_if_other, publish_own, queue
 from plc_interface.handshake.work import Work, row
 from station.channel.line import Begun, Reason, Refusal
 

@@ -3,7 +3,7 @@
 from plc_interface.handshake.actions import RequestOpen
 from plc_interface.handshake.events import Beat
 from plc_interface.handshake.modes import Link, Signal
-from plc_interface.handshake.settle import resynchronise
+from plc_interface.handshake.resynchronisation import resynchronise
 from plc_interface.handshake.work import Work, row
 
 

@@ -4,7 +4,7 @@ import copy
 
 from plc_interface.handshake.actions import Action, SaveJournal
 from plc_interface.handshake.events import Event
-from plc_interface.handshake.intake import apply_event
+from plc_interface.handshake.inputs import apply_event
 from plc_interface.handshake.modes import TIMERS, Signal
 from plc_interface.handshake.state import State
 from plc_interface.handshake.table import apply

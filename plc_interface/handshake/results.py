@@ -1,8 +1,8 @@
 """The result block and its acknowledgement by sequence."""
 
 from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.outcomes import acknowledge, pass_over_hidden
 from plc_interface.handshake.state import Fault
-from plc_interface.handshake.verdict import acknowledge, pass_over_hidden
 from plc_interface.handshake.work import Work, row
 
 

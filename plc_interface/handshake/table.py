@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from plc_interface.handshake import bits, inspection, link, orders, results, trigger
+from plc_interface.handshake import bits, commands, inspection, link, results, trigger
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
 from plc_interface.handshake.work import Row, Work
 
@@ -12,7 +12,7 @@ REGIONS: dict[type[Mode], tuple[Row, ...]] = {
     Arming: bits.ARMING_ROWS,
     Lot: bits.LOT_ROWS,
     Result: results.ROWS,
-    Command: orders.ROWS,
+    Command: commands.ROWS,
     Inspection: inspection.ROWS,
     Trigger: trigger.ROWS,
 }

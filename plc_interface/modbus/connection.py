@@ -11,7 +11,7 @@ from plc_interface.modbus.mbap import LONGEST_FRAME, framed, frames
 from plc_interface.modbus.peer import Peer
 
 if TYPE_CHECKING:
-    from plc_interface.modbus.hub import ConnectionManager
+    from plc_interface.modbus.connection_manager import ConnectionManager
 
 _BUFFER_BYTES = 4 * LONGEST_FRAME
 """Taken from the kernel at one time. What a client sends beyond it waits there, so that others have their turn."""

@@ -12,13 +12,13 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pymodbus.transport import CommParams, CommType
 
 from plc_interface.modbus.connection import Connection
-from plc_interface.modbus.hub import ConnectionManager
+from plc_interface.modbus.connection_manager import ConnectionManager
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import OnWriter
 from plc_interface.modbus.peer import Peer
-from plc_interface.modbus.responder import OnWrite
+from plc_interface.modbus.request_handler import OnWrite
 from plc_interface.modbus.statistics import Statistics
 from plc_interface.modbus.tls import server_context
+from plc_interface.modbus.write_lock import OnWriter
 from station.errors import StationError
 from station.settings.modbus import ModbusSettings
 

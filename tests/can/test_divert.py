@@ -14,7 +14,7 @@ from plc_interface.can.errors import (
     RejectRefusedError,
 )
 from plc_interface.can.link import ORDER
-from plc_interface.can.shots import Order, PendingRejects, Report
+from plc_interface.can.pending_rejects import Order, PendingRejects, Report
 
 
 def test_shots_are_fired_at_their_counts_and_echoed_by_sequence(on_bus):

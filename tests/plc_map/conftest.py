@@ -21,9 +21,9 @@ from plc_interface.handshake.machine import step
 from plc_interface.handshake.state import restarted
 from plc_interface.handshake.view import view
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.server import ModbusServer
+from plc_interface.modbus.write_lock import WriterChange
 from plc_interface.register_map import BY_NAME, REGISTERS
 from station.channel.line import Begun, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.modbus import ModbusSettings

@@ -14,9 +14,9 @@ import pytest
 from plc_interface.codec import WordOrder
 from plc_interface.modbus.exceptions import ExceptionCode
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import WriterChange
 from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.server import ModbusServer
+from plc_interface.modbus.write_lock import WriterChange
 from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_map import BY_NAME
 from station.settings.modbus import ModbusSettings

@@ -11,7 +11,7 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.pdu.mei_message import ReadDeviceInformationResponse
 
-from plc_interface.modbus.lease import WriterChange
+from plc_interface.modbus.write_lock import WriterChange
 
 CLIENTS = Path(__file__).parent / "clients"
 FETCHED = Path(tempfile.gettempdir()) / f"fruit-station-clients-{os.getuid()}"

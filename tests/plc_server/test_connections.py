@@ -6,8 +6,8 @@ import struct
 
 import pytest
 
+from plc_interface.modbus.connection_manager import RESERVED_PLACES
 from plc_interface.modbus.exceptions import Trouble
-from plc_interface.modbus.hub import RESERVED_PLACES
 from plc_interface.register_map import BY_NAME
 
 TRIGGER_ID, REFERENCE = BY_NAME["trigger_id"].address, BY_NAME["reference_u16"].address

@@ -5,7 +5,7 @@ import sys
 
 SCRIPT = """
 import gc, logging, os
-from plc_interface.latency import request_real_time_priority
+from plc_interface.real_time import request_real_time_priority
 logging.basicConfig(format="%(message)s")
 got = request_real_time_priority()
 policy = os.sched_getscheduler(0)

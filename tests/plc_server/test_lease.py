@@ -5,8 +5,8 @@ import struct
 import pytest
 
 from plc_interface.modbus.exceptions import Trouble
-from plc_interface.modbus.lease import SILENCE_S, WriteLock, WriterChange
 from plc_interface.modbus.peer import Peer
+from plc_interface.modbus.write_lock import SILENCE_S, WriteLock, WriterChange
 from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_map import BY_NAME
 
@@ -120,7 +120,7 @@ class TestOnTheWire:
         assert plc.write(TRIGGER_ID, 7)[0] == 16
 
     def test_a_writer_whose_old_connection_hangs_takes_over(self, serve, connect, eventually, monkeypatch):
-        monkeypatch.setattr("plc_interface.modbus.lease.SILENCE_S", 3.0)  # time enough for a machine that is busy
+        monkeypatch.setattr("plc_interface.modbus.write_lock.SILENCE_S", 3.0)  # time enough for a machine that is busy
         serving = serve()
         hanging, back = connect(serving), connect(serving)
         hanging.claim()

@@ -4,8 +4,7 @@ from plc_interface.handshake.actions import NotifyPublished, RequestOutcome
 from plc_interface.handshake.events import OpenAnswered
 from plc_interface.handshake.inspection import run, unknown_run
 from plc_interface.handshake.modes import Signal
-from plc_interface.handshake.state import NO_SIZE, PendingTrigger
-from plc_interface.handshake.verdict import (
+from plc_interface.handshake.outcomes import (
     acknowledge,
     hide,
     in_place_of,
@@ -15,6 +14,7 @@ from plc_interface.handshake.verdict import (
     publish_own,
     queue,
 )
+from plc_interface.handshake.state import NO_SIZE, PendingTrigger
 from plc_interface.handshake.work import Work
 from station.channel.line import Open, Outcome, Reason
 

@@ -7,12 +7,12 @@ from typing import Protocol
 from plc_interface.modbus.access import AllowList, plain_address
 from plc_interface.modbus.exceptions import ExceptionCode, RequestError, Trouble
 from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.lease import OnWriter, WriteLock, WriterChange
 from plc_interface.modbus.log_limit import LimitedLog
 from plc_interface.modbus.peer import Peer
-from plc_interface.modbus.responder import OnWrite, RequestHandler
+from plc_interface.modbus.request_handler import OnWrite, RequestHandler
 from plc_interface.modbus.statistics import Statistics
 from plc_interface.modbus.tls import Right, identity_of
+from plc_interface.modbus.write_lock import OnWriter, WriteLock, WriterChange
 from station.settings.modbus import ModbusSettings
 
 RESERVED_PLACES = 4
