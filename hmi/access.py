@@ -9,7 +9,7 @@ from hmi.context import Hmi
 from hmi.problem import Problem
 from hmi.roles import Right, least_role
 from hmi.sessions import Caller
-from hmi.words import Locale, preferred
+from hmi.translation import Locale, preferred
 
 SESSION_COOKIE, LANGUAGE_COOKIE = "station_session", "station_language"
 TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"

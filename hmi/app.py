@@ -17,15 +17,15 @@ from hmi.access import locale_of
 from hmi.assets import Assets
 from hmi.context import Hmi
 from hmi.gateway import Gateway, actor_of
-from hmi.guard import SecurityMiddleware
 from hmi.live import Live
+from hmi.login_limiter import LoginRateLimiter
 from hmi.navigation import modules, parts
 from hmi.page import show
-from hmi.people_file import UserStore
-from hmi.pin_limit import LoginRateLimiter
 from hmi.problem import Problem
 from hmi.render import Renderer
+from hmi.security import SecurityMiddleware
 from hmi.sessions import Sessions
+from hmi.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
 from station.settings.configuration import Configuration

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from markupsafe import Markup, escape
 
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.channel.panel_live import Fruit, FruitShort
 
 WIDTH, HEIGHT = 360, 290

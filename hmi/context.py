@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from hmi.assets import Assets
 from hmi.gateway import Gateway
 from hmi.live import Live
-from hmi.people_file import UserStore
-from hmi.pin_limit import LoginRateLimiter
+from hmi.login_limiter import LoginRateLimiter
 from hmi.render import Renderer
 from hmi.sessions import Sessions
+from hmi.user_store import UserStore
 from station.settings.hmi import HmiSettings
 
 

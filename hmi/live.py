@@ -12,7 +12,7 @@ from hmi.gateway import Gateway
 from hmi.render import Renderer
 from hmi.roles import RIGHTS, Right, Role
 from hmi.sessions import Caller
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.settings.hmi import Language
 
 BEAT_S = 0.5

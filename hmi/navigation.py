@@ -9,7 +9,7 @@ from typing import NamedTuple
 from hmi.live import Part
 
 PAGES = (
-    "hmi.pages.frame",
+    "hmi.pages.layout",
     "hmi.pages.run",
     "hmi.pages.change",
     "hmi.pages.recipes",

@@ -11,7 +11,7 @@ from hmi.access import SESSION_COOKIE, caller_of, hmi_of, locale_of
 from hmi.context import Hmi
 from hmi.navigation import entries
 from hmi.roles import Right, Role
-from hmi.words import Locale
+from hmi.translation import Locale
 
 FRAME_PARTS = ("frame.alarm", "frame.state")
 """On every page."""

@@ -7,7 +7,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hmi.assets import Assets
-from hmi.words import Locale
+from hmi.translation import Locale
 
 
 class Renderer:

@@ -13,7 +13,7 @@ from hmi.navigation import Entry
 from hmi.page import go_to, show
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.channel.line import CommandDone
 from station.channel.messages import Message, RefusedError
 from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm

@@ -16,7 +16,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import NO_VALUE, Locale
+from hmi.translation import NO_VALUE, Locale
 from station.channel.panel_live import AskRecipes, OrderName, OrderShown, PanelOrder, Recipes, RecipeShown
 from station.settings.recipe import Recipe
 

@@ -19,7 +19,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
 from station.channel.panel_live import OrderName, OrderShown, PanelOrder
 from station.channel.panel_maintenance_queries import (

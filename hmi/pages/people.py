@@ -11,10 +11,10 @@ from hmi.context import Hmi
 from hmi.gateway import actor_of
 from hmi.navigation import Entry
 from hmi.page import give_session, go_to, show
-from hmi.people_file import UserStoreError, least_digits
 from hmi.problem import Problem
 from hmi.roles import Right, Role
 from hmi.sessions import Caller
+from hmi.user_store import UserStoreError, least_digits
 from station.channel.panel_live import PersonNoted
 
 router = APIRouter()

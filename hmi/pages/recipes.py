@@ -17,7 +17,7 @@ from hmi.problem import Problem
 from hmi.recipe_form import BadFieldError, Group, changed, formatted, groups, with_changes
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.channel.messages import RefusedError
 from station.channel.panel_queries import JobTold
 from station.channel.panel_recipe_queries import (

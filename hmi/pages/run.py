@@ -17,7 +17,7 @@ from hmi.page import go_to, show
 from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
-from hmi.words import Locale
+from hmi.translation import Locale
 from station.channel.messages import RefusedError
 from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hmi import charts
 from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import field_keys, groups
-from hmi.words import FOLDER, NO_VALUE, Locale, catalogue, preferred
+from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, preferred
 from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault

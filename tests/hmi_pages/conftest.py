@@ -25,8 +25,8 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from hmi.api_tokens import ApiTokens
-from hmi.people_file import UserStore
 from hmi.roles import Role
+from hmi.user_store import UserStore
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,

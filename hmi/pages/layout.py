@@ -11,7 +11,7 @@ from hmi.gateway import Gateway
 from hmi.live import Part
 from hmi.page import go_to
 from hmi.problem import Problem
-from hmi.words import Locale
+from hmi.translation import Locale
 
 router = APIRouter()
 MOST_PARTS = 20
@@ -39,8 +39,8 @@ def _state_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
 
 
 PARTS = {
-    "frame.alarm": Part("frame_alarm.html.j2", _alarms, _alarm_values),
-    "frame.state": Part("frame_state.html.j2", _state, _state_values),
+    "frame.alarm": Part("layout_alarm.html.j2", _alarms, _alarm_values),
+    "frame.state": Part("layout_state.html.j2", _state, _state_values),
 }
 
 
