@@ -10,13 +10,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from installer import precautions, rolling_back
-from installer.installing import Installation
+from installer import preflight, rollback
+from installer.installation import Installation
 from installer.layout import Layout
+from installer.messages import Failed, Refused, print_progress
 from installer.release import Packages, Source
 from installer.services import ScratchRoot, Services, Systemd
-from installer.undoing import installed, uninstall
-from installer.words import Failed, Refused, print_progress
+from installer.uninstall import installed, uninstall
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -71,7 +71,7 @@ def _act(chosen: argparse.Namespace, layout: Layout, services: Services) -> None
     if chosen.purge and not chosen.undo:
         raise Refused("--purge goes with --undo")
     if chosen.undo:
-        precautions.check_machine(layout)
+        preflight.check_machine(layout)
         if chosen.dry_run:
             kept = "" if chosen.purge else "; configuration, records, copies and user are kept"
             print_progress(f"would stop the station and take away what was installed{kept}")
@@ -95,14 +95,14 @@ def _act(chosen: argparse.Namespace, layout: Layout, services: Services) -> None
 
 
 def _roll_back(chosen: argparse.Namespace, layout: Layout, services: Services) -> None:
-    precautions.check_machine(layout)
-    rolling_back.check(layout)
+    preflight.check_machine(layout)
+    rollback.check(layout)
     if not chosen.during_lot:
-        precautions.check_no_lot(layout, layout.current)
+        preflight.check_no_lot(layout, layout.current)
     if chosen.dry_run:
         print_progress(f"would go back to {layout.previous.resolve().name}")
     else:
-        rolling_back.roll_back(layout, services)
+        rollback.roll_back(layout, services)
 
 
 @contextlib.contextmanager

@@ -5,8 +5,8 @@ import tempfile
 from pathlib import Path
 
 from installer.layout import Layout
+from installer.messages import Failed, Refused, print_progress
 from installer.programs import run
-from installer.words import Failed, Refused, print_progress
 
 
 def try_with(layout: Layout, release: Path) -> tuple[str, ...]:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from installer.layout import Layout
+from installer.messages import Failed
 from installer.programs import station
-from installer.words import Failed
 
 LIMIT_S = 120.0
 _ASK_S = 3.0

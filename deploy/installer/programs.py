@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from installer.layout import NAME, Layout
-from installer.words import Failed
+from installer.messages import Failed
 
 LONG_S = 4 * 3600.0
 _LINES = 12

@@ -11,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 
 from installer.layout import Layout, read_note, write_note
+from installer.messages import Refused, print_progress
 from installer.programs import LONG_S, run
-from installer.words import Refused, print_progress
 
 LOCKS = ("requirements-build.lock", "requirements.lock")
 PACKAGES = ("station", "plc_interface", "hmi", "recipes")

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from installer.layout import NAME, TIMER, UNIT, Layout
+from installer.messages import Failed, print_progress
 from installer.programs import run
-from installer.words import Failed, print_progress
 
 START_LIMIT_S = 200.0
 STOP_LIMIT_S = 200.0

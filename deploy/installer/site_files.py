@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 from installer.layout import NAME, Layout, read_note, write_note
+from installer.messages import print_progress
 from installer.programs import own
-from installer.words import print_progress
 
 PLACES = {
     "systemd": "/etc/systemd/system",

@@ -170,7 +170,7 @@ class StandIn:
     """Starts the unit's program of a scratch root and listens to it, as systemd does with `Type=notify`."""
 
     def __init__(self, installer: Callable[[str], Any], folder: Path) -> None:
-        self.failed = installer("words").Failed
+        self.failed = installer("messages").Failed
         self.layout = installer("layout").Layout(folder)
         self.heard: list[str] = []
         self.process: subprocess.Popen[bytes] | None = None

@@ -51,8 +51,8 @@ def test_all_that_cannot_be_made_again_is_copied_and_the_oldest_goes(root, insta
     assert not (newest / "state/run").exists()
     assert json.loads((newest / "records/backup.json").read_text())["sequence"] == 41
     assert (
-        installer("copies").schema_version(newest / "records")
-        == installer("copies").schema_version(installed.home / "records")
+        installer("backup").schema_version(newest / "records")
+        == installer("backup").schema_version(installed.home / "records")
         != ""
     )
 

@@ -91,8 +91,8 @@ def test_what_cannot_be_done_is_refused_in_words(tmp_path, install, arguments, w
 
 
 def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, monkeypatch):
-    refused = installer("words").Refused
-    checks, layout = installer("precautions"), installer("layout").Layout
+    refused = installer("messages").Refused
+    checks, layout = installer("preflight"), installer("layout").Layout
     with monkeypatch.context() as patch:
         patch.setattr(checks.os, "geteuid", lambda: 1000)
         with pytest.raises(refused, match="sudo deploy/install"):
@@ -113,7 +113,7 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
 
 
 def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monkeypatch):
-    checks, layout = installer("precautions"), installer("layout").Layout(tmp_path)
+    checks, layout = installer("preflight"), installer("layout").Layout(tmp_path)
     checks.check_no_lot(layout, tmp_path)  # nothing was ever recorded
     (layout.home / "records").mkdir(parents=True)
     (layout.home / "records/records.sqlite3").touch()
@@ -121,7 +121,7 @@ def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monke
     monkeypatch.setattr(checks, "station", lambda *words: "\n".join(rows) if "--from" in words else "A-16: M, ended")
     checks.check_no_lot(layout, tmp_path)
     rows.append("4711    2026-06-30")
-    with pytest.raises(installer("words").Refused, match="inspected within the last 10 minutes: stop the line"):
+    with pytest.raises(installer("messages").Refused, match="inspected within the last 10 minutes: stop the line"):
         checks.check_no_lot(layout, tmp_path)
 
 

@@ -19,7 +19,7 @@ def installation(installer, sources, environment):
     def make(layout, services, version):
         what = installer("release").Source(sources[version])
         packages = installer("release").Packages(environment=environment)
-        return installer("installing").Installation(layout, services, what, packages, limit_s=200.0)
+        return installer("installation").Installation(layout, services, what, packages, limit_s=200.0)
 
     return make
 
@@ -32,7 +32,7 @@ def form_of(layout):
 def test_a_running_station_is_upgraded_or_left_as_it_was(
     stand_in, installer, installation, install, unused_ports, sources
 ):
-    refused, failed = installer("words").Refused, installer("words").Failed
+    refused, failed = installer("messages").Refused, installer("messages").Failed
     layout, settings = stand_in.layout, stand_in.layout.configuration
     modbus, hmi, metrics = unused_ports(3)
     settings.parent.mkdir(parents=True)
@@ -144,6 +144,6 @@ def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
         wanted = wanted or tree
         assert tree == wanted, f"after {done} steps"
         assert layout.configuration.read_text() == "# new\n"
-        installer("rolling_back").roll_back(layout, services(layout))
+        installer("rollback").roll_back(layout, services(layout))
         assert layout.configuration.read_text() == "# old\n", f"after {done} steps, and back"
         assert layouts.target(layout.current).name.startswith("0.1.0+")

@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from installer.layout import Layout
+from installer.messages import print_progress
 from installer.programs import LONG_S, own, station
-from installer.words import print_progress
 
 LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs"})
 """Of the home folder: the records are copied by the station itself, the rest is of the moment."""

@@ -4,13 +4,13 @@ import shutil
 from collections.abc import Callable
 from typing import NamedTuple
 
-from installer import configuration, copies, precautions, site_files
+from installer import backup, configuration, preflight, site_files
 from installer.health import LIMIT_S, ready, wait_until_well
 from installer.layout import Layout, point, read_note, target, write_note
+from installer.messages import Failed, print_progress
 from installer.release import STAMP, Packages, Source, complete, make
-from installer.rolling_back import roll_back
+from installer.rollback import roll_back
 from installer.services import Services
-from installer.words import Failed, print_progress
 
 BEFORE = "before-upgrade-"
 _COPIES_KEPT = 3
@@ -58,12 +58,12 @@ class Installation:
         Raises:
             Refused: it cannot be done.
         """
-        precautions.check_machine(self._layout)
+        preflight.check_machine(self._layout)
         self._source.check()
         if not complete(self.release):
-            precautions.check_disk_space(self._layout)
+            preflight.check_disk_space(self._layout)
         if self.is_upgrade and self._old is not None and not during_lot:
-            precautions.check_no_lot(self._layout, self._old)
+            preflight.check_no_lot(self._layout, self._old)
 
     def steps(self) -> list[Step]:
         """Return the steps in order. Each may be repeated; together they lead to the goal from any state between."""
@@ -120,8 +120,8 @@ class Installation:
     def _make_backup(self) -> None:
         assert self._old is not None  # noqa: S101 (an upgrade has one)
         self._was_ready = self._services.running() and ready(self._layout, self._old)
-        copy = copies.make_backup(self._layout, self._old, BEFORE)
-        copies.prune(self._layout, BEFORE, _COPIES_KEPT)
+        copy = backup.make_backup(self._layout, self._old, BEFORE)
+        backup.prune(self._layout, BEFORE, _COPIES_KEPT)
         note = {"from": self._old.name, "to": self.release.name}
         before = read_note(self._layout.upgrade)
         # An interrupted upgrade has perhaps changed the file already: what it was before is in the earlier note.

@@ -8,9 +8,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from installer.layout import Layout
+from installer.messages import Failed, Refused
 from installer.programs import station
 from installer.release import ROOM_BYTES
-from installer.words import Failed, Refused
 
 QUIET = timedelta(minutes=10)
 _PROGRAMS = {"runuser": "util-linux", "systemctl": "systemd", "systemd-sysusers": "systemd", "userdel": "passwd"}

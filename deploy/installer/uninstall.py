@@ -4,8 +4,8 @@ import shutil
 
 from installer import site_files
 from installer.layout import NAME, Layout, read_note
+from installer.messages import print_progress
 from installer.services import Services
-from installer.words import print_progress
 
 
 def installed(layout: Layout) -> bool:

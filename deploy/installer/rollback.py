@@ -2,13 +2,13 @@
 
 import shutil
 
-from installer import copies, site_files
+from installer import backup, site_files
 from installer.health import LIMIT_S, wait_until_well
 from installer.layout import Layout, point, read_note, target
+from installer.messages import Refused, print_progress
 from installer.programs import own, station
 from installer.release import STAMP, complete
 from installer.services import Services
-from installer.words import Refused, print_progress
 
 
 def check(layout: Layout) -> None:
@@ -45,12 +45,12 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
         layout.configuration.write_text(note["configuration"], encoding="utf-8")
         own(layout, layout.configuration, "root", "fruit-station")
         print_progress(f"{layout.configuration} is as before the upgrade")
-    if (copy / copies.RECORDS).is_dir() and copies.schema_version(
-        layout.home / copies.RECORDS
-    ) != copies.schema_version(copy / copies.RECORDS):
-        station(layout, old, "records", "restore", copy / copies.RECORDS, limit_s=4 * 3600.0)
+    if (copy / backup.RECORDS).is_dir() and backup.schema_version(
+        layout.home / backup.RECORDS
+    ) != backup.schema_version(copy / backup.RECORDS):
+        station(layout, old, "records", "restore", copy / backup.RECORDS, limit_s=4 * 3600.0)
         print_progress(
-            f"the records are as before the upgrade; what came since is in {layout.home / copies.RECORDS / 'aside'}"
+            f"the records are as before the upgrade; what came since is in {layout.home / backup.RECORDS / 'aside'}"
         )
     site_files.put(layout, old)
     point(layout.current, old)
