@@ -1,13 +1,13 @@
-// The number pad, and the cleaning lock, which ends by itself.
+// The keypad, and the cleaning lock, which ends by itself.
 "use strict";
 
 (() => {
-  for (const pad of document.querySelectorAll("[data-pad]")) {
-    const form = pad.closest("form");
+  for (const keypad of document.querySelectorAll("[data-keypad]")) {
+    const form = keypad.closest("form");
     const fields = [...form.querySelectorAll(".pin")];
     let field = fields[0];
     fields.forEach((each) => each.addEventListener("focus", () => (field = each)));
-    pad.addEventListener("click", (event) => {
+    keypad.addEventListener("click", (event) => {
       const button = event.target.closest("button");
       if (!button) {
         return;
