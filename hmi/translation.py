@@ -1,4 +1,4 @@
-"""Translation: message catalogues of the folder `words`, one file for each page and language."""
+"""Translation: message catalogues of the folder `locale`, one file for each page and language."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from station.settings.hmi import Language
 
-FOLDER = Path(__file__).with_name("words")
+FOLDER = Path(__file__).with_name("locale")
 SOURCE: Language = "en"
 _DECIMAL = {"en": ".", "de": ",", "es": ","}
 _NUMBER = re.compile(r"(?<![\w.])([0-9]+)\.([0-9]+)(?![\w.])")

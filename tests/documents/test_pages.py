@@ -47,7 +47,7 @@ def test_the_operators_guide_shows_screens(pages):
     ("name", "language"), [("operator.md", "en"), ("operator.de.md", "de"), ("operator.es.md", "es")]
 )
 def test_what_the_operators_guide_calls_a_button_is_written_on_the_panel(pages, root, name, language):
-    files = (root / "hmi" / "words" / language).glob("*.json")
+    files = (root / "hmi" / "locale" / language).glob("*.json")
     words = {text for file in files for text in json.loads(file.read_text("utf-8")).values()}
     beginnings = {text.partition("{")[0] for text in words if "{" in text}
     named = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", pages[f"docs/{name}"].path.read_text("utf-8")))
