@@ -29,7 +29,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     CommandName,
@@ -192,7 +192,7 @@ async def inspect(configuration: Configuration) -> dict[str, Pace]:
             began_s = time.monotonic()
             length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
             trigger = Begin(trigger_id=number, encoder=0, lot="", fruit_length_mm_x10=length)
-            begun = await client.ask(trigger, Begun, deadline_s=5)
+            begun = await client.ask(trigger, BeginReply, deadline_s=5)
             if begun.sequence is None:
                 raise SystemExit(f"the station refuses: {begun.refusal}")
             outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)

@@ -10,17 +10,17 @@ from hmi.api_access import changer, reader
 from hmi.api_model import (
     Error,
     HealthAnswer,
+    InspectionDetails,
     InspectionList,
-    InspectionShort,
-    InspectionWhole,
+    InspectionSummary,
     LotAnswer,
     LotBegin,
     LotList,
     LotName,
     Part,
+    RecipeDetails,
     RecipeList,
-    RecipeShort,
-    RecipeWhole,
+    RecipeSummary,
 )
 from hmi.roles import Right
 from station.channel.messages import RefusedError
@@ -31,14 +31,14 @@ from station.channel.panel_queries import (
     FindInspections,
     GetInspection,
     InspectionPage,
-    InspectionTold,
+    InspectionView,
     ListLots,
     Lots,
-    LotTold,
+    LotView,
     Search,
     StartLot,
 )
-from station.channel.panel_recipe_queries import GetRecipe, ListRecipes, RecipeRow, Recipes, RecipeTold
+from station.channel.panel_recipe_queries import GetRecipe, ListRecipes, RecipeRow, Recipes, RecipeView
 from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True
@@ -103,28 +103,28 @@ async def inspections(
     )
     asked = FindInspections(search=search, limit=limit, below=below)
     page = await hmi.gateway.ask(asked, InspectionPage, deadline_s=DEADLINE_S)
-    return InspectionList(inspections=[InspectionShort.of(row) for row in page.rows], below=page.below)
+    return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
 
 
 @router.get("/inspections/{sequence}", tags=["results"], responses=_NOT_FOUND)
-async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionWhole:
+async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDetails:
     """One inspection with its curve."""
     try:
-        reply = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
+        reply = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
     except RefusedError as error:
         raise HTTPException(404, str(error)) from error
-    return InspectionWhole.of(reply)
+    return InspectionDetails.of(reply)
 
 
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
     """The state of every recipe."""
     reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    return RecipeList(recipes=[RecipeShort(**_short(row)) for row in reply.rows])
+    return RecipeList(recipes=[RecipeSummary(**_short(row)) for row in reply.rows])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
-async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
+async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     """One recipe, with the values in force."""
     reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     row = next((each for each in reply.rows if each.name == name), None)
@@ -133,8 +133,8 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeWhole:
     values = None
     if row.in_force is not None:
         asked = GetRecipe(name=name, revision=row.in_force)
-        values = (await hmi.gateway.ask(asked, RecipeTold, deadline_s=DEADLINE_S)).values
-    return RecipeWhole(**_short(row), values=values)
+        values = (await hmi.gateway.ask(asked, RecipeView, deadline_s=DEADLINE_S)).values
+    return RecipeDetails(**_short(row), values=values)
 
 
 @router.get("/lots", tags=["lots"])
@@ -157,7 +157,7 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     asked = StartLot(name=name, grower=begin.grower, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(asked, LotTold, deadline_s=DEADLINE_S))
+    return LotAnswer.of(await hmi.gateway.ask(asked, LotView, deadline_s=DEADLINE_S))
 
 
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
@@ -166,7 +166,7 @@ async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path(
     if not (await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
     asked = EndLot(name=name, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(asked, LotTold, deadline_s=DEADLINE_S))
+    return LotAnswer.of(await hmi.gateway.ask(asked, LotView, deadline_s=DEADLINE_S))
 
 
 def _short(row: RecipeRow) -> dict[str, Any]:

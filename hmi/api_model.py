@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from station.channel.panel_queries import InspectionRow, InspectionTold, LotTold
+from station.channel.panel_queries import InspectionRow, InspectionView, LotView
 from station.vocabulary import OutcomeName
 
 LotName = Annotated[str, Field(min_length=1, max_length=32, pattern=r"^[ -~]*[!-~][ -~]*$")]
@@ -46,7 +46,7 @@ class HealthAnswer(Model):
     versions: dict[str, str]
 
 
-class InspectionShort(Model):
+class InspectionSummary(Model):
     """One inspection in a list."""
 
     sequence: int = Field(description="The inspection's number; never given twice.")
@@ -60,7 +60,7 @@ class InspectionShort(Model):
     reasons: list[str] = Field(description="The first one decided; empty only for PASS.")
 
     @classmethod
-    def of(cls, row: InspectionRow) -> "InspectionShort":
+    def of(cls, row: InspectionRow) -> "InspectionSummary":
         """Convert the station's answer."""
         return cls(
             sequence=row.sequence,
@@ -78,7 +78,7 @@ class InspectionShort(Model):
 class InspectionList(Model):
     """Newest first."""
 
-    inspections: list[InspectionShort]
+    inspections: list[InspectionSummary]
     below: int | None = Field(description="Ask with it for the next page; null where this is the last.")
 
 
@@ -96,7 +96,7 @@ class Point(Model):
     changed_area_px: int | None = Field(default=None, description="The same.")
 
 
-class InspectionWhole(Model):
+class InspectionDetails(Model):
     """One inspection."""
 
     sequence: int
@@ -130,7 +130,7 @@ class InspectionWhole(Model):
     size_class: int | None = Field(description="Likewise.")
 
     @classmethod
-    def of(cls, reply: InspectionTold) -> "InspectionWhole":
+    def of(cls, reply: InspectionView) -> "InspectionDetails":
         """Convert the station's answer."""
         standing = reply.standing
         return cls(
@@ -164,7 +164,7 @@ class InspectionWhole(Model):
         )
 
 
-class RecipeShort(Model):
+class RecipeSummary(Model):
     """The state of one recipe."""
 
     name: str
@@ -177,10 +177,10 @@ class RecipeShort(Model):
 class RecipeList(Model):
     """By name."""
 
-    recipes: list[RecipeShort]
+    recipes: list[RecipeSummary]
 
 
-class RecipeWhole(RecipeShort):
+class RecipeDetails(RecipeSummary):
     """A recipe in force, with its values."""
 
     values: dict[str, Any] | None = Field(description="As its JSON Schema has them; null where none is in force.")
@@ -195,7 +195,7 @@ class LotAnswer(Model):
     ended: datetime | None = Field(description="Null while it runs.")
 
     @classmethod
-    def of(cls, reply: LotTold) -> "LotAnswer":
+    def of(cls, reply: LotView) -> "LotAnswer":
         """Convert the station's answer."""
         ended = None if reply.ended_utc_ms is None else moment(reply.ended_utc_ms)
         return cls(name=reply.name, grower=reply.grower, began=moment(reply.began_utc_ms), ended=ended)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from markupsafe import Markup, escape
 
 from hmi.translation import Locale
-from station.channel.panel_live import Fruit, FruitShort
+from station.channel.panel_live import Fruit, FruitSummary
 
 WIDTH, HEIGHT = 360, 290
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46, 12, 16, 44
@@ -66,7 +66,7 @@ def curve(fruit: Fruit, locale: Locale) -> Markup:
     return _svg(WIDTH, HEIGHT, label, "".join(parts) + texts)
 
 
-def trend(fruit: Sequence[FruitShort], locale: Locale) -> Markup:
+def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
     """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
     width, height, left, low = 300, 118, 46, 92

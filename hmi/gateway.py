@@ -11,7 +11,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import Noted
 from station.channel.messages import ChannelError, DeadlineError, Message, RefusedError
 from station.channel.panel import Actor
-from station.channel.panel_live import AskFruit, AskPanel, AskRecent, Fruit, PanelState, PersonNoted, Recent
+from station.channel.panel_live import Fruit, GetFruit, GetPanelState, GetRecent, PanelState, PersonNoted, Recent
 from station.errors import StationError
 
 ReplyT = TypeVar("ReplyT", bound=Message)
@@ -101,9 +101,9 @@ class Gateway:
         while True:
             began_s = time.monotonic()
             with contextlib.suppress(ChannelError):
-                state = await self.ask(AskPanel(), PanelState, deadline_s=_POLL_DEADLINE_S)
+                state = await self.ask(GetPanelState(), PanelState, deadline_s=_POLL_DEADLINE_S)
                 if (newest := (state.boot, state.last_sequence)) != self._known:
-                    self.recent = await self.ask(AskRecent(most=200), Recent)
+                    self.recent = await self.ask(GetRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()
             polled, self._polled = self._polled, asyncio.Event()
@@ -115,7 +115,7 @@ class Gateway:
         if sequence is None:
             return None
         with contextlib.suppress(RefusedError):
-            return await self.ask(AskFruit(sequence=sequence), Fruit)
+            return await self.ask(GetFruit(sequence=sequence), Fruit)
         return None
 
 

@@ -4,19 +4,19 @@ from collections.abc import Callable
 
 from plc_interface.register import Access, Register
 from plc_interface.register_map import REGISTERS
-from station.channel.line import RegisterTold
+from station.channel.line import RegisterView
 
 Value = int | float | str | None
 
 
-def formatted_registers(value: Callable[[str], Value]) -> tuple[RegisterTold, ...]:
+def formatted_registers(value: Callable[[str], Value]) -> tuple[RegisterView, ...]:
     """Return every register of the map with its formatted value, in the order of the addresses.
 
     Args:
         value: returns a register's value by its name; None if there is none.
     """
     return tuple(
-        RegisterTold(
+        RegisterView(
             name=register.name,
             address=register.address,
             value=_formatted(register, value(register.name)),

@@ -14,7 +14,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     Line,
@@ -129,7 +129,7 @@ class StationLink:
             size_class=action.size_class,
         )
         try:
-            begun = await self._client.ask(request, Begun, deadline_s=self._settings.begin_deadline_s)
+            begun = await self._client.ask(request, BeginReply, deadline_s=self._settings.begin_deadline_s)
         except ChannelError as error:
             log.warning("%s", error)
             self._feed(ev.BeginFailed(now(), action.number))

@@ -17,7 +17,7 @@ from hmi.translation import Locale
 from station.channel.line import CommandDone
 from station.channel.messages import Message, RefusedError
 from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
-from station.channel.panel_live import AlarmHistory, AskAlarmHistory
+from station.channel.panel_live import AlarmHistory, GetAlarmHistory
 
 router = APIRouter()
 ENTRY = Entry("alarms", "/alarms")
@@ -55,7 +55,7 @@ async def alarms(request: Request) -> Response:
 @router.get("/alarms/history")
 async def history(request: Request, hmi: HmiNow) -> Response:
     """Show recent changes of alarms."""
-    found = await hmi.gateway.ask(AskAlarmHistory(most=_LAST), AlarmHistory)
+    found = await hmi.gateway.ask(GetAlarmHistory(most=_LAST), AlarmHistory)
     return show(request, "alarms_history.html.j2", changes=found.changes)
 
 

@@ -17,7 +17,14 @@ from hmi.problem import Problem
 from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.translation import NO_VALUE, Locale
-from station.channel.panel_live import AskRecipes, OrderName, OrderShown, PanelOrder, Recipes, RecipeShown
+from station.channel.panel_live import (
+    GetRecipes,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    Recipes,
+    RecipeSummary,
+)
 from station.settings.recipe import Recipe
 
 router = APIRouter()
@@ -45,7 +52,11 @@ def _order(gateway: Gateway) -> object:
 
 def _order_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
-    order = next((each for each in state.orders if each.order is OrderName.CHOOSE_RECIPE), None) if state else None
+    order = (
+        next((each for each in state.orders if each.order is OperatorCommandName.CHOOSE_RECIPE), None)
+        if state
+        else None
+    )
     return {"state": state, "order": order}
 
 
@@ -55,7 +66,7 @@ PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
 @router.get("/change")
 async def change(request: Request, hmi: HmiNow) -> Response:
     """Show the fruit to select from."""
-    found = await hmi.gateway.ask(AskRecipes(), Recipes)
+    found = await hmi.gateway.ask(GetRecipes(), Recipes)
     return show(request, "change.html.j2", recipes=found.recipes, active=found.active, problems=found.problems)
 
 
@@ -70,7 +81,7 @@ async def confirm(
     request: Request, hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]
 ) -> Response:
     """Show the differences from the active recipe."""
-    found = await hmi.gateway.ask(AskRecipes(), Recipes)
+    found = await hmi.gateway.ask(GetRecipes(), Recipes)
     chosen = next((each for each in found.recipes if each.number == number), None)
     if chosen is None:
         raise Problem(404, "change.gone")
@@ -90,12 +101,12 @@ async def carry_out(
     number: Annotated[int, Form(ge=1, le=65_535)],
 ) -> Response:
     """Change the fruit in the same way as the PLC's command."""
-    request = PanelOrder(person=actor_of(caller), order=OrderName.CHOOSE_RECIPE, argument=str(number))
-    await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
+    request = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.CHOOSE_RECIPE, argument=str(number))
+    await hmi.gateway.ask(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
     return go_to("/change/progress")
 
 
-def changes(now: RecipeShown | None, then: RecipeShown, locale: Locale) -> list[Change]:
+def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> list[Change]:
     """Return the differences that matter at the line; all values if no recipe is active.
 
     Args:
@@ -108,7 +119,7 @@ def changes(now: RecipeShown | None, then: RecipeShown, locale: Locale) -> list[
     return [line for line in lines if line.now != line.then]
 
 
-def _values(shown: RecipeShown, w: Locale) -> dict[str, str]:
+def _values(shown: RecipeSummary, w: Locale) -> dict[str, str]:
     try:
         recipe = Recipe.model_validate_json(json.dumps(json.loads(shown.values)))
     except (ValueError, ValidationError):  # of another form of the program

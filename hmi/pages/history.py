@@ -24,8 +24,8 @@ from station.channel.panel_queries import (
     GetInspection,
     GetStages,
     InspectionPage,
-    InspectionTold,
-    JobTold,
+    InspectionView,
+    JobView,
     Picture,
     ReadAudit,
     Search,
@@ -125,7 +125,7 @@ async def export(
     if wanted is None:
         raise Problem(400, "problem.bad_form")
     asked = StartExport(search=wanted, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(asked, JobTold, deadline_s=DEADLINE_S)
+    job = await hmi.gateway.ask(asked, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
@@ -138,7 +138,7 @@ async def report(
 ) -> Response:
     """Start a lot's report."""
     asked = StartLotReport(lot=lot, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(asked, JobTold, deadline_s=DEADLINE_S)
+    job = await hmi.gateway.ask(asked, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
@@ -220,13 +220,13 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
     return reply
 
 
-async def _inspection(hmi: Hmi, sequence: int) -> InspectionTold:
+async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
     if not 0 < sequence < 2**32:
         raise Problem(404, "problem.not_found")
-    return await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionTold, deadline_s=DEADLINE_S)
+    return await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
 
 
-def _steps(reply: InspectionTold) -> list[dict[str, Any]]:
+def _steps(reply: InspectionView) -> list[dict[str, Any]]:
     """Return every point of the curve, with its image and mask where these are stored."""
     kept = {(each.kind, each.step): each for each in reply.images if each.there}
     return [
@@ -235,7 +235,7 @@ def _steps(reply: InspectionTold) -> list[dict[str, Any]]:
     ]
 
 
-def _drawn(reply: InspectionTold) -> dict[str, Any] | None:
+def _drawn(reply: InspectionView) -> dict[str, Any] | None:
     """Return the curve with the limits of the recipe at that time."""
     points = [
         (point.closing_mm, point.area_mm2)

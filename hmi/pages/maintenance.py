@@ -21,27 +21,27 @@ from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
-from station.channel.panel_live import OrderName, OrderShown, PanelOrder
+from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
 from station.channel.panel_maintenance_queries import (
-    BallRunTold,
-    BeginBallRun,
+    CalibrationRunView,
     CalibrationState,
-    EndBallRun,
+    ContinueCalibrationRun,
+    EndCalibrationRun,
     GetCalibration,
     GetCalibrationPicture,
     GetHealth,
     GetLiveImage,
     GetRegisters,
-    GoOnBallRun,
     Health,
     Jogged,
     JogGripper,
-    Lit,
+    LedsSet,
     LiveImage,
     Log,
     ReadLog,
     Registers,
     SetLeds,
+    StartCalibrationRun,
 )
 from station.channel.panel_queries import Picture
 
@@ -88,8 +88,8 @@ async def hand(
 @router.post("/mode")
 async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
     """Set manual mode, in which no fruit is accepted, or production again."""
-    asked = PanelOrder(person=actor_of(caller), order=OrderName.SET_MODE, argument=mode)
-    shown = await hmi.gateway.ask(asked, OrderShown, deadline_s=DEADLINE_S)
+    asked = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
+    shown = await hmi.gateway.ask(asked, OperatorCommandView, deadline_s=DEADLINE_S)
     until_s = time.monotonic() + MODE_S
     while shown.state == "executing" and time.monotonic() < until_s:
         await asyncio.sleep(0.1)
@@ -121,7 +121,7 @@ async def jog(
 async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
     asked = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
-    await hmi.gateway.ask(asked, Lit, deadline_s=DEADLINE_S)
+    await hmi.gateway.ask(asked, LedsSet, deadline_s=DEADLINE_S)
     return go_to("/maintenance/hand?lit=yes")
 
 
@@ -184,22 +184,22 @@ async def begin(
     if len(parsed) > 6 or not all(parsed):
         raise Problem(400, "problem.bad_form")
     wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
-    asked = BeginBallRun(kind=kind, places=wanted, actor=actor_of(caller))
-    await hmi.gateway.ask(asked, BallRunTold, deadline_s=DEADLINE_S)
+    asked = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
+    await hmi.gateway.ask(asked, CalibrationRunView, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/go-on")
 async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
     """Confirm that the ball is in place."""
-    await hmi.gateway.ask(GoOnBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=DEADLINE_S)
+    await hmi.gateway.ask(ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/end")
 async def end(hmi: HmiNow, caller: Maintainer) -> Response:
     """Cancel the run."""
-    await hmi.gateway.ask(EndBallRun(actor=actor_of(caller)), BallRunTold, deadline_s=MOVE_DEADLINE_S)
+    await hmi.gateway.ask(EndCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=MOVE_DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 

@@ -19,7 +19,7 @@ from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.translation import Locale
 from station.channel.messages import RefusedError
-from station.channel.panel_queries import JobTold
+from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import (
     LARGEST_TEXT,
     ApproveRecipe,
@@ -38,7 +38,7 @@ from station.channel.panel_recipe_queries import (
     RecipeRow,
     Recipes,
     RecipeText,
-    RecipeTold,
+    RecipeView,
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
@@ -80,14 +80,14 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
 @router.get("/{name}/edit")
 async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show the form."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     return await _form(request, hmi, locale, reply, {}, "")
 
 
 @router.get("/{name}/chart")
 async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     typed: dict[str, Any] = {}
     for path, text in _typed(request.query_params).items():
         try:
@@ -106,7 +106,7 @@ async def save(
     """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     typed = _typed(texts)
     try:
         changes = changed(reply.values, typed)
@@ -173,7 +173,7 @@ async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the file's text, with its comments."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeTold, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeView, deadline_s=DEADLINE_S)
     return show(request, "recipe_text.html.j2", row=reply.row, text=reply.text, revision=revision, tab="text")
 
 
@@ -208,7 +208,7 @@ async def whatif(
 ) -> Response:
     """Judge the latest fruit again by the file as it is."""
     job = await hmi.gateway.ask(
-        StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobTold, deadline_s=DEADLINE_S
+        StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobView, deadline_s=DEADLINE_S
     )
     return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
 
@@ -222,7 +222,7 @@ async def _form(
     request: Request,
     hmi: Hmi,
     locale: Locale,
-    reply: RecipeTold,
+    reply: RecipeView,
     typed: Mapping[str, str],
     wrong: str,
     reason: str = "",
@@ -278,7 +278,7 @@ async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
     if revision is None:
         return None
     asked = GetRecipe(name=name, revision=revision)
-    return (await hmi.gateway.ask(asked, RecipeTold, deadline_s=DEADLINE_S)).values
+    return (await hmi.gateway.ask(asked, RecipeView, deadline_s=DEADLINE_S)).values
 
 
 async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:

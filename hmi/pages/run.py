@@ -19,7 +19,15 @@ from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.translation import Locale
 from station.channel.messages import RefusedError
-from station.channel.panel_live import AskFruit, AskPicture, Fruit, OrderName, OrderShown, PanelOrder, Picture
+from station.channel.panel_live import (
+    Fruit,
+    GetFruit,
+    GetPicture,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    Picture,
+)
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
@@ -27,7 +35,14 @@ SHOWN = 20
 ORDER_DEADLINE_S = 5.0
 _MOST_REASONS = 3
 _ORDERS = frozenset(
-    {OrderName.START, OrderName.STOP, OrderName.CALL_OFF, OrderName.RECOVER, OrderName.START_LOT, OrderName.END_LOT}
+    {
+        OperatorCommandName.START,
+        OperatorCommandName.STOP,
+        OperatorCommandName.CALL_OFF,
+        OperatorCommandName.RECOVER,
+        OperatorCommandName.START_LOT,
+        OperatorCommandName.END_LOT,
+    }
 )
 _KEPT_FOR_EVER = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
@@ -50,7 +65,7 @@ def _buttons(gateway: Gateway) -> object:
 
 
 def _buttons_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    return {"state": gateway.state, "OrderName": OrderName}
+    return {"state": gateway.state, "OperatorCommandName": OperatorCommandName}
 
 
 def _fruit(gateway: Gateway) -> object:
@@ -116,7 +131,7 @@ async def run(request: Request) -> Response:
 async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequence) -> Response:
     """Show one of the latest fruit; an older one is in the history."""
     try:
-        found = await hmi.gateway.ask(AskFruit(sequence=sequence), Fruit)
+        found = await hmi.gateway.ask(GetFruit(sequence=sequence), Fruit)
     except RefusedError:
         return go_to(f"/history/{sequence}")
     return show(request, "fruit.html.j2", **fruit_values(found, locale))
@@ -125,7 +140,7 @@ async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequ
 @router.get("/fruit/{sequence}/picture.svg")
 async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
     """Send a fruit's picture with the contact's outline; it never changes, so a browser fetches it once."""
-    found = await hmi.gateway.ask(AskPicture(sequence=sequence), Picture)
+    found = await hmi.gateway.ask(GetPicture(sequence=sequence), Picture)
     base64.b64decode(found.jpeg, validate=True)
     corners = " ".join(f"{x},{y}" for x, y in found.outline)
     size = f'width="{found.width_px}" height="{found.height_px}"'
@@ -146,15 +161,15 @@ async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
 async def order(
     hmi: HmiNow,
     caller: Annotated[Caller, Depends(orders(Right.RUN))],
-    order: Annotated[OrderName, Form()],
+    order: Annotated[OperatorCommandName, Form()],
     argument: Annotated[str, Form(max_length=64)] = "",
     grower: Annotated[str, Form(max_length=64)] = "",
 ) -> Response:
     """Start, stop, cancel, recover, or begin and end a lot; the page shows the result."""
     if order not in _ORDERS:
         raise Problem(400, "problem.bad_form")
-    request = PanelOrder(person=actor_of(caller), order=order, argument=argument, grower=grower)
-    await hmi.gateway.ask(request, OrderShown, deadline_s=ORDER_DEADLINE_S)
+    request = OperatorCommand(person=actor_of(caller), order=order, argument=argument, grower=grower)
+    await hmi.gateway.ask(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
     return go_to("/")
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from station.channel.line import Begun, Open, Outcome, StationState
+from station.channel.line import BeginReply, Open, Outcome, StationState
 
 
 class Moment(NamedTuple):
@@ -86,7 +86,7 @@ class BeginAnswered:
 
     at: Moment
     number: int
-    begun: Begun
+    begun: BeginReply
 
 
 @dataclass(frozen=True, slots=True)

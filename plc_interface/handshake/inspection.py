@@ -10,7 +10,7 @@ from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_oth
 from plc_interface.handshake.state import PendingTrigger
 from plc_interface.handshake.trigger import note_refusal
 from plc_interface.handshake.work import Work, row
-from station.channel.line import Begun, Reason, Refusal
+from station.channel.line import BeginReply, Reason, Refusal
 
 
 def request_begin(work: Work) -> None:
@@ -85,7 +85,7 @@ def unknown_run(pending: PendingTrigger, sequence: int, at: Moment) -> Running:
 def refuse_as_answered(work: Work) -> None:
     """Refuse with the station's reason."""
     event = work.event
-    begun = event.begun if isinstance(event, BeginAnswered) else Begun()
+    begun = event.begun if isinstance(event, BeginAnswered) else BeginReply()
     refuse_pending(work, begun.refusal or Refusal.NOT_READY)
     if begun.refusal is Refusal.BUSY:
         work.signals.append(Signal.STATION_BUSY)

@@ -33,7 +33,7 @@ class Outcome(Message):
     """The one outcome of an accepted trigger."""
 
     sequence: int = Field(ge=1, lt=2**32)
-    """The inspection's number, from `Begun`; never used twice, also over restarts and new databases."""
+    """The inspection's number, from `BeginReply`; never used twice, also over restarts and new databases."""
     trigger_id: int = Field(ge=1, le=65_535)
     outcome: OutcomeName
     reasons: tuple[Reason, ...]
@@ -78,7 +78,7 @@ class Begin(Message):
     """The grader's; 0 where none is given."""
 
 
-class Begun(Message):
+class BeginReply(Message):
     """The trigger is accepted, or it is refused and nothing was started."""
 
     sequence: int | None = Field(default=None, ge=1, lt=2**32)
@@ -124,7 +124,7 @@ class Open(Message):
     """Ended and not acknowledged, in order of sequence."""
 
 
-class RegisterTold(Message):
+class RegisterView(Message):
     """One register of the PLC's by its name, as text."""
 
     name: str
@@ -151,7 +151,7 @@ class Line(Message):
     """By name, as in the register map."""
     faults: tuple[str, ...]
     """Of the interface and the CAN node, one sentence each."""
-    registers: tuple[RegisterTold, ...] = ()
+    registers: tuple[RegisterView, ...] = ()
     """In the order of their addresses; only if requested by the station, once."""
 
 

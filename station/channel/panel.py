@@ -68,7 +68,7 @@ class AlarmList(Message):
     """For so long one can be shelved at most."""
 
 
-class OfAlarm(Message):
+class AlarmAction(Message):
     """Action of a person on one alarm; answered with `CommandDone`, and written to the audit trail."""
 
     alarm: str = Field(max_length=64)
@@ -79,13 +79,13 @@ class OfAlarm(Message):
     """In what capacity, as `operator`, `quality`, `service`."""
 
 
-class AcknowledgeAlarm(OfAlarm):
+class AcknowledgeAlarm(AlarmAction):
     """Acknowledge an alarm. Idempotent."""
 
     asked: ClassVar[str] = "to acknowledge an alarm"
 
 
-class ShelveAlarm(OfAlarm):
+class ShelveAlarm(AlarmAction):
     """Shelve an alarm, in the list and for the PLC; refused for a latched one and for one that is shelved."""
 
     asked: ClassVar[str] = "to shelve an alarm"
@@ -95,7 +95,7 @@ class ShelveAlarm(OfAlarm):
     """Duration, `AlarmList.longest_shelved_s` at most."""
 
 
-class UnshelveAlarm(OfAlarm):
+class UnshelveAlarm(AlarmAction):
     """Unshelve an alarm before its time is over. Idempotent."""
 
     asked: ClassVar[str] = "to show a shelved alarm again"

@@ -16,7 +16,7 @@ LONGEST_LOT = 32
 """As in the PLC's registers."""
 
 
-class OrderName(StrEnum):
+class OperatorCommandName(StrEnum):
     """Operator commands."""
 
     CHOOSE_RECIPE = "choose_recipe"
@@ -37,8 +37,8 @@ class OrderName(StrEnum):
     """The next fruit belongs to another lot, and gets the recipe that is then in force."""
 
 
-class PanelOrder(Message):
-    """Execute an operator command. Answered with `OrderShown`.
+class OperatorCommand(Message):
+    """Execute an operator command. Answered with `OperatorCommandView`.
 
     The answer holds the result, or for a command in progress its state so far; `PanelState` reports the rest. Not
     idempotent, except that a command in progress is not started twice.
@@ -46,18 +46,18 @@ class PanelOrder(Message):
 
     asked: ClassVar[str] = "to carry out an order"
     person: Actor
-    order: OrderName
+    order: OperatorCommandName
     argument: str = Field(default="", max_length=64)
     grower: str = Field(default="", max_length=64)
     """Of a lot that is started; may be empty."""
 
 
-class OrderShown(Message):
+class OperatorCommandView(Message):
     """An operator command, in progress or ended."""
 
     ticket: int
     """Rises by one with each order of this start of the station."""
-    order: OrderName
+    order: OperatorCommandName
     argument: str
     state: Literal["executing", "done", "failed"]
     why: str
@@ -78,13 +78,13 @@ class PersonNoted(Message):
     subject: str = Field(default="", max_length=200)
 
 
-class AskPanel(Message):
+class GetPanelState(Message):
     """Query the operator's summary. Answered with `PanelState`."""
 
     asked: ClassVar[str] = "for its state"
 
 
-class RecipeNamed(Message):
+class RecipeNames(Message):
     """Names of a recipe."""
 
     number: int
@@ -93,14 +93,14 @@ class RecipeNamed(Message):
     revision: str
 
 
-class RecipeShown(RecipeNamed):
+class RecipeSummary(RecipeNames):
     """Summary of a recipe in force."""
 
     values: str
     """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
 
 
-class DeviceShown(Message):
+class DeviceView(Message):
     """State of a device."""
 
     name: str
@@ -110,7 +110,7 @@ class DeviceShown(Message):
     """Since it was last found well; None where it never was."""
 
 
-class FruitShort(Message):
+class FruitSummary(Message):
     """One fruit's outcome in a list."""
 
     sequence: int
@@ -157,7 +157,7 @@ class PanelState(Message):
     stopping: bool
     """Stopped by a person: it accepts no trigger until it is started."""
     simulated: bool
-    recipe: RecipeNamed | None
+    recipe: RecipeNames | None
     lot: str | None
     """None before the first fruit of one."""
     named_lot: str
@@ -170,10 +170,10 @@ class PanelState(Message):
     """Why the check with the ball is required before any fruit; empty if it is not."""
     alarms: tuple[ListedAlarm, ...]
     """Those that are not normal, most urgent first; those that are shelved are among them."""
-    devices: tuple[DeviceShown, ...]
-    orders: tuple[OrderShown, ...]
+    devices: tuple[DeviceView, ...]
+    orders: tuple[OperatorCommandView, ...]
     """The last ones, newest first."""
-    may: tuple[OrderName, ...]
+    may: tuple[OperatorCommandName, ...]
     """Commands that would be accepted now."""
     recoveries: tuple[RecoveryName, ...]
     """Latched stops to recover from."""
@@ -184,7 +184,7 @@ class PanelState(Message):
     """The longest that an inspection may take by the active recipe and settings."""
 
 
-class AskRecent(Message):
+class GetRecent(Message):
     """Query the latest fruit. Answered with `Recent`."""
 
     asked: ClassVar[str] = "for the last fruit"
@@ -194,17 +194,17 @@ class AskRecent(Message):
 class Recent(Message):
     """Fruit, newest first."""
 
-    fruit: tuple[FruitShort, ...]
+    fruit: tuple[FruitSummary, ...]
 
 
-class AskFruit(Message):
+class GetFruit(Message):
     """Query one of the latest fruit in full. Answered with `Fruit`; refused if it is not among the latest any more."""
 
     asked: ClassVar[str] = "for a fruit"
     sequence: int = Field(ge=1, lt=2**32)
 
 
-class CurveShown(Message):
+class CurvePointSummary(Message):
     """A point of the area curve."""
 
     closing_mm: float
@@ -212,7 +212,7 @@ class CurveShown(Message):
     flagged: bool
 
 
-class LimitShown(Message):
+class LimitView(Message):
     """An area limit of the recipe."""
 
     closing_mm: float
@@ -223,14 +223,14 @@ class LimitShown(Message):
 class Fruit(Message):
     """One fruit in full."""
 
-    short: FruitShort
+    short: FruitSummary
     explanation: tuple[str, ...]
     """Sentences, English."""
     recipe_title: str
     revision: str
     onset_mm: float | None
-    curve: tuple[CurveShown, ...]
-    limits: tuple[LimitShown, ...]
+    curve: tuple[CurvePointSummary, ...]
+    limits: tuple[LimitView, ...]
     early_stop_mm2: float
     growth_mm2_per_mm: float
     """The largest of a good fruit."""
@@ -240,7 +240,7 @@ class Fruit(Message):
     """Of which step there is a picture; None for none."""
 
 
-class AskPicture(Message):
+class GetPicture(Message):
     """Query a fruit's picture. Answered with `Picture`; refused if it is not stored any more."""
 
     asked: ClassVar[str] = "for a picture"
@@ -258,7 +258,7 @@ class Picture(Message):
     """Corners of the contact's outer edge, x and y; empty where no contact was found."""
 
 
-class AskRecipes(Message):
+class GetRecipes(Message):
     """Query the recipes to select from. Answered with `Recipes`."""
 
     asked: ClassVar[str] = "for the recipes"
@@ -267,14 +267,14 @@ class AskRecipes(Message):
 class Recipes(Message):
     """Recipes in force, by their number."""
 
-    recipes: tuple[RecipeShown, ...]
-    active: RecipeShown | None
+    recipes: tuple[RecipeSummary, ...]
+    active: RecipeSummary | None
     """The recipe of the next fruit; during a lot it may be an older revision."""
     problems: tuple[str, ...]
     """Of the recipes' files."""
 
 
-class AskAlarmHistory(Message):
+class GetAlarmHistory(Message):
     """Query recent changes of alarms. Answered with `AlarmHistory`."""
 
     asked: ClassVar[str] = "for the alarms' history"

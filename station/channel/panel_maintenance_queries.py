@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
-from station.channel.line import RegisterTold
+from station.channel.line import RegisterView
 from station.channel.messages import Message
 from station.channel.panel import Actor
 from station.channel.panel_queries import Picture
@@ -74,7 +74,7 @@ class Jogged(Message):
 
 
 class SetLeds(Message):
-    """Set the sensor's light; in manual mode only. Answered with `Lit`."""
+    """Set the sensor's light; in manual mode only. Answered with `LedsSet`."""
 
     asked: ClassVar[str] = "to set the LEDs"
     red: int = Field(ge=0, le=15)
@@ -83,7 +83,7 @@ class SetLeds(Message):
     actor: Actor
 
 
-class Lit(Message):
+class LedsSet(Message):
     """The camera has accepted the light setting."""
 
 
@@ -125,7 +125,7 @@ class GetCalibration(Message):
     asked: ClassVar[str] = "for the calibration"
 
 
-class CheckTold(Message):
+class CheckView(Message):
     """One check of a calibration or verification."""
 
     name: str
@@ -135,7 +135,7 @@ class CheckTold(Message):
     remedy: str
 
 
-class CalibrationTold(Message):
+class CalibrationView(Message):
     """One calibration or verification."""
 
     serial: str
@@ -144,7 +144,7 @@ class CalibrationTold(Message):
     operator: str
     words: str
     passed: bool
-    checks: tuple[CheckTold, ...]
+    checks: tuple[CheckView, ...]
     pictures: tuple[str, ...]
     """Names of its plots, for `GetCalibrationPicture`."""
 
@@ -158,7 +158,7 @@ class RunStep(Message):
     detail: str
 
 
-class BallRunTold(Message):
+class CalibrationRunView(Message):
     """A calibration or verification, in progress or the last one."""
 
     kind: Literal["calibration", "verification"]
@@ -168,7 +168,7 @@ class BallRunTold(Message):
     """The person's next action; empty for none."""
     steps: tuple[RunStep, ...]
     """The last of each title."""
-    told: str
+    result: str
     """The result."""
 
 
@@ -178,15 +178,15 @@ class CalibrationState(Message):
     serial: str
     in_use: str
     """The scale as text."""
-    calibration: CalibrationTold | None
-    verification: CalibrationTold | None
+    calibration: CalibrationView | None
+    verification: CalibrationView | None
     age_s: float | None
     verification_age_s: float | None
     oldest_days: float
     verify_every_h: float | None
     trouble: str
     ball_mm: float
-    run: BallRunTold | None
+    run: CalibrationRunView | None
     run_refused: str
     """Why no run can start now."""
 
@@ -199,8 +199,8 @@ class GetCalibrationPicture(Message):
     name: str = Field(pattern=r"^(area|field|reference)\.png$")
 
 
-class BeginBallRun(Message):
-    """Calibrate or verify with the ball, in manual mode: the gripper closes on it. Answered with `BallRunTold`."""
+class StartCalibrationRun(Message):
+    """Calibrate or verify, in manual mode: the gripper closes on the ball. Answered with `CalibrationRunView`."""
 
     asked: ClassVar[str] = "to begin at the ball"
     kind: Literal["calibration", "verification"]
@@ -209,15 +209,15 @@ class BeginBallRun(Message):
     actor: Actor
 
 
-class GoOnBallRun(Message):
-    """Confirm that the ball is in place. Answered with `BallRunTold`."""
+class ContinueCalibrationRun(Message):
+    """Confirm that the ball is in place. Answered with `CalibrationRunView`."""
 
     asked: ClassVar[str] = "to go on at the ball"
     actor: Actor
 
 
-class EndBallRun(Message):
-    """Cancel the run; the jaws open. Idempotent; answered with `BallRunTold`."""
+class EndCalibrationRun(Message):
+    """Cancel the run; the jaws open. Idempotent; answered with `CalibrationRunView`."""
 
     asked: ClassVar[str] = "to call the run off"
     actor: Actor
@@ -232,7 +232,7 @@ class GetRegisters(Message):
 class Registers(Message):
     """All registers of the map, in the order of their addresses."""
 
-    registers: tuple[RegisterTold, ...]
+    registers: tuple[RegisterView, ...]
     age_s: float | None
     """Since the PLC interface sent them; None if it has not yet."""
 

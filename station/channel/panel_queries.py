@@ -78,7 +78,7 @@ class GetInspection(Message):
     sequence: Sequence
 
 
-class CurvePointTold(Message):
+class CurvePointView(Message):
     """One width step."""
 
     step: int
@@ -93,7 +93,7 @@ class CurvePointTold(Message):
     changed_area_px: int | None = None
 
 
-class ImageTold(Message):
+class ImageView(Message):
     """A stored image."""
 
     kind: Literal["reference", "step", "mask"]
@@ -103,7 +103,7 @@ class ImageTold(Message):
     """Whether its file still exists."""
 
 
-class InspectionTold(Message):
+class InspectionView(Message):
     """All data of one inspection."""
 
     sequence: int
@@ -118,7 +118,7 @@ class InspectionTold(Message):
     reasons: tuple[tuple[str, str], ...]
     """Of the final outcome: name and sentence."""
     explanation: tuple[str, ...]
-    curve: tuple[CurvePointTold, ...]
+    curve: tuple[CurvePointView, ...]
     recipe_name: str
     recipe_revision: str
     recipe_sha256: str
@@ -128,7 +128,7 @@ class InspectionTold(Message):
     measures: dict[str, float | int | str | bool | None]
     devices: dict[str, str]
     versions: dict[str, str]
-    images: tuple[ImageTold, ...]
+    images: tuple[ImageView, ...]
     images_state: str
     published_utc_ms: int | None
     acknowledged_utc_ms: int | None
@@ -176,7 +176,7 @@ class ListLots(Message):
     name: Annotated[str, Field(max_length=32)] | None = None
 
 
-class LotTold(Message):
+class LotView(Message):
     """One lot."""
 
     name: str
@@ -189,11 +189,11 @@ class LotTold(Message):
 class Lots(Message):
     """Newest first."""
 
-    lots: tuple[LotTold, ...]
+    lots: tuple[LotView, ...]
 
 
 class StartLot(Message):
-    """Begin a lot. Idempotent; answered with `LotTold`."""
+    """Begin a lot. Idempotent; answered with `LotView`."""
 
     asked: ClassVar[str] = "to begin a lot"
     name: str = Field(min_length=1, max_length=32)
@@ -202,7 +202,7 @@ class StartLot(Message):
 
 
 class EndLot(Message):
-    """End a lot. Idempotent; answered with `LotTold`."""
+    """End a lot. Idempotent; answered with `LotView`."""
 
     asked: ClassVar[str] = "to end a lot"
     name: str = Field(min_length=1, max_length=32)
@@ -220,7 +220,7 @@ class ReadAudit(Message):
     """With this text in their subject."""
 
 
-class AuditRowTold(Message):
+class AuditRowView(Message):
     """One row of the audit trail; `old` and `new` are JSON, shortened where they are long."""
 
     seq: int
@@ -237,7 +237,7 @@ class AuditRowTold(Message):
 class AuditRows(Message):
     """Newest first."""
 
-    rows: tuple[AuditRowTold, ...]
+    rows: tuple[AuditRowView, ...]
 
 
 class StartExport(Message):
@@ -258,7 +258,7 @@ class StartLotReport(Message):
     actor: Actor
 
 
-class AskJob(Message):
+class GetJob(Message):
     """Query the state of a job."""
 
     asked: ClassVar[str] = "for a job"
@@ -266,7 +266,7 @@ class AskJob(Message):
 
 
 class EndJob(Message):
-    """Cancel a job. Idempotent; answered with `JobTold`."""
+    """Cancel a job. Idempotent; answered with `JobView`."""
 
     asked: ClassVar[str] = "to call a job off"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
@@ -280,7 +280,7 @@ class JobFile(Message):
     media_type: str
 
 
-class JobTold(Message):
+class JobView(Message):
     """State of a job."""
 
     job: str
@@ -289,7 +289,7 @@ class JobTold(Message):
     done: int
     of: int
     """0 where it is not known."""
-    told: str
+    message: str
     """Its message: its last output if it failed."""
     files: tuple[JobFile, ...]
     """Once it is done."""

@@ -67,7 +67,7 @@ class GetRecipe(Message):
     """None for the file."""
 
 
-class RecipeTold(Message):
+class RecipeView(Message):
     """A recipe's text and values."""
 
     row: RecipeRow
@@ -92,7 +92,7 @@ class Change(Message):
     new: str
 
 
-class RevisionTold(Message):
+class RevisionView(Message):
     """One revision, with the differences from the one before it."""
 
     revision: int
@@ -114,7 +114,7 @@ class RevisionTold(Message):
 class RecipeHistory(Message):
     """Newest first."""
 
-    revisions: tuple[RevisionTold, ...]
+    revisions: tuple[RevisionView, ...]
     below: int | None
 
 

@@ -5,10 +5,10 @@ from datetime import UTC, datetime
 from station.channel.line import CommandDone
 from station.channel.panel import (
     AcknowledgeAlarm,
+    AlarmAction,
     AlarmList,
     ListAlarms,
     ListedAlarm,
-    OfAlarm,
     ShelveAlarm,
     UnshelveAlarm,
 )
@@ -89,7 +89,7 @@ class AlarmOrders:
         alarm, entry = self._taken(request, "unshelved")
         return self._done(self._desk.unshelve(alarm), entry)
 
-    def _taken(self, request: OfAlarm, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
+    def _taken(self, request: AlarmAction, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
         """The alarm, and the trail's row, which is checked before anything is done."""
         if request.alarm not in set(AlarmId):
             raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")

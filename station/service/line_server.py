@@ -4,7 +4,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     Line,
@@ -60,7 +60,7 @@ class LineServer:
         """Answer until cancelled."""
         await self._server.serve()
 
-    async def _begin(self, request: Begin) -> Begun:
+    async def _begin(self, request: Begin) -> BeginReply:
         refusal, _ = self._gate.refusal()
         lot = self._lots.of(request.lot)
         if refusal is None and not await self._lots.begin(lot):

@@ -5,7 +5,7 @@ import logging
 import time
 from typing import Any
 
-from station.channel.line import Command, CommandDone, CommandName, Line, RegisterTold
+from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
 from station.channel.panel import Recover
 from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
@@ -63,7 +63,7 @@ class Orders:
         """What a person does at the panel that needs the mode to stay as it is; empty for nothing."""
         self.registers_wanted = False
         """The PLC interface is to tell its registers with the next beat."""
-        self._registers: tuple[tuple[RegisterTold, ...], float] = ((), 0.0)
+        self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
         self._line: Line | None = None
         self._line_at_s: float | None = None
         self._turn = asyncio.Lock()
@@ -97,7 +97,7 @@ class Orders:
             self._metrics.heard("plc")
 
     @property
-    def registers(self) -> tuple[tuple[RegisterTold, ...], float]:
+    def registers(self) -> tuple[tuple[RegisterView, ...], float]:
         """The PLC's registers as they were told last, and the monotonic time of that; none and 0 before the first."""
         return self._registers
 

@@ -8,23 +8,23 @@ from station.channel.line import Noted
 from station.channel.panel_live import (
     AlarmChange,
     AlarmHistory,
-    AskAlarmHistory,
-    AskFruit,
-    AskPanel,
-    AskPicture,
-    AskRecent,
-    AskRecipes,
-    DeviceShown,
+    DeviceView,
     Fruit,
-    OrderShown,
-    PanelOrder,
+    GetAlarmHistory,
+    GetFruit,
+    GetPanelState,
+    GetPicture,
+    GetRecent,
+    GetRecipes,
+    OperatorCommand,
+    OperatorCommandView,
     PanelState,
     PersonNoted,
     Picture,
     Recent,
-    RecipeNamed,
+    RecipeNames,
     Recipes,
-    RecipeShown,
+    RecipeSummary,
 )
 from station.channel.server import Handlers
 from station.inspection.states import STATES
@@ -89,13 +89,13 @@ class Panel:
         self._heard_s: float | None = None
         service.ledger.on_told, service.on_published = self._memory.ended, self._memory.stands
         self.handlers: Handlers = {
-            AskPanel: self._state,
-            AskRecent: self._recent,
-            AskFruit: self._fruit,
-            AskPicture: self._picture,
-            AskRecipes: self._recipes,
-            AskAlarmHistory: self._alarm_history,
-            PanelOrder: self._order,
+            GetPanelState: self._state,
+            GetRecent: self._recent,
+            GetFruit: self._fruit,
+            GetPicture: self._picture,
+            GetRecipes: self._recipes,
+            GetAlarmHistory: self._alarm_history,
+            OperatorCommand: self._order,
             PersonNoted: self._person,
             **alarms.handlers,
         }
@@ -122,7 +122,7 @@ class Panel:
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
         return f"the pages' process has not asked for {age_s:.0f} s" if age_s > SILENT_S else ""
 
-    async def _state(self, _request: AskPanel) -> PanelState:
+    async def _state(self, _request: GetPanelState) -> PanelState:
         self._heard_s = time.monotonic()
         service, line = self._service, self._gate.state()
         facts, active = STATES[service.state], service.active
@@ -150,7 +150,7 @@ class Panel:
             check_due=self._calibrated.refusal(),
             alarms=self._alarms.standing(),
             devices=tuple(
-                DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
+                DeviceView(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
                 for name, watch in self._crew.watches.items()
             ),
             orders=self._orders.shown,
@@ -161,16 +161,16 @@ class Panel:
             deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
         )
 
-    async def _recent(self, request: AskRecent) -> Recent:
+    async def _recent(self, request: GetRecent) -> Recent:
         return Recent(fruit=self._memory.recent(request.most))
 
-    async def _fruit(self, request: AskFruit) -> Fruit:
+    async def _fruit(self, request: GetFruit) -> Fruit:
         return self._memory.fruit(request.sequence)
 
-    async def _picture(self, request: AskPicture) -> Picture:
+    async def _picture(self, request: GetPicture) -> Picture:
         return await self._memory.picture(request.sequence)
 
-    async def _recipes(self, _request: AskRecipes) -> Recipes:
+    async def _recipes(self, _request: GetRecipes) -> Recipes:
         found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
         active = self._service.active
         return Recipes(
@@ -179,7 +179,7 @@ class Panel:
             problems=self._book.problems,
         )
 
-    async def _alarm_history(self, request: AskAlarmHistory) -> AlarmHistory:
+    async def _alarm_history(self, request: GetAlarmHistory) -> AlarmHistory:
         rows = await self._records.alarm_log(request.most)
         return AlarmHistory(
             changes=tuple(
@@ -187,7 +187,7 @@ class Panel:
             )
         )
 
-    async def _order(self, request: PanelOrder) -> OrderShown:
+    async def _order(self, request: OperatorCommand) -> OperatorCommandView:
         return await self._orders.order(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
@@ -196,12 +196,12 @@ class Panel:
         return Noted()
 
 
-def _named(active: Active) -> RecipeNamed:
+def _named(active: Active) -> RecipeNames:
     recipe = active.recipe
-    return RecipeNamed(
+    return RecipeNames(
         number=recipe.plc_number, name=recipe.name, title=recipe.title, revision=active.snapshot.revision
     )
 
 
-def _shown(active: Active) -> RecipeShown:
-    return RecipeShown(**_named(active).model_dump(), values=active.snapshot.text)
+def _shown(active: Active) -> RecipeSummary:
+    return RecipeSummary(**_named(active).model_dump(), values=active.snapshot.text)

@@ -16,16 +16,16 @@ from station.calibration.verifying import Verified, Verifying
 from station.channel.messages import Message
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
-    BallRunTold,
-    BeginBallRun,
+    CalibrationRunView,
     CalibrationState,
-    CalibrationTold,
-    CheckTold,
-    EndBallRun,
+    CalibrationView,
+    CheckView,
+    ContinueCalibrationRun,
+    EndCalibrationRun,
     GetCalibration,
     GetCalibrationPicture,
-    GoOnBallRun,
     RunStep,
+    StartCalibrationRun,
 )
 from station.channel.panel_queries import Picture
 from station.channel.server import Handler
@@ -100,9 +100,9 @@ class PanelBall:
         return {
             GetCalibration: self.state,
             GetCalibrationPicture: self.picture,
-            BeginBallRun: self.begin,
-            GoOnBallRun: self.go_on,
-            EndBallRun: self.end,
+            StartCalibrationRun: self.begin,
+            ContinueCalibrationRun: self.go_on,
+            EndCalibrationRun: self.end,
         }
 
     async def close(self) -> None:
@@ -153,7 +153,7 @@ class PanelBall:
 
         return await self._worker.do(read)
 
-    async def begin(self, request: BeginBallRun) -> BallRunTold:
+    async def begin(self, request: StartCalibrationRun) -> CalibrationRunView:
         """Begin a run; the gripper closes on the ball."""
         if why := self._why_not(self._crew.cell.camera.description.serial):
             raise StationError(why)
@@ -164,7 +164,7 @@ class PanelBall:
         run.task = asyncio.create_task(self._carry_out(run, request), name=f"{request.kind} at the panel")
         return _told(run)
 
-    async def go_on(self, _request: GoOnBallRun) -> BallRunTold:
+    async def go_on(self, _request: ContinueCalibrationRun) -> CalibrationRunView:
         """The ball was laid."""
         run = self._run
         if run is None or run.state != "waiting":
@@ -173,7 +173,7 @@ class PanelBall:
         run.laid.set()
         return _told(run)
 
-    async def end(self, request: EndBallRun) -> BallRunTold:
+    async def end(self, request: EndCalibrationRun) -> CalibrationRunView:
         """Call the run off."""
         run = self._run
         if run is None:
@@ -190,7 +190,7 @@ class PanelBall:
             return "This camera is no sensor that could be calibrated."
         return self._refusal()
 
-    async def _carry_out(self, run: _Run, request: BeginBallRun) -> None:
+    async def _carry_out(self, run: _Run, request: StartCalibrationRun) -> None:
         try:
             words = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
         except asyncio.CancelledError:
@@ -207,7 +207,7 @@ class PanelBall:
             self._orders.kept_manual = ""
             self._crew.use(by_inspection=False)
 
-    async def _calibrate(self, run: _Run, request: BeginBallRun) -> str:
+    async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> str:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
         bench = BallBench(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         draft = await Calibrating(
@@ -281,8 +281,8 @@ class PanelBall:
         kind = self._run.kind if self._run is not None else "run"
         self._trail.note(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
 
-    def _calibration_told(self, made: Calibration) -> CalibrationTold:
-        return CalibrationTold(
+    def _calibration_told(self, made: Calibration) -> CalibrationView:
+        return CalibrationView(
             serial=made.serial,
             id=made.id,
             made_utc_ms=round(1000 * made.made_at.timestamp()),
@@ -293,9 +293,9 @@ class PanelBall:
             pictures=_there(self._store.folder(made)),
         )
 
-    def _verification_told(self, made: Verification) -> CalibrationTold:
+    def _verification_told(self, made: Verification) -> CalibrationView:
         ratio = "" if made.area_ratio is None else f"the ball's area is {made.area_ratio:.1%} of the calibration's"
-        return CalibrationTold(
+        return CalibrationView(
             serial=made.serial,
             id=made.id,
             made_utc_ms=round(1000 * made.made_at.timestamp()),
@@ -313,15 +313,15 @@ def _note_step(run: _Run, progress: Progress) -> None:
     )
 
 
-def _told(run: _Run) -> BallRunTold:
-    return BallRunTold(
-        kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), told=run.told
+def _told(run: _Run) -> CalibrationRunView:
+    return CalibrationRunView(
+        kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), result=run.told
     )
 
 
-def _checks(made: Calibration | Verification) -> tuple[CheckTold, ...]:
+def _checks(made: Calibration | Verification) -> tuple[CheckView, ...]:
     return tuple(
-        CheckTold(name=check.name, passed=check.passed, found=check.found, expected=check.expected, remedy=check.remedy)
+        CheckView(name=check.name, passed=check.passed, found=check.found, expected=check.expected, remedy=check.remedy)
         for check in made.checks
     )
 

@@ -7,23 +7,23 @@ from pathlib import Path
 
 from station.channel.messages import Message
 from station.channel.panel_queries import (
-    AskJob,
     AuditRows,
-    AuditRowTold,
+    AuditRowView,
     Chunk,
-    CurvePointTold,
+    CurvePointView,
     EndJob,
     EndLot,
     FindInspections,
     GetInspection,
-    ImageTold,
+    GetJob,
+    ImageView,
     InspectionPage,
     InspectionRow,
-    InspectionTold,
-    JobTold,
+    InspectionView,
+    JobView,
     ListLots,
     Lots,
-    LotTold,
+    LotView,
     ReadAudit,
     ReadJobFile,
     Search,
@@ -72,7 +72,7 @@ class PanelHistory:
             ReadAudit: self.audit,
             StartExport: self.start_export,
             StartLotReport: self.start_report,
-            AskJob: self.job,
+            GetJob: self.job,
             EndJob: self.end_job,
             ReadJobFile: self.read_file,
         }
@@ -81,10 +81,10 @@ class PanelHistory:
         """One page of a search, newest first."""
         return await self._worker.do(lambda: self._find(request))
 
-    async def inspection(self, request: GetInspection) -> InspectionTold:
+    async def inspection(self, request: GetInspection) -> InspectionView:
         """One inspection whole."""
 
-        def read() -> InspectionTold:
+        def read() -> InspectionView:
             with reading(self._folder) as connection:
                 return _told(read_inspection(connection, request.sequence, self._folder))
 
@@ -99,13 +99,13 @@ class PanelHistory:
 
         return await self._worker.do(read)
 
-    async def start_lot(self, request: StartLot) -> LotTold:
+    async def start_lot(self, request: StartLot) -> LotView:
         """Tell of a lot's begin, with its row of the trail."""
         lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
         await self._note(request, "lot.told", {"grower": lot.grower})
         return _lot(lot)
 
-    async def end_lot(self, request: EndLot) -> LotTold:
+    async def end_lot(self, request: EndLot) -> LotView:
         """Tell of a lot's end, with its row of the trail."""
         lot = await self._records.change(lambda connection: end_lot(connection, request.name))
         await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
@@ -118,7 +118,7 @@ class PanelHistory:
             with reading(self._folder) as connection:
                 rows = read_audit(connection, request.limit, request.action, request.subject)[::-1]
             told = (
-                AuditRowTold(
+                AuditRowView(
                     seq=row.seq,
                     utc_ms=row.utc_ms,
                     who=row.who,
@@ -135,25 +135,25 @@ class PanelHistory:
 
         return await self._worker.do(read)
 
-    async def start_export(self, request: StartExport) -> JobTold:
+    async def start_export(self, request: StartExport) -> JobView:
         """Write a table of inspections."""
         folder = self._jobs.folder()
         target = folder / f"inspections.{request.form}"
         await self._note(request, "records.exported", request.search.model_dump(mode="json", exclude_none=True))
         return self._jobs.begin("export", folder, ["records", "export", str(target), *_options(request.search)])
 
-    async def start_report(self, request: StartLotReport) -> JobTold:
+    async def start_report(self, request: StartLotReport) -> JobView:
         """Write a lot's report."""
         _check_text(request.lot)
         folder = self._jobs.folder()
         arguments = ["records", "report", "--", request.lot, str(folder / f"lot.{request.form}")]
         return self._jobs.begin("lot_report", folder, arguments)
 
-    async def job(self, request: AskJob) -> JobTold:
+    async def job(self, request: GetJob) -> JobView:
         """How a job does."""
         return self._jobs.told(request.job)
 
-    async def end_job(self, request: EndJob) -> JobTold:
+    async def end_job(self, request: EndJob) -> JobView:
         """Call a job off."""
         return await self._jobs.end(request.job)
 
@@ -185,14 +185,14 @@ def _row(row: Summary) -> InspectionRow:
     return InspectionRow.model_validate({**row._asdict(), "areas_mm2": row.areas_mm2})
 
 
-def _lot(lot: Lot) -> LotTold:
-    return LotTold(**lot._asdict())
+def _lot(lot: Lot) -> LotView:
+    return LotView(**lot._asdict())
 
 
-def _told(record: FullRecord) -> InspectionTold:
+def _told(record: FullRecord) -> InspectionView:
     trigger, judged, standing, recipe = record.trigger, record.judged, record.standing, record.trigger.recipe
     reasons = standing.reasons if standing is not None else ()
-    return InspectionTold(
+    return InspectionView(
         sequence=record.sequence,
         trigger_id=trigger.trigger_id,
         encoder=trigger.encoder,
@@ -204,7 +204,7 @@ def _told(record: FullRecord) -> InspectionTold:
         reasons=tuple((str(reason), sentence(reason)) for reason in reasons),
         explanation=judged.explanation if judged else (),
         curve=tuple(
-            CurvePointTold(**{name: value for name, value in asdict(point).items() if name != "captured_s"})
+            CurvePointView(**{name: value for name, value in asdict(point).items() if name != "captured_s"})
             for point in (judged.curve if judged else ())
         ),
         recipe_name=recipe.name if recipe else "",
@@ -216,7 +216,7 @@ def _told(record: FullRecord) -> InspectionTold:
         devices=dict(judged.devices) if judged else {},
         versions=dict(judged.versions) if judged else {},
         images=tuple(
-            ImageTold(kind=image.kind, step=image.step, sha256=image.sha256, there=Path(image.path).is_file())
+            ImageView(kind=image.kind, step=image.step, sha256=image.sha256, there=Path(image.path).is_file())
             for image in record.images
         ),
         images_state=record.images_state,

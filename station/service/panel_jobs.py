@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobTold
+from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobView
 from station.errors import StationError
 
 FOLDER = "panel_jobs"
@@ -97,7 +97,7 @@ class PanelJobs:
             raise JobError(f"{free_bytes // 1_000_000} MB are free on the disk of {folder.parent}; free space first")
         return folder
 
-    def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobTold:
+    def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobView:
         """Begin a job. Not idempotent.
 
         Args:
@@ -112,7 +112,7 @@ class PanelJobs:
         self._forget()
         return self.told(job.id)
 
-    def told(self, job_id: str) -> JobTold:
+    def told(self, job_id: str) -> JobView:
         """How a job does.
 
         Args:
@@ -127,8 +127,8 @@ class PanelJobs:
             for path in sorted(job.folder.iterdir() if job.state == "done" else ())
             if path.suffix in _MEDIA
         )
-        return JobTold(
-            job=job.id, kind=job.kind, state=job.state, done=self._done(job), of=job.of, told=job.told, files=files
+        return JobView(
+            job=job.id, kind=job.kind, state=job.state, done=self._done(job), of=job.of, message=job.told, files=files
         )
 
     def read(self, job_id: str, name: str, offset: int) -> Chunk:
@@ -153,7 +153,7 @@ class PanelJobs:
         except OSError as error:
             raise JobError(f"{name} cannot be read: {error.strerror}; begin the job again") from error
 
-    async def end(self, job_id: str) -> JobTold:
+    async def end(self, job_id: str) -> JobView:
         """Call a job off. Idempotent.
 
         Args:

@@ -18,7 +18,7 @@ from station.channel.panel_maintenance_queries import (
     Health,
     Jogged,
     JogGripper,
-    Lit,
+    LedsSet,
     LiveImage,
     Log,
     PartHealth,
@@ -188,12 +188,12 @@ class PanelMaintenance:
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
 
-    async def set_leds(self, request: SetLeds) -> Lit:
+    async def set_leds(self, request: SetLeds) -> LedsSet:
         """Set the sensor's light; the next start of the camera sets its own again."""
         self._check(request.actor, "leds", "camera")
         await self._crew.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
         self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
-        return Lit()
+        return LedsSet()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
         """The newest image; it is only measured while nothing is inspected."""

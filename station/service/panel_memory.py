@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from station.channel.line import Outcome
-from station.channel.panel_live import Counts, CurveShown, Fruit, FruitShort, LimitShown, Picture
+from station.channel.panel_live import Counts, CurvePointSummary, Fruit, FruitSummary, LimitView, Picture
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.records.judgement import limit_factor
@@ -56,7 +56,7 @@ class PanelMemory:
 
     def __init__(self) -> None:
         self._kept: OrderedDict[int, _Kept] = OrderedDict()
-        self._short: deque[FruitShort] = deque(maxlen=MOST_IN_SHORT)
+        self._short: deque[FruitSummary] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
         self._turn = asyncio.Lock()
 
@@ -66,7 +66,7 @@ class PanelMemory:
         return self._short[-1].sequence if self._short else None
 
     def recall(
-        self, short: Iterable[FruitShort], full: Iterable[Remembered], lots: Mapping[str, Mapping[str, int]]
+        self, short: Iterable[FruitSummary], full: Iterable[Remembered], lots: Mapping[str, Mapping[str, int]]
     ) -> None:
         """Go on where the start before has ended.
 
@@ -122,7 +122,7 @@ class PanelMemory:
         counted = self._lots.get(lot or "", Counter())
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
 
-    def recent(self, most: int) -> tuple[FruitShort, ...]:
+    def recent(self, most: int) -> tuple[FruitSummary, ...]:
         """The last fruit, newest first.
 
         Args:
@@ -188,7 +188,7 @@ def fruit_of(
         revision=revision,
         onset_mm=onset_mm if isinstance(onset_mm, float) else None,
         curve=tuple(
-            CurveShown(
+            CurvePointSummary(
                 closing_mm=round(point.closing_mm or 0.0, 3),
                 area_mm2=round(point.area_mm2 or 0.0, 2),
                 flagged=bool(point.flags),
@@ -196,7 +196,7 @@ def fruit_of(
             for point in points
         ),
         limits=tuple(
-            LimitShown(
+            LimitView(
                 closing_mm=each.closing_mm,
                 area_mm2=factor * each.area_mm2,
                 least_area_mm2=factor * each.least_area_mm2,
@@ -211,7 +211,7 @@ def fruit_of(
     )
 
 
-def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
+def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitSummary:
     """A fruit in a list.
 
     Args:
@@ -219,7 +219,7 @@ def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) 
         recipe: the recipe's name.
         areas_mm2: of the steps since the onset.
     """
-    return FruitShort(
+    return FruitSummary(
         sequence=standing.sequence,
         outcome=standing.outcome,
         reasons=tuple(map(str, standing.reasons)),

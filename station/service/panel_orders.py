@@ -7,7 +7,7 @@ from collections import deque
 
 from station.channel.line import Command, CommandName
 from station.channel.panel import Recover, RecoveryName
-from station.channel.panel_live import LONGEST_LOT, OrderName, OrderShown, PanelOrder
+from station.channel.panel_live import LONGEST_LOT, OperatorCommand, OperatorCommandName, OperatorCommandView
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.errors import StationError
 from station.inspection.cycle import UNJUDGED, WAITING
@@ -36,10 +36,10 @@ _RECOVERIES: dict[ArmCause, RecoveryName] = {
     ArmCause.REGISTERS_IN_USE: "program",
 }
 _COMMANDS = {
-    OrderName.CHOOSE_RECIPE: CommandName.CHANGE_RECIPE,
-    OrderName.START: CommandName.RESET,
-    OrderName.CALL_OFF: CommandName.CALL_OFF,
-    OrderName.SET_MODE: CommandName.SET_MODE,
+    OperatorCommandName.CHOOSE_RECIPE: CommandName.CHANGE_RECIPE,
+    OperatorCommandName.START: CommandName.RESET,
+    OperatorCommandName.CALL_OFF: CommandName.CALL_OFF,
+    OperatorCommandName.SET_MODE: CommandName.SET_MODE,
 }
 """What the PLC may order too goes the PLC's way."""
 
@@ -62,7 +62,7 @@ class PanelOrders:
         self._orders, self._service, self._crew, self._lots = orders, service, crew, lots
         self._records, self._trail = records, trail
         self._tickets = itertools.count(1)
-        self._shown: deque[OrderShown] = deque(maxlen=_REMEMBERED)
+        self._shown: deque[OperatorCommandView] = deque(maxlen=_REMEMBERED)
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
     async def close(self) -> None:
@@ -72,7 +72,7 @@ class PanelOrders:
         await asyncio.gather(*self._tasks.values(), return_exceptions=True)
 
     @property
-    def shown(self) -> tuple[OrderShown, ...]:
+    def shown(self) -> tuple[OperatorCommandView, ...]:
         """The last orders, newest first."""
         return tuple(reversed(self._shown))
 
@@ -84,29 +84,29 @@ class PanelOrders:
         return () if found is None else (found,)
 
     @property
-    def possible(self) -> tuple[OrderName, ...]:
+    def possible(self) -> tuple[OperatorCommandName, ...]:
         """What would be begun now."""
         service, state = self._service, self._service.state
         conditions = {
-            OrderName.CHOOSE_RECIPE: not self._orders.recipe_changing,
-            OrderName.START: not self._orders.no_reset() and (state in WAITING or service.stop_wanted),
-            OrderName.STOP: not service.stop_wanted and not service.stop_asked and state is not State.LATCHED,
-            OrderName.CALL_OFF: state in UNJUDGED,
-            OrderName.RECOVER: bool(self.recoveries),
-            OrderName.SET_MODE: True,
-            OrderName.START_LOT: not self._lots.plc_names,
-            OrderName.END_LOT: not self._lots.plc_names and bool(self._lots.named),
+            OperatorCommandName.CHOOSE_RECIPE: not self._orders.recipe_changing,
+            OperatorCommandName.START: not self._orders.no_reset() and (state in WAITING or service.stop_wanted),
+            OperatorCommandName.STOP: not service.stop_wanted and not service.stop_asked and state is not State.LATCHED,
+            OperatorCommandName.CALL_OFF: state in UNJUDGED,
+            OperatorCommandName.RECOVER: bool(self.recoveries),
+            OperatorCommandName.SET_MODE: True,
+            OperatorCommandName.START_LOT: not self._lots.plc_names,
+            OperatorCommandName.END_LOT: not self._lots.plc_names and bool(self._lots.named),
         }
         return tuple(order for order, possible in conditions.items() if possible)
 
-    async def order(self, request: PanelOrder) -> OrderShown:
+    async def order(self, request: OperatorCommand) -> OperatorCommandView:
         """Begin an order, and wait a moment for its end.
 
         Args:
             request: as it came.
         """
         same = next((each for each in self.shown if _under_way(each, request)), None)
-        shown = same or OrderShown(
+        shown = same or OperatorCommandView(
             ticket=next(self._tickets),
             order=request.order,
             argument=request.argument,
@@ -125,7 +125,7 @@ class PanelOrders:
             await asyncio.wait({running}, timeout=AT_ONCE_S)
         return next((each for each in self._shown if each.ticket == shown.ticket), shown)
 
-    async def _follow(self, shown: OrderShown, request: PanelOrder) -> None:
+    async def _follow(self, shown: OperatorCommandView, request: OperatorCommand) -> None:
         try:
             why = await self._carry_out(request)
         except StationError as error:
@@ -133,7 +133,7 @@ class PanelOrders:
         ended = shown.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
         self._shown = deque((ended if each.ticket == shown.ticket else each for each in self._shown), _REMEMBERED)
 
-    async def _carry_out(self, request: PanelOrder) -> str:
+    async def _carry_out(self, request: OperatorCommand) -> str:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
         if order in _COMMANDS:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
@@ -141,11 +141,11 @@ class PanelOrders:
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
             return (await self._orders.carry_out(command, by)).why
         match order:
-            case OrderName.RECOVER:
+            case OperatorCommandName.RECOVER:
                 return await self._recover(argument, by)
-            case OrderName.STOP:
+            case OperatorCommandName.STOP:
                 why = await self._orders.stop()
-            case OrderName.START_LOT:
+            case OperatorCommandName.START_LOT:
                 why = await self._start_lot(argument, request.grower)
             case _:
                 why = await self._end_lot()
@@ -181,5 +181,5 @@ class PanelOrders:
         return ""
 
 
-def _under_way(shown: OrderShown, request: PanelOrder) -> bool:
+def _under_way(shown: OperatorCommandView, request: OperatorCommand) -> bool:
     return shown.state == "executing" and (shown.order, shown.argument) == (request.order, request.argument)

@@ -11,7 +11,7 @@ import numpy as np
 from sqlalchemy import Connection
 
 from station.channel.line import Outcome
-from station.channel.panel_live import FruitShort
+from station.channel.panel_live import FruitSummary
 from station.errors import StationError
 from station.records.database import plain, reading
 from station.records.errors import RecordsError
@@ -48,7 +48,7 @@ _COUNTS = (
 class Recalled(NamedTuple):
     """What `PanelMemory.recall` takes."""
 
-    short: tuple[FruitShort, ...]
+    short: tuple[FruitSummary, ...]
     full: tuple[Remembered, ...]
     lots: dict[str, Counter[str]]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from station.channel.messages import Message
 from station.channel.panel import Actor
-from station.channel.panel_queries import JobTold
+from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import (
     ApproveRecipe,
     Change,
@@ -25,10 +25,10 @@ from station.channel.panel_recipe_queries import (
     RecipeRow,
     Recipes,
     RecipeText,
-    RecipeTold,
+    RecipeView,
     RejectRecipe,
     RevertRecipe,
-    RevisionTold,
+    RevisionView,
     SaveDraft,
     StartWhatIf,
     SubmitRecipe,
@@ -115,10 +115,10 @@ class PanelRecipes:
 
         return await self._worker.do(read)
 
-    async def recipe(self, request: GetRecipe) -> RecipeTold:
+    async def recipe(self, request: GetRecipe) -> RecipeView:
         """One recipe's file, or one of its revisions."""
 
-        def read() -> RecipeTold:
+        def read() -> RecipeView:
             row = _row(self._store.standing(request.name))
             if request.revision is None:
                 file = self._store.good_file(request.name)
@@ -126,7 +126,7 @@ class PanelRecipes:
             else:
                 revision = self._store.revision(request.name, request.revision)
                 text, recipe = revision.text, _recipe(revision)
-            return RecipeTold(row=row, text=text, values=recipe.model_dump(mode="json"))
+            return RecipeView(row=row, text=text, values=recipe.model_dump(mode="json"))
 
         return await self._worker.do(read)
 
@@ -234,7 +234,7 @@ class PanelRecipes:
 
         return await self._worker.do(read)
 
-    async def start_whatif(self, request: StartWhatIf) -> JobTold:
+    async def start_whatif(self, request: StartWhatIf) -> JobView:
         """Judge stored inspections again by the recipe's file as it is now."""
         if not request.lot.isprintable():
             raise StationError(f"the lot {request.lot!r} is no name; give one of printable letters")
@@ -277,12 +277,12 @@ def _row(standing: Standing) -> RecipeRow:
     )
 
 
-def _revision(each: Revision, before: Revision | None) -> RevisionTold:
+def _revision(each: Revision, before: Revision | None) -> RevisionView:
     try:
         changes = () if before is None else _changes(before.recipe, each.recipe)
     except SettingsError:  # of a form that this program does not take any more
         changes = ()
-    return RevisionTold(
+    return RevisionView(
         revision=each.revision,
         status=each.status.value,
         origin=each.origin.value,

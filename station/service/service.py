@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from station.channel.line import Begin, Begun, Outcome
+from station.channel.line import Begin, BeginReply, Outcome
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
@@ -93,7 +93,7 @@ class Service:
 
     # What the line asks.
 
-    async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> Begun:
+    async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> BeginReply:
         """Begin an inspection, or say why not. The same request again, before its outcome was told, begins none.
 
         Args:
@@ -296,15 +296,15 @@ class Service:
 
     # Small parts.
 
-    def _begun(self, now: Inspection) -> Begun:
+    def _begun(self, now: Inspection) -> BeginReply:
         left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
         if now.accepted_s is not None:
             left_s -= time.monotonic() - now.accepted_s
-        return Begun(sequence=now.sequence, deadline_s=max(0.0, left_s))
+        return BeginReply(sequence=now.sequence, deadline_s=max(0.0, left_s))
 
-    def _refused(self, refusal: Refusal) -> Begun:
+    def _refused(self, refusal: Refusal) -> BeginReply:
         self._metrics.refused(refusal)
-        return Begun(refusal=refusal)
+        return BeginReply(refusal=refusal)
 
     def _tell_late(self) -> None:
         if self._now is None or self._told_late is self.state:

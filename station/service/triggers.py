@@ -3,7 +3,7 @@
 import asyncio
 from collections import OrderedDict
 
-from station.channel.line import Begin, Begun, Outcome
+from station.channel.line import Begin, BeginReply, Outcome
 from station.records.errors import UnknownInspectionError
 from station.service.inspection import Inspection
 
@@ -100,14 +100,14 @@ class Pending:
         self.request, self.inspection = request, inspection
         self.recording: asyncio.Future[int] | None = None
         """Makes it durable; where it is cancelled, the record is taken back."""
-        self._answer: asyncio.Future[Begun] = asyncio.get_running_loop().create_future()
+        self._answer: asyncio.Future[BeginReply] = asyncio.get_running_loop().create_future()
 
     @property
     def is_answered(self) -> bool:
         """Whether the request has its answer."""
         return self._answer.done()
 
-    def answer(self, begun: Begun) -> None:
+    def answer(self, begun: BeginReply) -> None:
         """Answer the request; the first answer stands.
 
         Args:
@@ -116,6 +116,6 @@ class Pending:
         if not self.is_answered:
             self._answer.set_result(begun)
 
-    async def answered(self) -> Begun:
+    async def answered(self) -> BeginReply:
         """Wait for the answer."""
         return await asyncio.shield(self._answer)

@@ -17,7 +17,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import (
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     CommandName,
@@ -25,7 +25,7 @@ from station.channel.line import (
     Outcome,
     StationState,
 )
-from station.channel.panel_live import AskPanel, PanelState
+from station.channel.panel_live import GetPanelState, PanelState
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
 from station.service.calibrated import Calibrated
@@ -182,7 +182,7 @@ async def inspected(site, store, calibration):
             await asyncio.sleep(0.1)
         assert asked
         site.ask(do="fruit", kind="strawberry", seed=2)
-        begun = await client.ask(Begin(trigger_id=1, encoder=0, lot="A"), Begun, deadline_s=40)
+        begun = await client.ask(Begin(trigger_id=1, encoder=0, lot="A"), BeginReply, deadline_s=40)
         assert begun.sequence is not None, begun
         return await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
 
@@ -190,7 +190,7 @@ async def inspected(site, store, calibration):
 async def glance(configuration):
     """What the pages are told."""
     async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as client:
-        return await client.ask(AskPanel(), PanelState, deadline_s=20)
+        return await client.ask(GetPanelState(), PanelState, deadline_s=20)
 
 
 async def beat(client):

@@ -29,7 +29,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     CommandName,
@@ -38,7 +38,7 @@ from station.channel.line import (
     Published,
 )
 from station.channel.messages import ChannelError
-from station.channel.panel_live import AskPanel, PanelState
+from station.channel.panel_live import GetPanelState, PanelState
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
@@ -147,7 +147,7 @@ class Cell:
     def state(self) -> PanelState | None:
         endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
         try:
-            return run_apart(self._ask(endpoint, [(AskPanel(), PanelState)], 2.0))[0]
+            return run_apart(self._ask(endpoint, [(GetPanelState(), PanelState)], 2.0))[0]
         except ChannelError:
             return None
 
@@ -180,7 +180,7 @@ class Cell:
         def trigger() -> int | None:
             self.until(lambda state: state.ready)
             self.trigger_id += 1
-            return self.ask_line((Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1"), Begun))[0].sequence
+            return self.ask_line((Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1"), BeginReply))[0].sequence
 
         return eventually(trigger)
 

@@ -5,7 +5,14 @@ import re
 
 import pytest
 
-from station.channel.panel_live import OrderName, OrderShown, PanelState, RecipeNamed, Recipes, RecipeShown
+from station.channel.panel_live import (
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+    RecipeNames,
+    Recipes,
+    RecipeSummary,
+)
 from station.settings.recipe import load_recipes
 
 DUE = (
@@ -15,11 +22,11 @@ DUE = (
 
 
 def state(check_due):
-    order = OrderShown(
-        ticket=1, order=OrderName.CHOOSE_RECIPE, argument="2", state="done", why="", who="Ana", began_utc_ms=1,
-        ended_utc_ms=2,
+    order = OperatorCommandView(
+        ticket=1, order=OperatorCommandName.CHOOSE_RECIPE, argument="2", state="done", why="", who="Ana",
+        began_utc_ms=1, ended_utc_ms=2,
     )  # fmt: skip
-    recipe = RecipeNamed(number=2, name="blueberry", title="Blueberry", revision="1")
+    recipe = RecipeNames(number=2, name="blueberry", title="Blueberry", revision="1")
     return PanelState.model_construct(
         boot="1", utc_ms=1, state="idle", sentence="", packml_state=None, mode=1, ready=not check_due,
         why_not_ready=check_due, busy=False, needs_person=False, stopping=False, simulated=False, recipe=recipe,
@@ -30,7 +37,7 @@ def state(check_due):
 @pytest.mark.parametrize("path", ["/change/2", "/change/progress"])
 def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypatch, path):
     gateway, values = pages.context.gateway, json.dumps(load_recipes()["blueberry"].model_dump(mode="json"))
-    chosen = RecipeShown(number=2, name="blueberry", title="Blueberry", revision="1", values=values)
+    chosen = RecipeSummary(number=2, name="blueberry", title="Blueberry", revision="1", values=values)
 
     async def ask(*_, **__):
         return Recipes(recipes=(chosen,), active=chosen, problems=())

@@ -15,7 +15,7 @@ from hmi import charts
 from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import field_keys, groups
 from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, preferred
-from station.channel.panel_live import CurveShown, Fruit, FruitShort, LimitShown, OrderName
+from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
 from station.devices.gripper.errors import GripperError, GripperFaultError
@@ -237,7 +237,7 @@ def test_no_text_that_a_page_uses_is_missing():
         for path in files:
             used |= set(pattern.findall(path.read_text(encoding="utf-8")))
     used |= {f"reason.{reason}" for reason in Reason} | {f"packml.{state}" for state in PackmlState}
-    used |= {f"order.{order}" for order in OrderName} | {f"alarms.state.{state}" for state in AlarmState}
+    used |= {f"order.{order}" for order in OperatorCommandName} | {f"alarms.state.{state}" for state in AlarmState}
     used |= {f"nav.{entry.name}" for entry in entries()}
     used |= {f"inspection.flag_{flag}" for flag in Flag} | {f"maintenance.fault_{fault}" for fault in FrameFault}
     assert used <= set(catalogue("en")), used - set(catalogue("en"))
@@ -312,7 +312,7 @@ def test_an_axis_reaches_its_largest_value_with_few_round_numbers(largest):
 
 
 def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 60.0)) -> Fruit:
-    short = FruitShort(
+    short = FruitSummary(
         sequence=7,
         outcome=outcome,
         reasons=("area_over_limit",),
@@ -330,8 +330,8 @@ def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 
         recipe_title="Blueberry",
         revision="1",
         onset_mm=15.0,
-        curve=tuple(CurveShown(closing_mm=float(n), area_mm2=a, flagged=n == 0) for n, a in enumerate(areas)),
-        limits=(LimitShown(closing_mm=3.0, area_mm2=45.0, least_area_mm2=10.0),),
+        curve=tuple(CurvePointSummary(closing_mm=float(n), area_mm2=a, flagged=n == 0) for n, a in enumerate(areas)),
+        limits=(LimitView(closing_mm=3.0, area_mm2=45.0, least_area_mm2=10.0),),
         early_stop_mm2=50.0,
         growth_mm2_per_mm=20.0,
         deadline_s=100.0,

@@ -32,7 +32,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     CommandName,
@@ -165,7 +165,7 @@ class Site:
         async def steps(client: ChannelClient) -> Outcome:
             size = {"fruit_length_mm_x10": 480, "size_class": 3} if bruised else {}
             request = Begin(trigger_id=next(self._triggers), encoder=7, lot="LOT 1", **size)
-            begun = await client.ask(request, Begun, deadline_s=20)
+            begun = await client.ask(request, BeginReply, deadline_s=20)
             assert begun.sequence is not None, begun
             outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
             await client.ask(Published(outcome=outcome), Noted, deadline_s=20)

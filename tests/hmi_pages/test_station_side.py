@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.recipe_form import BadFieldError, changed, formatted, groups
-from station.channel.panel_queries import JobTold
+from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.service.panel_jobs import MOST_WAITING, JobError, PanelJobs
 from station.service.panel_recipes import PanelRecipes
@@ -29,7 +29,7 @@ FAIL = "import sys; sys.exit('the disk is full')"
 WAIT = "import sys, time, pathlib; pathlib.Path(sys.argv[1], 'begun').touch(); time.sleep(600)"
 
 
-async def until(jobs: PanelJobs, job: str, wanted: Callable[[JobTold], Any]) -> JobTold:
+async def until(jobs: PanelJobs, job: str, wanted: Callable[[JobView], Any]) -> JobView:
     deadline_s = time.monotonic() + PATIENCE_S
     while not wanted(told := jobs.told(job)):
         assert time.monotonic() < deadline_s, told
@@ -70,7 +70,7 @@ def test_a_job_that_fails_tells_its_last_words_and_leaves_nothing(tmp_path: Path
     async def work(jobs: PanelJobs) -> None:
         folder = jobs.folder()
         told = await until(jobs, jobs.begin("export", folder, [str(folder)]).job, lambda told: told.state == "failed")
-        assert told.told == "the disk is full"
+        assert told.message == "the disk is full"
         assert told.files == ()
         assert not folder.exists()
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from station.channel.line import Begun
+from station.channel.line import BeginReply
 from station.errors import BadInputError
 from station.inspection.cycle import TABLE, Event
 from station.inspection.deadlines import FAULT_OF, LONGEST_S, Pace, deadlines, late
@@ -45,7 +45,7 @@ def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
     steps_s = 12 * (1 / 20 + 0.2 + 3 / 30)
     assert 5 / 30 + 2 * 2.0 + steps_s < once.inspection_s < 60
     assert once.inspection_s < limits.inspection_s < 2 * once.inspection_s
-    assert Begun(sequence=1, deadline_s=limits.inspection_s).refusal is None
+    assert BeginReply(sequence=1, deadline_s=limits.inspection_s).refusal is None
     assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * 0.2)
 
 
@@ -102,7 +102,7 @@ def test_late_names_what_was_waited_for_and_the_inspection_first():
 def test_a_recipe_that_takes_longer_than_the_plc_can_be_told_is_refused():
     with pytest.raises(BadInputError, match=r"recipe strawberry: an inspection may take \d+ s here.*shorter settle"):
         deadlines(changed(settle_s=10.0, number=100), PACE)
-    assert Begun.model_fields["deadline_s"].metadata[1].le == LONGEST_S
+    assert BeginReply.model_fields["deadline_s"].metadata[1].le == LONGEST_S
 
 
 def test_an_inspections_phases_are_those_in_which_the_station_is_busy():

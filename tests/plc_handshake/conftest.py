@@ -27,7 +27,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     Line,
@@ -133,14 +133,14 @@ class ScriptedStation:
         self.outcomes[sequence] = Outcome.model_validate(values | changes)
         return self.outcomes[sequence]
 
-    async def _begin(self, request: Begin) -> Begun:
+    async def _begin(self, request: Begin) -> BeginReply:
         await until(lambda: not self.deaf)
         if self.refusal or self.running:
-            return Begun(refusal=self.refusal or Refusal.BUSY)
+            return BeginReply(refusal=self.refusal or Refusal.BUSY)
         sequence = max(self.begun, default=100) + 1
         self.begun[sequence] = request
         self.running = sequence
-        return Begun(sequence=sequence, deadline_s=self.deadline_s)
+        return BeginReply(sequence=sequence, deadline_s=self.deadline_s)
 
     async def _await(self, request: AwaitOutcome) -> Outcome:
         return await until(lambda: self.outcomes.get(request.sequence))
@@ -425,7 +425,7 @@ class Bench:
         self.armed()
         self.write("enable", "trigger", trigger_id=trigger_id)
         assert self.state.pending is not None
-        self.feed(ev.BeginAnswered, self.state.pending.number, Begun(sequence=sequence, deadline_s=2.0))
+        self.feed(ev.BeginAnswered, self.state.pending.number, BeginReply(sequence=sequence, deadline_s=2.0))
 
     def of(self, kind: type[Any]) -> list[Any]:
         return [action for action in self.actions if isinstance(action, kind)]

@@ -9,7 +9,7 @@ from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.state import Size
 from plc_interface.register_map import BY_NAME, GROUP_BY_NAME
-from station.channel.line import Begun, Refusal
+from station.channel.line import BeginReply, Refusal
 
 NONE = (0, 0)
 
@@ -21,7 +21,7 @@ def asked(made):
 
 def end(made, sequence):
     """Have the inspection under way end, and its result acknowledged."""
-    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=sequence, deadline_s=2.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=sequence, deadline_s=2.0))
     made.write("enable")
     trigger_id, size = made.state.running.trigger_id, made.state.running
     outcome = made.outcome(sequence=sequence, trigger_id=trigger_id).model_copy(

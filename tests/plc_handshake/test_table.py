@@ -11,7 +11,7 @@ from plc_interface.handshake.state import Fault
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.view import line, result_values, view
 from plc_interface.register_map import BY_NAME
-from station.channel.line import Begun, Open, Reason, Refusal
+from station.channel.line import BeginReply, Open, Reason, Refusal
 
 
 def test_every_signal_and_every_mode_has_its_row():
@@ -79,7 +79,7 @@ def test_a_sequence_given_twice_is_refused(bench):
     made = bench(Journal(highest=41))
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
     assert (made.state.inspection, made.state.last_refusal) == (Inspection.NONE, Refusal.NOT_READY)
     assert made.state.trigger is Trigger.ANSWERED
 
@@ -128,7 +128,7 @@ def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     assert isinstance(actions[0], do.SaveJournal)
     assert actions[0].durable
     assert (made.state.last_refusal, made.state.link) == (Refusal.STATION_LOST, Link.RESUMING)
-    made.feed(ev.BeginAnswered, 1, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.BeginAnswered, 1, BeginReply(sequence=41, deadline_s=1.0))
     assert made.state.running is None
     actions = made.link(Open(running=(41, 7), outcomes=()))
     told, taken = [action for action in actions if not isinstance(action, do.SaveJournal | do.Log)]
@@ -141,7 +141,7 @@ def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_onli
     made = bench()
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
-    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(refusal=Refusal.BUSY))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(refusal=Refusal.BUSY))
     assert (made.state.last_refusal, made.state.link) == (Refusal.BUSY, Link.UP)
     made.feed(ev.OpenAnswered, made.state.open_request, Open(running=(41, 6), outcomes=()))
     assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
@@ -157,7 +157,7 @@ def test_the_answer_to_another_begin_accepts_nothing(bench):
     made.link()
     made.write("enable")
     made.write("enable", "trigger", trigger_id=8)
-    made.feed(ev.BeginAnswered, first, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.BeginAnswered, first, BeginReply(sequence=41, deadline_s=1.0))
     assert (made.state.running, made.state.pending.trigger_id, made.state.stale) == (None, 8, 1)
 
 
@@ -168,7 +168,7 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
     made.feed(ev.RequestFailed, "a note was lost")
     made.feed(ev.Beat, made.station_state())
     asked_before = made.state.open_request
-    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=1.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
     made.feed(ev.OpenAnswered, asked_before, Open(running=None, outcomes=()))
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
     made.link(Open(running=(41, 7), outcomes=()))
@@ -392,7 +392,7 @@ def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(
     made.write("enable", "trigger", trigger_id=7)
     made.feed(ev.WriterWithdrawn)
     assert made.state.pending is not None
-    made.feed(ev.BeginAnswered, made.state.pending.number, Begun(sequence=41, deadline_s=2.0))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
     assert made.state.trigger is Trigger.HELD
     made.feed(ev.WriterGranted)
     made.write("trigger", trigger_id=7)

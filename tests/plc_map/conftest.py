@@ -25,7 +25,7 @@ from plc_interface.modbus.peer import Peer
 from plc_interface.modbus.server import ModbusServer
 from plc_interface.modbus.write_lock import WriterChange
 from plc_interface.register_map import BY_NAME, REGISTERS
-from station.channel.line import Begun, Open, Outcome, PackmlState, Reason, Refusal, StationState
+from station.channel.line import BeginReply, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.modbus import ModbusSettings
 from station.settings.plc import HandshakeSettings
 
@@ -99,11 +99,11 @@ class Rig:
     def _act(self, action: actions.Action) -> None:
         match action:
             case actions.RequestBegin():
-                begun = Begun(refusal=self.refusal)
+                begun = BeginReply(refusal=self.refusal)
                 if self.refusal is None:
                     self.begun.append((action.trigger_id, action.encoder, action.lot))
                     self.sizes.append((action.fruit_length_mm_x10, action.size_class))
-                    begun = Begun(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
+                    begun = BeginReply(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
                 self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, begun))
             case actions.RequestOutcome():
                 self.soon(self.inspection_s, lambda: events.OutcomeReceived(now(), self._made(action.sequence)))

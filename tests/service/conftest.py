@@ -22,7 +22,7 @@ from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
     Begin,
-    Begun,
+    BeginReply,
     Command,
     CommandDone,
     CommandName,
@@ -79,9 +79,9 @@ class LineClient:
     async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
         return await self.client.ask(Command(command=command, argument=argument), CommandDone, deadline_s=40)
 
-    async def begin(self, trigger_id: int | None = None) -> Begun:
+    async def begin(self, trigger_id: int | None = None) -> BeginReply:
         request = Begin(trigger_id=trigger_id or next(self.ids), encoder=7, lot="LOT 1")
-        return await self.client.ask(request, Begun, deadline_s=20)
+        return await self.client.ask(request, BeginReply, deadline_s=20)
 
     async def outcome(self, sequence: int | None) -> Outcome:
         assert sequence is not None

@@ -13,7 +13,7 @@ from plc_interface.handshake.modes import Arming, Command, Link, Result
 from plc_interface.handshake.state import Fault, State
 from plc_interface.handshake.view import view
 from plc_interface.register_map import BY_NAME
-from station.channel.line import Begun, Open, Outcome, PackmlState, Reason, Refusal, StationState
+from station.channel.line import BeginReply, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.plc import HandshakeSettings
 
 DEADLINE_S = 4.0
@@ -92,13 +92,13 @@ class Station:
             simulated=False,
         )
 
-    def begin(self, trigger_id: int) -> Begun:
+    def begin(self, trigger_id: int) -> BeginReply:
         if self.running is not None:
-            return Begun(refusal=Refusal.BUSY)
+            return BeginReply(refusal=Refusal.BUSY)
         sequence = max(self.records, default=100) + 1
         self.records[sequence] = Inspection(trigger_id)
         self.running = sequence
-        return Begun(sequence=sequence, deadline_s=DEADLINE_S)
+        return BeginReply(sequence=sequence, deadline_s=DEADLINE_S)
 
     def judge(self, name: str) -> None:
         assert self.running is not None
