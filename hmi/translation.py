@@ -39,18 +39,18 @@ def catalogue(language: Language) -> Mapping[str, str]:
 
 @cache
 def sentence_patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """Return the station's own sentences, `said.*` of the English catalogue, as patterns; the most specific first.
+    """Return the station's own sentences, `sentence.*` of the English catalogue, as patterns; the most specific first.
 
-    A device's fault, `said.fault_of_*`, encloses an observation and a remedy: these patterns come first.
+    A device's fault, `sentence.fault_of_*`, encloses an observation and a remedy: these patterns come first.
     """
-    texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("said.")}
+    texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("sentence.")}
     parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
     patterns = {
         key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in pieces)
         for key, pieces in parts.items()
     }
     order = sorted(
-        parts, key=lambda key: (not key.startswith("said.fault_of_"), -sum(len(literal) for literal, *_ in parts[key]))
+        parts, key=lambda key: (not key.startswith("sentence.fault_of_"), -sum(len(literal) for literal, *_ in parts[key]))
     )
     return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 

@@ -66,17 +66,17 @@ NO_FAULTS = {
 }
 """Names, what is asked on the wire or looked for in an answer, and what a setting is refused with."""
 COMPOSED = {
-    "said.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
-    "said.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
-    "said.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
-    "said.changed_since": ("recipe {}: it was changed since {} was looked at, to {}", "; look at it as it is now and"),
-    "said.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
-    "said.stopped_growth": ("No further step was made at {} mm of closing", ": the area grows by {} mm² a millimetre,"),
-    "said.verification_old": (" h old, at most {} h are allowed", "The last verification is {}: verify with the ball"),
-    "said.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
-    "said.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
-    "said.growth_near": ("closing the area grows by {} ± {} mm² a millimetre, ", "which may be "),
-    "said.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
+    "sentence.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
+    "sentence.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
+    "sentence.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
+    "sentence.changed_since": ("recipe {}: it was changed since {} was looked at, to {}", "; look at it as it is now and"),
+    "sentence.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
+    "sentence.stopped_growth": ("No further step was made at {} mm of closing", ": the area grows by {} mm² a millimetre,"),
+    "sentence.verification_old": (" h old, at most {} h are allowed", "The last verification is {}: verify with the ball"),
+    "sentence.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
+    "sentence.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
+    "sentence.growth_near": ("closing the area grows by {} ± {} mm² a millimetre, ", "which may be "),
+    "sentence.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
 }
 """What the station puts together of several."""
 NO_PAGES = {
@@ -154,7 +154,7 @@ def anonymous(text):
 
 
 def test_what_operators_are_refused_with_is_said_in_every_language():
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
     for module in ("readiness", "orders", "panel_orders", "alarm_orders"):
         told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
         assert told - NOT_FOR_OPERATORS <= known, module
@@ -162,7 +162,7 @@ def test_what_operators_are_refused_with_is_said_in_every_language():
 
 @pytest.mark.parametrize("module", FAULTS_FROM)
 def test_every_fault_of_a_device_is_said_in_every_language(module):
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
     told = {text for text in sentences(STATION / f"{module}.py") if len(text.split()) > 2 and text != text.upper()}
     assert told - NO_FAULTS <= known
 
@@ -172,7 +172,7 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
     told = {text for path in STATION.rglob("*.py") for text in sentences(path)}
     for key, text in catalogue("en").items():
         pieces = COMPOSED.get(key, (anonymous(text),))
-        if key.startswith("said.") and not key.startswith("said.expect_"):
+        if key.startswith("sentence.") and not key.startswith("sentence.expect_"):
             assert all(any(piece in each for each in told) for piece in pieces), key
 
 
