@@ -50,7 +50,8 @@ def sentence_patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
         for key, pieces in parts.items()
     }
     order = sorted(
-        parts, key=lambda key: (not key.startswith("sentence.fault_of_"), -sum(len(literal) for literal, *_ in parts[key]))
+        parts,
+        key=lambda key: (not key.startswith("sentence.fault_of_"), -sum(len(literal) for literal, *_ in parts[key])),
     )
     return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 

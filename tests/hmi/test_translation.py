@@ -69,10 +69,19 @@ COMPOSED = {
     "sentence.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
     "sentence.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
     "sentence.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
-    "sentence.changed_since": ("recipe {}: it was changed since {} was looked at, to {}", "; look at it as it is now and"),
+    "sentence.changed_since": (
+        "recipe {}: it was changed since {} was looked at, to {}",
+        "; look at it as it is now and",
+    ),
     "sentence.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
-    "sentence.stopped_growth": ("No further step was made at {} mm of closing", ": the area grows by {} mm² a millimetre,"),
-    "sentence.verification_old": (" h old, at most {} h are allowed", "The last verification is {}: verify with the ball"),
+    "sentence.stopped_growth": (
+        "No further step was made at {} mm of closing",
+        ": the area grows by {} mm² a millimetre,",
+    ),
+    "sentence.verification_old": (
+        " h old, at most {} h are allowed",
+        "The last verification is {}: verify with the ball",
+    ),
     "sentence.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
     "sentence.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
     "sentence.growth_near": ("closing the area grows by {} ± {} mm² a millimetre, ", "which may be "),
