@@ -65,7 +65,7 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 
 @router.get("/health", tags=["health"])
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
-    """Whether the station accepts fruit, and the state of each of its parts."""
+    """Readiness of the station, and the state of each of its parts."""
     reply = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
     return HealthAnswer(
         ready=reply.ready,

@@ -36,7 +36,7 @@ class Part(Model):
 
 
 class HealthAnswer(Model):
-    """Whether the station accepts fruit, and the state of each of its parts."""
+    """Readiness of the station, and the state of each of its parts."""
 
     ready: bool = Field(description="A trigger would be accepted now.")
     why: str = Field(description="Why not, with the remedy; empty where ready.")

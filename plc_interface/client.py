@@ -80,7 +80,7 @@ class StationClient(RegisterLink):
         """Return the names of the status bits that are set."""
         return STATUS.names(await self.read("status"))
 
-    async def shown(self) -> InspectionResult | None:
+    async def pending_result(self) -> InspectionResult | None:
         """Return the result that waits for its acknowledgement, or None."""
         return published_result(await self.scan())
 
@@ -146,7 +146,7 @@ class StationClient(RegisterLink):
         """Acknowledge the result with this sequence; returns once the station has noted it. Idempotent.
 
         Raises:
-            NotReadyError: another result is shown, or none.
+            NotReadyError: another result is published, or none.
             DeadlineMissedError: the station does not note it in time.
         """
         now = await self.scan()

@@ -29,7 +29,7 @@ def test_an_inspection_in_either_word_order(serve, order):
             await client.arm()
             await client.latch_lot("LOT-1")
             result = await client.inspect(7, encoder=0x12345678)
-            after = await client.shown()
+            after = await client.pending_result()
             return rig.begun, result, after, await client.counters()
 
     begun, result, after, counters = asyncio.run(main())
@@ -111,13 +111,13 @@ def test_a_result_that_comes_too_late_is_not_the_next_fruits(serve):
             with pytest.raises(DeadlineMissedError, match="result of trigger 7 did not come in time"):
                 await client.inspect(7, deadline_s=0.3)
             async with asyncio.timeout(20):
-                while (late := await client.shown()) is None:
+                while (late := await client.pending_result()) is None:
                     await asyncio.sleep(0.01)
             with pytest.raises(NotReadyError, match="result 65537 of trigger 7 waits"):
                 await client.inspect(8)
             with pytest.raises(NotReadyError, match="result 3 is not the one shown, which is 65537"):
                 await client.acknowledge(3)
-            assert await client.shown() == late
+            assert await client.pending_result() == late
             await client.acknowledge(late.sequence)
             await client.acknowledge(late.sequence)
             rig.inspection_s = 0.05
@@ -284,7 +284,7 @@ def test_nobody_there_and_a_link_that_breaks(serve, unused_port):
             await client.arm()
             await rig.server.stop()
             with pytest.raises(UnreachableError, match="did not answer when asked to read"):
-                await client.shown()
+                await client.pending_result()
 
     asyncio.run(main())
 
@@ -301,7 +301,7 @@ def test_a_result_of_another_fruit_is_never_returned(serve):
             )
             with pytest.raises(DeadlineMissedError):
                 await client.inspect(7, deadline_s=1.0)
-            shown = await client.shown()
+            shown = await client.pending_result()
             assert shown is not None
             return shown.trigger_id
 

@@ -35,7 +35,7 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench,
         if size:
             await plc.write(size)
         await plc.write({"control": 1 | 2, "trigger_id": trigger_id})
-        while (shown := await plc.shown()) is None:
+        while (shown := await plc.pending_result()) is None:
             await asyncio.sleep(0.02)
         await plc.write({"control": 1})
         assert shown.trigger_id == trigger_id
