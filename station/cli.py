@@ -31,7 +31,7 @@ COMMANDS = {
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
     "hmi": Entry("hmi.command:hmi", "Serve the operators' pages."),
-    "line": Entry("plc_interface.line.command:line", "Play the line's PLC against the station."),
+    "line": Entry("plc_interface.plc_simulator.command:line", "Play the line's PLC against the station."),
     "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Look after recipes, their revisions and approvals."),

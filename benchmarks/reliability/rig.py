@@ -20,7 +20,7 @@ import psutil
 from plc_interface.client import StationClient
 from plc_interface.client_errors import ClientError
 from plc_interface.codec import WordOrder
-from plc_interface.line.scan import Scanner
+from plc_interface.plc_simulator.scan import Scanner
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program

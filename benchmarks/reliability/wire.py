@@ -5,8 +5,8 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import NamedTuple
 
-from plc_interface.line.program import LineProgram, Outputs, Passage, Stage, Values
-from plc_interface.line.scan import Scanner
+from plc_interface.plc_simulator.program import LineProgram, Outputs, Passage, Stage, Values
+from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.register_map import BY_NAME
 from station.inspection.alarm_table import ALARMS, AlarmId
 

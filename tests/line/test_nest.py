@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from plc_interface.line.nest import GRADER_ERROR_MM, SEVERITIES, Grader, TwinNest
+from plc_interface.plc_simulator.nest import GRADER_ERROR_MM, SEVERITIES, Grader, TwinNest
 from station.settings.camera import TwinCameraSettings
 from station.settings.gripper import GripperSettings
 from station.twin.damage import DAMAGES, Severity

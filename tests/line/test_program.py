@@ -6,8 +6,15 @@ from typing import Any
 
 import pytest
 
-from plc_interface.line.faults import FaultPlan, LineFault
-from plc_interface.line.program import ANSWER_LIMIT_S, HEARTBEAT_LIMIT_S, LONGEST_SCAN_S, Decision, LineProgram, Stage
+from plc_interface.plc_simulator.faults import FaultPlan, LineFault
+from plc_interface.plc_simulator.program import (
+    ANSWER_LIMIT_S,
+    HEARTBEAT_LIMIT_S,
+    LONGEST_SCAN_S,
+    Decision,
+    LineProgram,
+    Stage,
+)
 from plc_interface.register_map import BY_NAME, RESULT, STATUS
 
 SCAN_S = 0.1

@@ -6,7 +6,7 @@ import pytest
 from pymodbus.exceptions import ModbusException
 
 from plc_interface.codec import WordOrder
-from plc_interface.line.scan import Scanner
+from plc_interface.plc_simulator.scan import Scanner
 
 
 @pytest.mark.parametrize("answered", [False, True])

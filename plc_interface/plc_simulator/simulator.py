@@ -5,9 +5,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from plc_interface.line.nest import LaidFruit, Nest
-from plc_interface.line.program import Decision, LineProgram, Passage
-from plc_interface.line.scan import Scanner
+from plc_interface.plc_simulator.nest import LaidFruit, Nest
+from plc_interface.plc_simulator.program import Decision, LineProgram, Passage
+from plc_interface.plc_simulator.scan import Scanner
 
 
 @dataclass(frozen=True, slots=True)

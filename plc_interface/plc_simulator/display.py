@@ -9,9 +9,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from plc_interface.line.nest import LaidFruit
-from plc_interface.line.program import Decision, Passage
-from plc_interface.line.simulator import Summary
+from plc_interface.plc_simulator.nest import LaidFruit
+from plc_interface.plc_simulator.program import Decision, Passage
+from plc_interface.plc_simulator.simulator import Summary
 
 _ROWS = 20
 _STYLES = {Decision.PASS: "green", Decision.FAIL: "bold red"}

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from plc_interface.codec import WordOrder, decode, encode, is_invalid
-from plc_interface.line.faults import FaultPlan, LineFault
+from plc_interface.plc_simulator.faults import FaultPlan, LineFault
 from plc_interface.register_bits import WRITE_KEY
 from plc_interface.register_map import BY_NAME
 

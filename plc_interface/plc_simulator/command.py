@@ -8,12 +8,12 @@ import click
 from rich.console import Console
 
 from plc_interface.codec import WordOrder
-from plc_interface.line.display import LineDisplay, summary_line
-from plc_interface.line.faults import FaultPlan, LineFault
-from plc_interface.line.nest import SEVERITIES, Nest, RealNest, TwinNest
-from plc_interface.line.program import LineProgram
-from plc_interface.line.scan import Scanner
-from plc_interface.line.simulator import LineSimulator, Pace
+from plc_interface.plc_simulator.display import LineDisplay, summary_line
+from plc_interface.plc_simulator.faults import FaultPlan, LineFault
+from plc_interface.plc_simulator.nest import SEVERITIES, Nest, RealNest, TwinNest
+from plc_interface.plc_simulator.program import LineProgram
+from plc_interface.plc_simulator.scan import Scanner
+from plc_interface.plc_simulator.simulator import LineSimulator, Pace
 from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes
