@@ -101,8 +101,8 @@ async def inspections(
         from_utc_ms=_utc_ms(begun_from),
         to_utc_ms=_utc_ms(begun_to),
     )
-    asked = FindInspections(search=search, limit=limit, below=below)
-    page = await hmi.gateway.ask(asked, InspectionPage, deadline_s=DEADLINE_S)
+    query = FindInspections(search=search, limit=limit, below=below)
+    page = await hmi.gateway.ask(query, InspectionPage, deadline_s=DEADLINE_S)
     return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
 
 
@@ -132,8 +132,8 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
     values = None
     if row.in_force is not None:
-        asked = GetRecipe(name=name, revision=row.in_force)
-        values = (await hmi.gateway.ask(asked, RecipeView, deadline_s=DEADLINE_S)).values
+        query = GetRecipe(name=name, revision=row.in_force)
+        values = (await hmi.gateway.ask(query, RecipeView, deadline_s=DEADLINE_S)).values
     return RecipeDetails(**_short(row), values=values)
 
 
@@ -156,8 +156,8 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
 @router.put("/lots/{name}", tags=["lots"])
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
-    asked = StartLot(name=name, grower=begin.grower, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(asked, LotView, deadline_s=DEADLINE_S))
+    query = StartLot(name=name, grower=begin.grower, actor=actor)
+    return LotAnswer.of(await hmi.gateway.ask(query, LotView, deadline_s=DEADLINE_S))
 
 
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
@@ -165,8 +165,8 @@ async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path(
     """End a lot. Idempotent."""
     if not (await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
-    asked = EndLot(name=name, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(asked, LotView, deadline_s=DEADLINE_S))
+    query = EndLot(name=name, actor=actor)
+    return LotAnswer.of(await hmi.gateway.ask(query, LotView, deadline_s=DEADLINE_S))
 
 
 def _short(row: RecipeRow) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 FREE_TRIES = 4
 FIRST_WAIT_S = 5.0
 LONGEST_WAIT_S = 900.0
-FORGOTTEN_AFTER_S = 3600.0
+CLEARED_AFTER_S = 3600.0
 _MOST_KEYS = 1000
 
 
@@ -38,7 +38,7 @@ class LoginRateLimiter:
         """
         for key in keys:
             tries, at_s = self._wrong.pop(key, (0, 0.0))
-            tries = 0 if self._clock() - at_s > FORGOTTEN_AFTER_S else tries
+            tries = 0 if self._clock() - at_s > CLEARED_AFTER_S else tries
             self._wrong[key] = tries + 1, self._clock()
         while len(self._wrong) > _MOST_KEYS:
             self._wrong.popitem(last=False)

@@ -54,7 +54,7 @@ class Interface:
         self._state = restarted(journal.read(), now(), settings.station_lost_after_s)
         self._statistics = Statistics()
         self._before_reset = (0, 0)
-        self._shown: dict[str, Value] = {}
+        self._written: dict[str, Value] = {}
         self._writer: Peer | None = None
         journal.write(self._state.journal, durable=True)
         self._show()
@@ -123,9 +123,9 @@ class Interface:
 
     def _show(self) -> None:
         values = view(self._state) | self._server_counts()
-        changed = {name: value for name, value in values.items() if self._shown.get(name, _NEVER) != value}
+        changed = {name: value for name, value in values.items() if self._written.get(name, _NEVER) != value}
         self._image.commit(changed)
-        self._shown = values
+        self._written = values
 
     def _carry_out(self, action: do.Action) -> None:
         match action:

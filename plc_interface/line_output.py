@@ -113,7 +113,7 @@ class RejectGate:
         self._io, self._distance = LineIo(settings), settings.distance_counts
         self._file = PendingRejectFile(folder)
         self._due = self._file.read()
-        self._shots: set[asyncio.Task[None]] = set()
+        self._rejects: set[asyncio.Task[None]] = set()
         self.renew_health = self._io.renew_health
         self.acknowledge_faults = self._io.acknowledge_faults
 
@@ -125,9 +125,9 @@ class RejectGate:
 
     async def stop(self) -> None:
         """Stop the heartbeat: the gate sets its safe output. The next run orders the pending rejects."""
-        for shot in self._shots:
+        for shot in self._rejects:
             shot.cancel()
-        await asyncio.gather(*self._shots, return_exceptions=True)
+        await asyncio.gather(*self._rejects, return_exceptions=True)
         await self._io.stop()
 
     def publish(self, outcome: Outcome) -> None:
@@ -143,16 +143,16 @@ class RejectGate:
 
     def _order(self, sequence: int, at_count: int) -> None:
         shot = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
-        self._shots.add(shot)
-        shot.add_done_callback(self._shots.discard)
+        self._rejects.add(shot)
+        shot.add_done_callback(self._rejects.discard)
 
     async def _divert(self, sequence: int, at_count: int) -> None:
-        said = ""
+        logged = ""
         while not self._is_too_far(sequence, at_count):
             try:
                 await self._io.divert(sequence, REJECTS_LANE, at_count)
             except (NotReadyError, InterfaceError, EchoMissingError, RejectLostError) as error:
-                if said != (said := type(error).__name__):
+                if logged != (logged := type(error).__name__):
                     log.warning("inspection %d: %s; its shot is ordered until its count is past", sequence, error)
                 await asyncio.sleep(_RETRY_S)
                 continue

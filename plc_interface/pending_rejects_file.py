@@ -24,7 +24,7 @@ class PendingRejectFile:
     def read(self) -> dict[int, int]:
         """Return the counts at which flaps are to open, by sequence; none if the file is absent or damaged."""
         try:
-            shots = {int(sequence): int(count) for sequence, count in json.loads(self._path.read_bytes()).items()}
+            counts = {int(sequence): int(count) for sequence, count in json.loads(self._path.read_bytes()).items()}
         except FileNotFoundError:
             return {}
         except (OSError, ValueError, TypeError, AttributeError) as error:
@@ -34,16 +34,16 @@ class PendingRejectFile:
                 type(error).__name__,
             )
             return {}
-        return {sequence: count for sequence, count in shots.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
+        return {sequence: count for sequence, count in counts.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
 
-    def write(self, shots: Mapping[int, int]) -> None:
+    def write(self, counts: Mapping[int, int]) -> None:
         """Replace the file. A failure is logged: the line goes on.
 
         Args:
-            shots: as `read` returns them.
+            counts: as `read` returns them.
         """
         try:
-            self._new.write_text(json.dumps(shots))
+            self._new.write_text(json.dumps(counts))
             self._new.replace(self._path)
         except OSError as error:
             log.error("the shots cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400

@@ -60,7 +60,7 @@ class StationLink:
         self._outcomes: dict[int, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._beat_now = asyncio.Event()
-        self._said = ""
+        self._logged = ""
 
     def start(self) -> None:
         """Start the beats."""
@@ -108,11 +108,11 @@ class StationLink:
             try:
                 state = await self._client.ask(self._line(), StationState, deadline_s=deadline_s)
             except ChannelError as error:
-                if str(error) != self._said:
+                if str(error) != self._logged:
                     log.warning("%s", error)
-                self._said = str(error)
+                self._logged = str(error)
             else:
-                self._said = ""
+                self._logged = ""
                 self._feed(ev.Beat(now(), state))
             try:
                 async with asyncio.timeout(period_s):
@@ -176,8 +176,8 @@ class StationLink:
         """Send notes one after the other: an acknowledgement never overtakes its outcome."""
         while self._notes:
             action = self._notes[0]
-            told = isinstance(action, do.NotifyPublished)
-            request = Published(outcome=action.outcome) if told else Acknowledged(sequence=action.sequence)
+            published = isinstance(action, do.NotifyPublished)
+            request = Published(outcome=action.outcome) if published else Acknowledged(sequence=action.sequence)
             try:
                 await self._client.ask(request, Noted, deadline_s=self._settings.station_lost_after_s)
             except RefusedError as error:
@@ -187,6 +187,6 @@ class StationLink:
                 self._feed(ev.RequestFailed(now(), str(error)))
                 return
             else:
-                if told:
+                if published:
                     self._feed(ev.OutcomeNoted(now(), action.outcome.sequence))
             self._notes.popleft()

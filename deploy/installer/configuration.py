@@ -27,12 +27,12 @@ def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
         copy = Path(folder) / layout.configuration.name
         shutil.copyfile(layout.configuration, copy)
         try:
-            said = run(program, "config", "migrate", "--write", copy, environment=layout.environment())
+            output = run(program, "config", "migrate", "--write", copy, environment=layout.environment())
             run(program, "config", "check", "--config", copy, environment=layout.environment())
         except Failed as error:
             wrong = str(error).partition("\n")[2].replace(str(copy), str(layout.configuration))
             raise Refused(f"{layout.configuration} is not good for {release.name}:\n{wrong}") from error
-    changes = tuple(line.removeprefix(f"{copy}: ") for line in said.splitlines())
+    changes = tuple(line.removeprefix(f"{copy}: ") for line in output.splitlines())
     return () if changes == ("nothing to change",) else changes
 
 

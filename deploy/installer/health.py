@@ -37,16 +37,16 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
     Raises:
         Failed: it is not healthy by then; with its report.
     """
-    address, deadline_s, said = _address(layout, release), time.monotonic() + limit_s, "it does not answer"
+    address, deadline_s, trouble = _address(layout, release), time.monotonic() + limit_s, "it does not answer"
     while time.monotonic() < deadline_s:
         try:
-            said = _trouble(address, version, was_ready=was_ready)
+            trouble = _trouble(address, version, was_ready=was_ready)
         except (OSError, http.client.HTTPException, ValueError) as error:
-            said = f"it does not answer: {error}"
-        if not said:
+            trouble = f"it does not answer: {error}"
+        if not trouble:
             return
         time.sleep(0.5)
-    raise Failed(f"the station is not well {limit_s:g} s after its start: {said}")
+    raise Failed(f"the station is not well {limit_s:g} s after its start: {trouble}")
 
 
 def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
@@ -65,8 +65,8 @@ def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
 def _address(layout: Layout, release: Path) -> tuple[str, int]:
     metrics = json.loads(station(layout, release, "config", "show"))["metrics"]
     host = str(metrics["host"])
-    asked = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 (a client, no listener)
-    return asked, metrics["port"]
+    address = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 (a client, no listener)
+    return address, metrics["port"]
 
 
 def _get(host: str, port: int, path: str) -> tuple[int, dict[str, Any]]:

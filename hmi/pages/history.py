@@ -84,7 +84,7 @@ async def search(
     typed = number.translate(_BETWEEN_DIGITS)
     if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
         return go_to(f"/history/{int(typed)}")
-    asked = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
+    typed = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
@@ -95,7 +95,7 @@ async def search(
         request,
         "history.html.j2",
         status=200 if wanted is not None else 400,
-        asked={**asked, "from": begun_from, "to": begun_to},
+        typed={**typed, "from": begun_from, "to": begun_to},
         bad=wanted is None,
         found=found,
         below=below,
@@ -124,8 +124,8 @@ async def export(
     wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     if wanted is None:
         raise Problem(400, "problem.bad_form")
-    asked = StartExport(search=wanted, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(asked, JobView, deadline_s=DEADLINE_S)
+    query = StartExport(search=wanted, form=form, actor=_actor(caller))
+    job = await hmi.gateway.ask(query, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
@@ -137,16 +137,16 @@ async def report(
     form: Annotated[Literal["html", "pdf"], Form()],
 ) -> Response:
     """Start a lot's report."""
-    asked = StartLotReport(lot=lot, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(asked, JobView, deadline_s=DEADLINE_S)
+    query = StartLotReport(lot=lot, form=form, actor=_actor(caller))
+    job = await hmi.gateway.ask(query, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
 @router.get("/audit")
 async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
     """Show the latest rows of the audit trail."""
-    asked = ReadAudit(limit=100, action=action, subject=subject)
-    reply = await hmi.gateway.ask(asked, AuditRows, deadline_s=DEADLINE_S)
+    query = ReadAudit(limit=100, action=action, subject=subject)
+    reply = await hmi.gateway.ask(query, AuditRows, deadline_s=DEADLINE_S)
     return show(request, "history_audit.html.j2", rows=reply.rows, action=action, subject=subject)
 
 
@@ -228,9 +228,9 @@ async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
 
 def _steps(reply: InspectionView) -> list[dict[str, Any]]:
     """Return every point of the curve, with its image and mask where these are stored."""
-    kept = {(each.kind, each.step): each for each in reply.images if each.there}
+    stored = {(each.kind, each.step): each for each in reply.images if each.there}
     return [
-        {"point": point, "image": kept.get(("step", point.step)), "mask": kept.get(("mask", point.step))}
+        {"point": point, "image": stored.get(("step", point.step)), "mask": stored.get(("mask", point.step))}
         for point in reply.curve
     ]
 

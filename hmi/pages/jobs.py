@@ -79,8 +79,8 @@ async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Respo
     async def pieces() -> AsyncIterator[bytes]:
         offset = 0
         while offset < found.size_bytes:
-            asked = ReadJobFile(job=job, name=name, offset=offset)
-            chunk = await hmi.gateway.ask(asked, Chunk, deadline_s=DEADLINE_S)
+            query = ReadJobFile(job=job, name=name, offset=offset)
+            chunk = await hmi.gateway.ask(query, Chunk, deadline_s=DEADLINE_S)
             if not chunk.data:
                 raise Problem(409, "problem.refused")
             offset += len(chunk.data)

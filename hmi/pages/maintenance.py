@@ -88,15 +88,15 @@ async def hand(
 @router.post("/mode")
 async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
     """Set manual mode, in which no fruit is accepted, or production again."""
-    asked = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
-    shown = await hmi.gateway.ask(asked, OperatorCommandView, deadline_s=DEADLINE_S)
+    query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
+    command = await hmi.gateway.ask(query, OperatorCommandView, deadline_s=DEADLINE_S)
     until_s = time.monotonic() + MODE_S
-    while shown.state == "executing" and time.monotonic() < until_s:
+    while command.state == "executing" and time.monotonic() < until_s:
         await asyncio.sleep(0.1)
         if (await _health(hmi))["health"].mode == int(mode):
             break
-    if shown.state == "failed":
-        raise RefusedError(shown.why)
+    if command.state == "failed":
+        raise RefusedError(command.why)
     return go_to("/maintenance/hand")
 
 
@@ -110,18 +110,18 @@ async def jog(
     """Move the fingers, or stop them; the page shows their position, or why they do not move."""
     try:
         width = float(width_mm.replace(",", ".")) if to == "width" else None
-        asked = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
+        query = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
     except ValueError:
         raise Problem(400, "problem.bad_form") from None
-    jogged = await hmi.gateway.ask(asked, Jogged, deadline_s=MOVE_DEADLINE_S)
+    jogged = await hmi.gateway.ask(query, Jogged, deadline_s=MOVE_DEADLINE_S)
     return go_to(f"/maintenance/hand?at_mm={jogged.width_mm:.1f}")
 
 
 @router.post("/leds")
 async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
-    asked = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
-    await hmi.gateway.ask(asked, LedsSet, deadline_s=DEADLINE_S)
+    query = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
+    await hmi.gateway.ask(query, LedsSet, deadline_s=DEADLINE_S)
     return go_to("/maintenance/hand?lit=yes")
 
 
@@ -184,8 +184,8 @@ async def begin(
     if len(parsed) > 6 or not all(parsed):
         raise Problem(400, "problem.bad_form")
     wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
-    asked = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
-    await hmi.gateway.ask(asked, CalibrationRunView, deadline_s=DEADLINE_S)
+    query = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
+    await hmi.gateway.ask(query, CalibrationRunView, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 

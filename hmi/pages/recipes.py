@@ -70,8 +70,8 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
     standing = await _row(hmi, name)
     changes: tuple[Change, ...] = ()
     if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
-        asked = CompareRecipe(name=name, new=standing.waiting)
-        changes = (await hmi.gateway.ask(asked, Changes, deadline_s=DEADLINE_S)).changes
+        query = CompareRecipe(name=name, new=standing.waiting)
+        changes = (await hmi.gateway.ask(query, Changes, deadline_s=DEADLINE_S)).changes
     values = await _values(hmi, name, standing)
     drawn = None if values is None else await _drawn(hmi, name, values)
     return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
@@ -117,8 +117,8 @@ async def save(
     if not changes:
         return await _form(request, hmi, locale, reply, typed, locale.text("recipes.nothing_changed"), reason)
     try:
-        asked = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
-        await hmi.gateway.ask(asked, RecipeRow, deadline_s=DEADLINE_S)
+        query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
+        await hmi.gateway.ask(query, RecipeRow, deadline_s=DEADLINE_S)
     except RefusedError as error:
         return await _form(request, hmi, locale, reply, typed, str(error), reason)
     return go_to(f"/recipes/{name}")
@@ -163,8 +163,8 @@ async def history(
     request: Request, hmi: HmiNow, name: Name, below: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the revisions: author, approver, dates, differences."""
-    asked = GetRecipeHistory(name=name, below=below)
-    reply = await hmi.gateway.ask(asked, RecipeHistory, deadline_s=DEADLINE_S)
+    query = GetRecipeHistory(name=name, below=below)
+    reply = await hmi.gateway.ask(query, RecipeHistory, deadline_s=DEADLINE_S)
     return show(request, "recipe_history.html.j2", row=await _row(hmi, name), reply=reply, tab="history")
 
 
@@ -277,8 +277,8 @@ async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
     revision = row.waiting or row.in_force
     if revision is None:
         return None
-    asked = GetRecipe(name=name, revision=revision)
-    return (await hmi.gateway.ask(asked, RecipeView, deadline_s=DEADLINE_S)).values
+    query = GetRecipe(name=name, revision=revision)
+    return (await hmi.gateway.ask(query, RecipeView, deadline_s=DEADLINE_S)).values
 
 
 async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from station.channel.panel_live import (
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
-SHOWN = 20
+MOST_RECENT = 20
 ORDER_DEADLINE_S = 5.0
 _MOST_REASONS = 3
 _ORDERS = frozenset(
@@ -44,7 +44,7 @@ _ORDERS = frozenset(
         OperatorCommandName.END_LOT,
     }
 )
-_KEPT_FOR_EVER = "private, max-age=31536000, immutable"
+_IMMUTABLE = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
@@ -86,7 +86,7 @@ def _figures(gateway: Gateway) -> object:
 def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
     fruit = gateway.recent.fruit
     reasons = Counter(reason for each in fruit for reason in each.reasons[:1])
-    times_s = [each.duration_ms / 1000 for each in fruit[:SHOWN]]
+    times_s = [each.duration_ms / 1000 for each in fruit[:MOST_RECENT]]
     return {
         "state": gateway.state,
         "last": gateway.last,
@@ -104,7 +104,7 @@ def _recent(gateway: Gateway) -> object:
 
 
 def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    return {"fruit": gateway.recent.fruit[:SHOWN], "sketch": charts.sketch}
+    return {"fruit": gateway.recent.fruit[:MOST_RECENT], "sketch": charts.sketch}
 
 
 PARTS = {
@@ -154,7 +154,7 @@ async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {found.width_px} {found.height_px}" {size}>'
         f'<image {size} href="data:image/jpeg;base64,{found.jpeg}"/>{outline}</svg>'
     )
-    return Response(drawn, media_type="image/svg+xml", headers={"cache-control": _KEPT_FOR_EVER})
+    return Response(drawn, media_type="image/svg+xml", headers={"cache-control": _IMMUTABLE})
 
 
 @router.post("/order")

@@ -220,9 +220,9 @@ def _put(node: Node, index: int, subindex: int, value: int) -> None:
     variable = _variable(node, index, subindex)
     with _sdo_access(node, f"to set its {variable.name} to 0x{value:X}"):
         variable.raw = value
-    kept = _get(node, index, subindex)
-    if kept != value:
-        raise BringUpError(f"{node.name} was told {variable.name} 0x{value:X} and holds 0x{kept:X}; {_OTHER_NODE}")
+    stored = _get(node, index, subindex)
+    if stored != value:
+        raise BringUpError(f"{node.name} was told {variable.name} 0x{value:X} and holds 0x{stored:X}; {_OTHER_NODE}")
 
 
 def read_position(node: Node) -> int:

@@ -53,7 +53,7 @@ class LineIo:
     def __init__(self, settings: CanSettings) -> None:
         self._settings = settings
         self._counters: Counter[str] = Counter()
-        self._shots = PendingRejects(self._counters, settings.tolerance_counts)
+        self._rejects = PendingRejects(self._counters, settings.tolerance_counts)
         self._emergencies: dict[tuple[int, int], str] = {}
         self._healthy_until_s = 0.0
         self._link: CanLink | None = None
@@ -107,15 +107,15 @@ class LineIo:
     def faults(self) -> tuple[str, ...]:
         """Return the faults of the bus, its nodes and recent reject actuations, one sentence each."""
         trouble = (self._trouble,) if self._trouble else ()
-        return (*trouble, *self._emergencies.values(), *self._shots.faults)
+        return (*trouble, *self._emergencies.values(), *self._rejects.faults)
 
     def give_up(self, error: RejectError) -> None:
         """Count a reject actuation that is not ordered at all, and store it as a fault."""
-        self._shots.blame(error)
+        self._rejects.blame(error)
 
     def acknowledge_faults(self) -> None:
         """Clear the faults of reject actuations; those of the bus and its nodes end with their cause."""
-        self._shots.faults.clear()
+        self._rejects.faults.clear()
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -163,7 +163,7 @@ class LineIo:
         link, now = self._link, self.encoder_count()
         if not self.ready or link is None or now is None:
             raise NotReadyError(f"shot {sequence} was not ordered: {self.why_not_ready}")
-        with self._shots.under_way(Order(sequence, lane, at_count)) as shot:
+        with self._rejects.under_way(Order(sequence, lane, at_count)) as shot:
             if ahead(now.value, at_count) <= 0:
                 raise LateRejectError(
                     sequence,
@@ -266,7 +266,7 @@ class LineIo:
         link = CanLink(
             self._settings,
             self._counters,
-            lambda report: loop.call_soon_threadsafe(self._shots.on_report, report),
+            lambda report: loop.call_soon_threadsafe(self._rejects.on_report, report),
             lambda emergency: loop.call_soon_threadsafe(self._on_emergency, emergency),
         )
         self._link, why = link, "the driver was stopped"
@@ -281,7 +281,7 @@ class LineIo:
             raise
         finally:
             self._operational, self._link = False, None
-            self._shots.lose(why)
+            self._rejects.lose(why)
             link.abort()
             await self._in_worker(link.close)
 

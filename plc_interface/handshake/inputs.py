@@ -90,7 +90,7 @@ def _open_answered(work: Work, event: OpenAnswered) -> None:
 
 def _outcome_noted(work: Work, event: OutcomeNoted) -> None:
     verdicts = work.state.journal.verdicts
-    work.update_journal(verdicts=tuple(verdict for verdict in verdicts if verdict.sequence != event.sequence))
+    work.update_journal(verdicts=tuple(outcome for outcome in verdicts if outcome.sequence != event.sequence))
 
 
 def _plc_wrote(work: Work, event: PlcWrote) -> None:
@@ -157,7 +157,7 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
     after = by_bit and sequence == state.unconfirmed
     if by_bit:
         state.unconfirmed = 0
-    if (by_bit or written) and state.queue and sequence == state.queue[0].sequence == state.shown:
+    if (by_bit or written) and state.queue and sequence == state.queue[0].sequence == state.published:
         work.signals.append(Signal.ACKNOWLEDGED)
     elif after and sequence:
         work.signals.append(Signal.ACKNOWLEDGE_AFTER)

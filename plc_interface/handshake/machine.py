@@ -30,13 +30,13 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
     apply_event(work)
     _run(work)
     state = work.state
-    kept = {
+    changes = {
         "queue": state.queue,
         "running": state.running,
         "asked_id": state.pending.trigger_id if state.pending else None,
     }
-    if any(getattr(state.journal, name) != value for name, value in kept.items()):
-        work.update_journal(**kept)
+    if any(getattr(state.journal, name) != value for name, value in changes.items()):
+        work.update_journal(**changes)
     if state.journal == before.journal:
         return state, tuple(work.actions)
     durable = (state.journal.verdicts, state.journal.disowned) != (before.journal.verdicts, before.journal.disowned)

@@ -58,7 +58,7 @@ class Result(StrEnum):
     """The result block and its acknowledgement."""
 
     EMPTY = "empty"
-    SHOWN = "shown"
+    PUBLISHED = "published"
     TAKEN = "taken"
     """Acknowledged; the PLC's bit has to fall before the next result is published."""
 

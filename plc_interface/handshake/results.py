@@ -24,7 +24,7 @@ def one_waits(work: Work) -> bool:
 def show(work: Work) -> None:
     """Show the oldest result, toggle."""
     work.state.toggle = not work.state.toggle
-    work.state.shown = work.state.queue[0].sequence
+    work.state.published = work.state.queue[0].sequence
 
 
 def take(work: Work) -> None:
@@ -62,29 +62,29 @@ def wrong(work: Work) -> None:
     work.fault(Fault.WRONG_ACKNOWLEDGEMENT)
 
 
-EMPTY, SHOWN, TAKEN = Result.EMPTY, Result.SHOWN, Result.TAKEN
+EMPTY, PUBLISHED, TAKEN = Result.EMPTY, Result.PUBLISHED, Result.TAKEN
 
 ROWS = (
-    row(EMPTY, Signal.QUEUED, show, to=SHOWN),
+    row(EMPTY, Signal.QUEUED, show, to=PUBLISHED),
     row(EMPTY, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
     row(EMPTY, Signal.ACKNOWLEDGE_OFF, enable_bit),
     row(EMPTY, Signal.WRITER_LOST, enable_bit),
-    row(SHOWN, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
-    row(SHOWN, Signal.ACKNOWLEDGED, take, show, when=another_waits),
-    row(SHOWN, Signal.ACKNOWLEDGED, take, to=EMPTY),
-    row(SHOWN, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
-    row(SHOWN, Signal.QUEUED),
-    row(SHOWN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
-    row(SHOWN, Signal.ACKNOWLEDGE_OFF, enable_bit),
-    row(SHOWN, Signal.WRITER_LOST, enable_bit),
+    row(PUBLISHED, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
+    row(PUBLISHED, Signal.ACKNOWLEDGED, take, show, when=another_waits),
+    row(PUBLISHED, Signal.ACKNOWLEDGED, take, to=EMPTY),
+    row(PUBLISHED, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
+    row(PUBLISHED, Signal.QUEUED),
+    row(PUBLISHED, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
+    row(PUBLISHED, Signal.ACKNOWLEDGE_OFF, enable_bit),
+    row(PUBLISHED, Signal.WRITER_LOST, enable_bit),
     row(TAKEN, Signal.ACKNOWLEDGED, take),
     row(TAKEN, Signal.QUEUED),
     row(TAKEN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
-    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, show, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, to=EMPTY),
-    row(TAKEN, Signal.WRITER_LOST, end_watch, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.WRITER_LOST, end_watch, show, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.WRITER_LOST, end_watch, to=EMPTY),
-    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, show, to=SHOWN, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, show, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, to=EMPTY),
 )

@@ -28,12 +28,12 @@ def resynchronise(work: Work) -> None:
         return
     state, opened = work.state, work.event.opened
     state.open_request = None
-    stands = {outcome.sequence: outcome for outcome in (*state.journal.verdicts, *state.queue)}
-    work.actions += [NotifyPublished(stands[sequence]) for sequence in sorted(stands)]
+    final = {outcome.sequence: outcome for outcome in (*state.journal.verdicts, *state.queue)}
+    work.actions += [NotifyPublished(final[sequence]) for sequence in sorted(final)]
     for outcome in sorted(opened.outcomes, key=lambda outcome: outcome.sequence):
-        _resynchronise_outcome(work, outcome, known=outcome.sequence in stands)
+        _resynchronise_outcome(work, outcome, known=outcome.sequence in final)
     if opened.running is not None:
-        _resynchronise_running(work, *opened.running, known=opened.running[0] in stands)
+        _resynchronise_running(work, *opened.running, known=opened.running[0] in final)
     if state.running is not None and not _is_open(opened, state.running.sequence):
         work.signals.append(Signal.GONE)
     pass_over_hidden(work)

@@ -117,7 +117,7 @@ class State:
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first one is published."""
-    shown: int = 0
+    published: int = 0
     """The sequence of the last published result."""
     toggle: bool = False
 
@@ -173,8 +173,8 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         reset_utc_ms=at.utc_ms,
         journal=journal.model_copy(update=changes),
         queue=journal.queue,
-        result=Result.SHOWN if journal.queue else Result.EMPTY,
-        shown=journal.queue[0].sequence if journal.queue else 0,
+        result=Result.PUBLISHED if journal.queue else Result.EMPTY,
+        published=journal.queue[0].sequence if journal.queue else 0,
     )
     if journal.asked_id is not None:
         state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True

@@ -77,7 +77,7 @@ def _status_bits(state: State) -> list[str]:
         "trigger_acknowledged": state.trigger in {Trigger.ANSWERED, Trigger.HELD},
         "acquiring": running,
         "inspecting": running,
-        "result_valid": state.result is Result.SHOWN,
+        "result_valid": state.result is Result.PUBLISHED,
         "overrun": state.overrun,
         "missed": state.missed,
         "command_executing": state.command is Command.EXECUTING,
@@ -97,8 +97,8 @@ def _is_faulted(station: StationState | None) -> bool:
 
 
 def _result(state: State) -> dict[str, Value]:
-    shown = state.queue[0] if state.result is Result.SHOWN else None
-    return _NO_RESULT if shown is None else result_values(shown)
+    published = state.queue[0] if state.result is Result.PUBLISHED else None
+    return _NO_RESULT if published is None else result_values(published)
 
 
 def result_values(outcome: Outcome) -> dict[str, Value]:

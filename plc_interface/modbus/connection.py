@@ -23,9 +23,9 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     pymodbus' own path from bytes to response is replaced, see decision 0012.
     """
 
-    def __init__(self, listener: ModbusBaseServer, hub: "ConnectionManager") -> None:
+    def __init__(self, listener: ModbusBaseServer, manager: "ConnectionManager") -> None:
         super().__init__(listener, None, None, None)
-        self._hub = hub
+        self._manager = manager
         self._buffer = bytearray(_BUFFER_BYTES)
         self._view = memoryview(self._buffer)
         self._filled = 0
@@ -42,8 +42,8 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the client, or close the connection."""
         super().connection_made(transport)
-        self.heard_s = self._hub.now_s()
-        self.peer = self._hub.admit(self, cast("asyncio.Transport", transport))
+        self.heard_s = self._manager.now_s()
+        self.peer = self._manager.admit(self, cast("asyncio.Transport", transport))
         if self.peer is None:
             self.drop()
 
@@ -62,7 +62,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         if self._ended:
             return
         if trouble is not None:
-            self._hub.note(trouble, self.peer, f"{why}: its connection is closed")
+            self._manager.note(trouble, self.peer, f"{why}: its connection is closed")
         self._end("")
         transport = cast("asyncio.Transport | None", self.transport)
         # read before it is closed: a TLS transport that is closed twice has lost its buffer
@@ -79,17 +79,17 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         """Answer every complete request."""
         if self._ended:
             return
-        hub, peer = self._hub, cast("Peer", self.peer)
+        manager, peer = self._manager, cast("Peer", self.peer)
         size = self._filled + nbytes
         used = 0
         answers: list[bytes] = []
         malformed = ""
-        now_s = hub.now_s()
+        now_s = manager.now_s()
         try:
             for (transaction, unit, message), end in frames(self._buffer, size):
                 used = end
                 self.heard_s = now_s
-                answers.append(framed(transaction, unit, hub.answer(peer, unit, message)))
+                answers.append(framed(transaction, unit, manager.answer(peer, unit, message)))
         except MalformedFrameError as error:
             malformed = str(error)
         if answers and not self._ended:
@@ -108,25 +108,25 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         if used:
             self._buffer[: self._filled] = self._buffer[used:size]
         if used or self.unfinished_since_s is None:
-            self.unfinished_since_s = self._hub.now_s()
+            self.unfinished_since_s = self._manager.now_s()
 
     def eof_received(self) -> None:
         """Close the connection after the client's last byte: no request is left."""
 
     def pause_writing(self) -> None:
         """Read no more requests while the client does not take its responses."""
-        self.stalled_since_s = self._hub.now_s()
+        self.stalled_since_s = self._manager.now_s()
         cast("asyncio.ReadTransport", self.transport).pause_reading()
 
     def resume_writing(self) -> None:
         """Go on reading."""
         self.stalled_since_s = None
         if self.unfinished_since_s is not None:
-            self.unfinished_since_s = self._hub.now_s()
+            self.unfinished_since_s = self._manager.now_s()
         if not self._ended:
             cast("asyncio.ReadTransport", self.transport).resume_reading()
 
     def _end(self, why: str) -> None:
         if not self._ended:
             self._ended = True
-            self._hub.gone(self.peer, why)
+            self._manager.gone(self.peer, why)

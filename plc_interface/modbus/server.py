@@ -34,9 +34,9 @@ class Listener(ModbusTcpServer):
     """Accepts connections on one port."""
 
     def __init__(
-        self, hub: ConnectionManager, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None
+        self, manager: ConnectionManager, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None
     ) -> None:
-        self._hub = hub
+        self._manager = manager
         if context is not None:
             self.tls_setup = CommParams(comm_name="modbus over TLS", comm_type=CommType.TLS, sslctx=context)
         nothing = SimDevice(0, [SimData(0, datatype=DataType.REGISTERS)])  # the image is read instead
@@ -53,7 +53,7 @@ class Listener(ModbusTcpServer):
 
     def _connection(self) -> Connection:
         """Make a connection that pymodbus does not register: it would retain those that fail in the TLS handshake."""
-        return Connection(self, self._hub)
+        return Connection(self, self._manager)
 
 
 class ModbusServer:
@@ -70,23 +70,23 @@ class ModbusServer:
             on_writer: called when the right to write is granted or withdrawn.
         """
         self._settings = settings
-        self._hub = ConnectionManager(settings, image, on_write, on_writer)
+        self._manager = ConnectionManager(settings, image, on_write, on_writer)
         self._listeners: list[Listener] = []
 
     @property
     def statistics(self) -> Statistics:
         """Counters since the server was made."""
-        return self._hub.statistics
+        return self._manager.statistics
 
     @property
     def connections(self) -> int:
         """Number of connected clients."""
-        return self._hub.connections
+        return self._manager.connections
 
     @property
     def writer(self) -> Peer | None:
         """The client with the right to write, if any."""
-        return self._hub.write_lock.holder
+        return self._manager.write_lock.holder
 
     async def start(self) -> None:
         """Listen on the port, and on the second one where TLS is enabled.
@@ -103,19 +103,19 @@ class ModbusServer:
         except StationError:
             await self.stop()
             raise
-        self._hub.open()
+        self._manager.open()
 
     async def stop(self) -> None:
         """Close the ports and every connection. Idempotent."""
         for listener in self._listeners:
             await listener.shutdown()
         self._listeners.clear()
-        self._hub.close()
+        self._manager.close()
         await asyncio.sleep(0)
 
     async def _listen(self, section: str, port: int, context: ssl.SSLContext | None) -> None:
         host = self._settings.host
-        listener = Listener(self._hub, host, port, self._settings.frame_timeout_s, context)
+        listener = Listener(self._manager, host, port, self._settings.frame_timeout_s, context)
         try:
             await listener.open()
         except OSError as error:

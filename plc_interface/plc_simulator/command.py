@@ -137,10 +137,10 @@ async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, c
     console = Console()
     async with scanner:
         simulator = LineSimulator(program, scanner, nest, pace)
-        running, told = asyncio.ensure_future(simulator.run(count)), asyncio.Event()
+        running, interrupted = asyncio.ensure_future(simulator.run(count)), asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, told.set)
-        ending = asyncio.ensure_future(told.wait())
+            asyncio.get_running_loop().add_signal_handler(number, interrupted.set)
+        ending = asyncio.ensure_future(interrupted.wait())
         with LineDisplay(console, simulator.summary) as display:
             simulator.on_passage, simulator.on_scan = display.passed, display.show_activity
             await asyncio.wait([running, ending], return_when=asyncio.FIRST_COMPLETED)

@@ -76,8 +76,8 @@ class ChannelClient:
                 await self._socket.send_multipart([envelope, name.encode(), request.model_dump_json().encode()])
                 status, body = await answer
         except TimeoutError:
-            asked = request.asked or f"for {name}"
-            raise DeadlineError(f"{self._peer} gave no answer within {deadline_s:g} s when asked {asked}") from None
+            purpose = request.purpose or f"for {name}"
+            raise DeadlineError(f"{self._peer} gave no answer within {deadline_s:g} s when asked {purpose}") from None
         except zmq.ZMQError as error:
             raise ChannelError(f"the channel to {self._peer} was closed") from error
         finally:

@@ -68,7 +68,7 @@ class Outcome(Message):
 class Begin(Message):
     """Inspect one fruit. Answered once the trigger is durable, before anything moves."""
 
-    asked: ClassVar[str] = "to begin an inspection"
+    purpose: ClassVar[str] = "to begin an inspection"
     trigger_id: int = Field(ge=1, le=65_535)
     encoder: int = Field(ge=0, lt=2**32)
     lot: str = Field(max_length=32)
@@ -91,28 +91,28 @@ class BeginReply(Message):
 class AwaitOutcome(Message):
     """Wait for the outcome of an accepted inspection."""
 
-    asked: ClassVar[str] = "for an inspection's outcome"
+    purpose: ClassVar[str] = "for an inspection's outcome"
     sequence: int = Field(ge=1, lt=2**32)
 
 
 class Published(Message):
     """The PLC can read this outcome now. It is final, also against another one that the station holds."""
 
-    asked: ClassVar[str] = "to note what the PLC was told"
+    purpose: ClassVar[str] = "to note what the PLC was told"
     outcome: Outcome
 
 
 class Acknowledged(Message):
     """The PLC has taken the outcomes up to this sequence."""
 
-    asked: ClassVar[str] = "to note an acknowledgement"
+    purpose: ClassVar[str] = "to note an acknowledgement"
     sequence: int = Field(ge=0, lt=2**32)
 
 
 class Resume(Message):
     """Query the open inspections, after a start or a lost connection."""
 
-    asked: ClassVar[str] = "what is open"
+    purpose: ClassVar[str] = "what is open"
 
 
 class Open(Message):
@@ -140,7 +140,7 @@ class RegisterView(Message):
 class Line(Message):
     """State of the line at the interface, sent with every beat, for the station's alarms, metrics and pages."""
 
-    asked: ClassVar[str] = "for the station's state"
+    purpose: ClassVar[str] = "for the station's state"
     plc_connected: bool
     plc_alive: bool
     """The PLC's heartbeat changes in time."""
@@ -188,7 +188,7 @@ class StationState(Message):
 class Command(Message):
     """Execute a command of the PLC; answered when it is done."""
 
-    asked: ClassVar[str] = "to carry out a command"
+    purpose: ClassVar[str] = "to carry out a command"
     command: CommandName
     argument: int = Field(ge=0, le=65_535)
 

@@ -17,7 +17,7 @@ class Message(BaseModel):
     """A request or a reply: strict, frozen, nothing unknown. Its class name is its name on the wire."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-    asked: ClassVar[str] = ""
+    purpose: ClassVar[str] = ""
     """The request as an operator reads it, continuing "when asked"; empty for the class name."""
 
 

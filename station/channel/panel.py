@@ -22,14 +22,14 @@ class Recover(Message):
     It enables the arm, and moves nothing; the station continues only after a reset.
     """
 
-    asked: ClassVar[str] = "to bring the arm back"
+    purpose: ClassVar[str] = "to bring the arm back"
     what: RecoveryName
 
 
 class ListAlarms(Message):
     """Query the alarms that are not in their normal state. Answered with `AlarmList`."""
 
-    asked: ClassVar[str] = "for its alarms"
+    purpose: ClassVar[str] = "for its alarms"
 
 
 class ListedAlarm(Message):
@@ -82,13 +82,13 @@ class AlarmAction(Message):
 class AcknowledgeAlarm(AlarmAction):
     """Acknowledge an alarm. Idempotent."""
 
-    asked: ClassVar[str] = "to acknowledge an alarm"
+    purpose: ClassVar[str] = "to acknowledge an alarm"
 
 
 class ShelveAlarm(AlarmAction):
     """Shelve an alarm, in the list and for the PLC; refused for a latched one and for one that is shelved."""
 
-    asked: ClassVar[str] = "to shelve an alarm"
+    purpose: ClassVar[str] = "to shelve an alarm"
     reason: str = Field(max_length=1000)
     """The reason; never empty."""
     for_s: float = Field(gt=0, allow_inf_nan=False)
@@ -98,4 +98,4 @@ class ShelveAlarm(AlarmAction):
 class UnshelveAlarm(AlarmAction):
     """Unshelve an alarm before its time is over. Idempotent."""
 
-    asked: ClassVar[str] = "to show a shelved alarm again"
+    purpose: ClassVar[str] = "to show a shelved alarm again"

@@ -44,7 +44,7 @@ class OperatorCommand(Message):
     idempotent, except that a command in progress is not started twice.
     """
 
-    asked: ClassVar[str] = "to carry out an order"
+    purpose: ClassVar[str] = "to carry out an order"
     person: Actor
     order: OperatorCommandName
     argument: str = Field(default="", max_length=64)
@@ -70,7 +70,7 @@ class OperatorCommandView(Message):
 class PersonNoted(Message):
     """An event of a person's log-in or rights, for the audit trail. Answered with `line.Noted`."""
 
-    asked: ClassVar[str] = "to note who is at the panel"
+    purpose: ClassVar[str] = "to note who is at the panel"
     person: Actor
     what: Literal[
         "logged_in", "log_in_refused", "logged_out", "idle", "added", "changed", "removed", "cleaning", "unlocked"
@@ -81,7 +81,7 @@ class PersonNoted(Message):
 class GetPanelState(Message):
     """Query the operator's summary. Answered with `PanelState`."""
 
-    asked: ClassVar[str] = "for its state"
+    purpose: ClassVar[str] = "for its state"
 
 
 class RecipeNames(Message):
@@ -187,7 +187,7 @@ class PanelState(Message):
 class GetRecent(Message):
     """Query the latest fruit. Answered with `Recent`."""
 
-    asked: ClassVar[str] = "for the last fruit"
+    purpose: ClassVar[str] = "for the last fruit"
     most: int = Field(default=20, ge=1, le=200)
 
 
@@ -200,7 +200,7 @@ class Recent(Message):
 class GetFruit(Message):
     """Query one of the latest fruit in full. Answered with `Fruit`; refused if it is not among the latest any more."""
 
-    asked: ClassVar[str] = "for a fruit"
+    purpose: ClassVar[str] = "for a fruit"
     sequence: int = Field(ge=1, lt=2**32)
 
 
@@ -243,7 +243,7 @@ class Fruit(Message):
 class GetPicture(Message):
     """Query a fruit's picture. Answered with `Picture`; refused if it is not stored any more."""
 
-    asked: ClassVar[str] = "for a picture"
+    purpose: ClassVar[str] = "for a picture"
     sequence: int = Field(ge=1, lt=2**32)
 
 
@@ -261,7 +261,7 @@ class Picture(Message):
 class GetRecipes(Message):
     """Query the recipes to select from. Answered with `Recipes`."""
 
-    asked: ClassVar[str] = "for the recipes"
+    purpose: ClassVar[str] = "for the recipes"
 
 
 class Recipes(Message):
@@ -277,7 +277,7 @@ class Recipes(Message):
 class GetAlarmHistory(Message):
     """Query recent changes of alarms. Answered with `AlarmHistory`."""
 
-    asked: ClassVar[str] = "for the alarms' history"
+    purpose: ClassVar[str] = "for the alarms' history"
     most: int = Field(default=100, ge=1, le=1000)
 
 

@@ -18,7 +18,7 @@ Serial = Annotated[str, Field(max_length=64)]
 class GetHealth(Message):
     """Query the state of every part, with ages."""
 
-    asked: ClassVar[str] = "for the station's health"
+    purpose: ClassVar[str] = "for the station's health"
 
 
 class PartHealth(Message):
@@ -58,7 +58,7 @@ class Health(Message):
 class JogGripper(Message):
     """Move the fingers, slowly and with the least force; in manual mode only. Answered with `Jogged`."""
 
-    asked: ClassVar[str] = "to jog the gripper"
+    purpose: ClassVar[str] = "to jog the gripper"
     to: Literal["open", "width", "stop"]
     width_mm: float | None = Field(default=None, ge=0.0, le=85.0, allow_inf_nan=False)
     """For `to` = `width`."""
@@ -76,7 +76,7 @@ class Jogged(Message):
 class SetLeds(Message):
     """Set the sensor's light; in manual mode only. Answered with `LedsSet`."""
 
-    asked: ClassVar[str] = "to set the LEDs"
+    purpose: ClassVar[str] = "to set the LEDs"
     red: int = Field(ge=0, le=15)
     green: int = Field(ge=0, le=15)
     blue: int = Field(ge=0, le=15)
@@ -90,7 +90,7 @@ class LedsSet(Message):
 class GetLiveImage(Message):
     """Query the sensor's newest image."""
 
-    asked: ClassVar[str] = "for a live image"
+    purpose: ClassVar[str] = "for a live image"
     contact: bool = False
     """Draw in what is measured against the golden reference, by the active recipe's method."""
     newer_than_s: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
@@ -122,7 +122,7 @@ class LiveImage(Message):
 class GetCalibration(Message):
     """Query the sensor's calibration and its last verification."""
 
-    asked: ClassVar[str] = "for the calibration"
+    purpose: ClassVar[str] = "for the calibration"
 
 
 class CheckView(Message):
@@ -194,7 +194,7 @@ class CalibrationState(Message):
 class GetCalibrationPicture(Message):
     """Query a plot of a calibration or verification. Answered with `Picture`."""
 
-    asked: ClassVar[str] = "for a calibration's plot"
+    purpose: ClassVar[str] = "for a calibration's plot"
     kind: Literal["calibration", "verification"]
     name: str = Field(pattern=r"^(area|field|reference)\.png$")
 
@@ -202,7 +202,7 @@ class GetCalibrationPicture(Message):
 class StartCalibrationRun(Message):
     """Calibrate or verify, in manual mode: the gripper closes on the ball. Answered with `CalibrationRunView`."""
 
-    asked: ClassVar[str] = "to begin at the ball"
+    purpose: ClassVar[str] = "to begin at the ball"
     kind: Literal["calibration", "verification"]
     places: tuple[tuple[float, float], ...] = Field(default=(), max_length=6)
     """Further places of the ball, mm beside its first; the run requests each in turn."""
@@ -212,21 +212,21 @@ class StartCalibrationRun(Message):
 class ContinueCalibrationRun(Message):
     """Confirm that the ball is in place. Answered with `CalibrationRunView`."""
 
-    asked: ClassVar[str] = "to go on at the ball"
+    purpose: ClassVar[str] = "to go on at the ball"
     actor: Actor
 
 
 class EndCalibrationRun(Message):
     """Cancel the run; the jaws open. Idempotent; answered with `CalibrationRunView`."""
 
-    asked: ClassVar[str] = "to call the run off"
+    purpose: ClassVar[str] = "to call the run off"
     actor: Actor
 
 
 class GetRegisters(Message):
     """Query the PLC's registers; the PLC interface sends them with its next beat."""
 
-    asked: ClassVar[str] = "for the PLC's registers"
+    purpose: ClassVar[str] = "for the PLC's registers"
 
 
 class Registers(Message):
@@ -240,7 +240,7 @@ class Registers(Message):
 class ReadLog(Message):
     """Read the last lines of the log."""
 
-    asked: ClassVar[str] = "for the log"
+    purpose: ClassVar[str] = "for the log"
     limit: int = Field(default=100, ge=1, le=MOST_LINES)
     level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
     """The least."""

@@ -40,7 +40,7 @@ class Search(Message):
 class FindInspections(Message):
     """Query one page of a search's results, newest first."""
 
-    asked: ClassVar[str] = "for inspections"
+    purpose: ClassVar[str] = "for inspections"
     search: Search = Search()
     limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
     below: int | None = Field(default=None, ge=1, le=2**32)
@@ -74,7 +74,7 @@ class InspectionPage(Message):
 class GetInspection(Message):
     """Query all data of one inspection."""
 
-    asked: ClassVar[str] = "for an inspection"
+    purpose: ClassVar[str] = "for an inspection"
     sequence: Sequence
 
 
@@ -140,7 +140,7 @@ class InspectionView(Message):
 class GetImage(Message):
     """Query a stored image's file."""
 
-    asked: ClassVar[str] = "for an image"
+    purpose: ClassVar[str] = "for an image"
     sha256: Sha256
 
 
@@ -155,7 +155,7 @@ class Picture(Message):
 class GetStages(Message):
     """Query the measurement of one step's image, stage by stage, by the inspection's own recipe."""
 
-    asked: ClassVar[str] = "for a step's stages"
+    purpose: ClassVar[str] = "for a step's stages"
     sequence: Sequence
     step: int = Field(ge=0, le=1000)
 
@@ -171,7 +171,7 @@ class Stages(Message):
 class ListLots(Message):
     """Query the latest lots, or one of them."""
 
-    asked: ClassVar[str] = "for the lots"
+    purpose: ClassVar[str] = "for the lots"
     limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
     name: Annotated[str, Field(max_length=32)] | None = None
 
@@ -195,7 +195,7 @@ class Lots(Message):
 class StartLot(Message):
     """Begin a lot. Idempotent; answered with `LotView`."""
 
-    asked: ClassVar[str] = "to begin a lot"
+    purpose: ClassVar[str] = "to begin a lot"
     name: str = Field(min_length=1, max_length=32)
     grower: str = Field(min_length=1, max_length=64)
     actor: Actor
@@ -204,7 +204,7 @@ class StartLot(Message):
 class EndLot(Message):
     """End a lot. Idempotent; answered with `LotView`."""
 
-    asked: ClassVar[str] = "to end a lot"
+    purpose: ClassVar[str] = "to end a lot"
     name: str = Field(min_length=1, max_length=32)
     actor: Actor
 
@@ -212,7 +212,7 @@ class EndLot(Message):
 class ReadAudit(Message):
     """Query the latest rows of the audit trail."""
 
-    asked: ClassVar[str] = "for the audit trail"
+    purpose: ClassVar[str] = "for the audit trail"
     limit: int = Field(default=50, ge=1, le=LARGEST_PAGE)
     action: Text = ""
     """Of this action, or of all that begin so."""
@@ -243,7 +243,7 @@ class AuditRows(Message):
 class StartExport(Message):
     """Export a search's results as a table, as a job."""
 
-    asked: ClassVar[str] = "to export inspections"
+    purpose: ClassVar[str] = "to export inspections"
     search: Search
     form: Literal["csv", "parquet"]
     actor: Actor
@@ -252,7 +252,7 @@ class StartExport(Message):
 class StartLotReport(Message):
     """Write a lot's report, as a job."""
 
-    asked: ClassVar[str] = "for a lot's report"
+    purpose: ClassVar[str] = "for a lot's report"
     lot: str = Field(max_length=32)
     form: Literal["html", "pdf"]
     actor: Actor
@@ -261,14 +261,14 @@ class StartLotReport(Message):
 class GetJob(Message):
     """Query the state of a job."""
 
-    asked: ClassVar[str] = "for a job"
+    purpose: ClassVar[str] = "for a job"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
 
 
 class EndJob(Message):
     """Cancel a job. Idempotent; answered with `JobView`."""
 
-    asked: ClassVar[str] = "to call a job off"
+    purpose: ClassVar[str] = "to call a job off"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
 
 
@@ -298,7 +298,7 @@ class JobView(Message):
 class ReadJobFile(Message):
     """A piece of a file of a job that is done."""
 
-    asked: ClassVar[str] = "for a job's file"
+    purpose: ClassVar[str] = "for a job's file"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
     name: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
     offset: int = Field(default=0, ge=0, lt=2**50)

@@ -20,7 +20,7 @@ Scalar = bool | int | float | str | None
 class ListRecipes(Message):
     """Query the state of all recipes."""
 
-    asked: ClassVar[str] = "for the recipes"
+    purpose: ClassVar[str] = "for the recipes"
 
 
 class RecipeRow(Message):
@@ -61,7 +61,7 @@ class Recipes(Message):
 class GetRecipe(Message):
     """Query one recipe's file, or one of its revisions."""
 
-    asked: ClassVar[str] = "for a recipe"
+    purpose: ClassVar[str] = "for a recipe"
     name: Name
     revision: Revision | None = None
     """None for the file."""
@@ -78,7 +78,7 @@ class RecipeView(Message):
 class GetRecipeHistory(Message):
     """Query a recipe's revisions, the newest first."""
 
-    asked: ClassVar[str] = "for a recipe's history"
+    purpose: ClassVar[str] = "for a recipe's history"
     name: Name
     below: int | None = Field(default=None, ge=1)
     """Of the page before; None for the first."""
@@ -121,7 +121,7 @@ class RecipeHistory(Message):
 class CompareRecipe(Message):
     """Query every value that differs between two forms of a recipe."""
 
-    asked: ClassVar[str] = "for a recipe's differences"
+    purpose: ClassVar[str] = "for a recipe's differences"
     name: Name
     old: Revision | None = None
     """A revision; None for the approved one."""
@@ -141,7 +141,7 @@ class SaveDraft(Message):
     Refused as a whole if the recipe would be invalid, or has changed since the author read it.
     """
 
-    asked: ClassVar[str] = "to save a draft"
+    purpose: ClassVar[str] = "to save a draft"
     name: Name
     values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
     """New values by their dotted paths, as `damage.area[0].area_mm2`."""
@@ -154,7 +154,7 @@ class SaveDraft(Message):
 class SubmitRecipe(Message):
     """Record a recipe's file as it is as a draft. Answered with `RecipeRow`."""
 
-    asked: ClassVar[str] = "to submit a recipe"
+    purpose: ClassVar[str] = "to submit a recipe"
     name: Name
     reason: Why
     actor: Actor
@@ -163,7 +163,7 @@ class SubmitRecipe(Message):
 class ApproveRecipe(Message):
     """Put a draft in force for the next lot; its author cannot. Answered with `RecipeRow`."""
 
-    asked: ClassVar[str] = "to approve a recipe"
+    purpose: ClassVar[str] = "to approve a recipe"
     name: Name
     revision: Revision
     reason: Why
@@ -173,7 +173,7 @@ class ApproveRecipe(Message):
 class RejectRecipe(Message):
     """Retire a draft: it is not put in force. Answered with `RecipeRow`."""
 
-    asked: ClassVar[str] = "to reject a draft"
+    purpose: ClassVar[str] = "to reject a draft"
     name: Name
     revision: Revision
     reason: Why
@@ -183,7 +183,7 @@ class RejectRecipe(Message):
 class RevertRecipe(Message):
     """Put a revision's text back into the recipe's file. Answered with `RecipeRow`."""
 
-    asked: ClassVar[str] = "to put a recipe back"
+    purpose: ClassVar[str] = "to put a recipe back"
     name: Name
     revision: Revision | None = None
     """None for the approved one."""
@@ -194,7 +194,7 @@ class RevertRecipe(Message):
 class ExportRecipe(Message):
     """Query a recipe's file with a first line that names it. Answered with `RecipeText`."""
 
-    asked: ClassVar[str] = "to export a recipe"
+    purpose: ClassVar[str] = "to export a recipe"
     name: Name
     revision: Revision | None = None
 
@@ -208,7 +208,7 @@ class RecipeText(Message):
 class ImportRecipe(Message):
     """Replace a recipe's file by a whole recipe. Answered with `RecipeRow`."""
 
-    asked: ClassVar[str] = "to import a recipe"
+    purpose: ClassVar[str] = "to import a recipe"
     text: str = Field(min_length=1, max_length=LARGEST_TEXT)
     base: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
     """The base revision; empty for the one that the text names."""
@@ -219,7 +219,7 @@ class ImportRecipe(Message):
 class GetPastCurves(Message):
     """Query the latest judged curves of a recipe's fruit, for comparison with limits."""
 
-    asked: ClassVar[str] = "for past curves"
+    purpose: ClassVar[str] = "for past curves"
     name: Name
     limit: int = Field(default=60, ge=1, le=MOST_CURVES)
 
@@ -248,7 +248,7 @@ class PastCurves(Message):
 class StartWhatIf(Message):
     """Judge the last inspections again by the recipe's file as it is, as a job."""
 
-    asked: ClassVar[str] = "what a draft would have done"
+    purpose: ClassVar[str] = "what a draft would have done"
     name: Name
     lot: Text = ""
     """Only of this lot; all where empty."""

@@ -57,13 +57,13 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
     }
 
 
-def table(shown: tuple[Conduit, ...]) -> str:
+def table(listed: tuple[Conduit, ...]) -> str:
     """Return the conduits as a Markdown table."""
     rows = ["| from | to | protocol | default | set by | carries | protected by |", "|" + " --- |" * 7]
     rows += [
         f"| {each.source} | {each.target} | {each.protocol} | {each.host}:{each.port}{_closed(each)} "
         f"| `{each.setting}` | {each.carries} | {each.protected} |"
-        for each in shown
+        for each in listed
     ]
     return "\n".join(rows) + "\n"
 
@@ -72,7 +72,7 @@ def _closed(conduit: Conduit) -> str:
     return "" if conduit.enabled else ", closed"
 
 
-def drawing(shown: tuple[Conduit, ...]) -> str:
+def drawing(listed: tuple[Conduit, ...]) -> str:
     """Return the zones with their conduits as an SVG: black on white, readable without colour."""
     height = 3 * (_BOX_HEIGHT + _GAP) + _GAP
     places = {
@@ -87,31 +87,31 @@ def drawing(shown: tuple[Conduit, ...]) -> str:
         f'<rect width="{_WIDTH}" height="{height}" fill="#fff"/>',
         _box(Zone.STATION, _MIDDLE, _GAP, height - 2 * _GAP, thick=True),
         *(_box(zone, x, y, _BOX_HEIGHT) for zone, (x, y) in places.items()),
-        *(_arrows(zone, *places[zone], [each for each in shown if zone in each[:2]]) for zone in places),
+        *(_arrows(zone, *places[zone], [each for each in listed if zone in each[:2]]) for zone in places),
         "</svg>",
     ]
     return "\n".join(parts) + "\n"
 
 
 def _box(zone: Zone, x: float, y: float, height: float, *, thick: bool = False) -> str:
-    words = _wrapped(MEANING[zone])
+    lines = _wrapped(MEANING[zone])
     middle = x + _BOX_WIDTH / 2
     return "".join(
         [
             f'<rect x="{x:g}" y="{y:g}" width="{_BOX_WIDTH}" height="{height:g}" rx="6" fill="#eef2f5" stroke="#222" ',
             f'stroke-width="{3 if thick else 1}"/>',
             _text(middle, y + 26, zone.value, 16, "middle"),
-            *(_text(middle, y + 50 + 16 * line, text, 12, "middle") for line, text in enumerate(words)),
+            *(_text(middle, y + 50 + 16 * line, text, 12, "middle") for line, text in enumerate(lines)),
         ]
     )
 
 
-def _arrows(zone: Zone, x: float, y: float, shown: list[Conduit]) -> str:
+def _arrows(zone: Zone, x: float, y: float, listed: list[Conduit]) -> str:
     """Return arrows from the opening to the listening zone, one for each direction, with its ports."""
     near, far = (x + _BOX_WIDTH, _MIDDLE) if x < _MIDDLE else (x, _MIDDLE + _BOX_WIDTH)
     groups = [
-        (near, far, [each for each in shown if each.source is zone]),
-        (far, near, [each for each in shown if each.target is zone]),
+        (near, far, [each for each in listed if each.source is zone]),
+        (far, near, [each for each in listed if each.target is zone]),
     ]
     drawn, line_y = "", y + 22
     for start, end, group in groups:
@@ -135,8 +135,8 @@ def _wrapped(text: str, longest: int = 36) -> list[str]:
     return lines
 
 
-def _text(x: float, y: float, words: str, size: int, anchor: str) -> str:
-    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}">{escape(words)}</text>'
+def _text(x: float, y: float, text: str, size: int, anchor: str) -> str:
+    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}">{escape(text)}</text>'
 
 
 def main() -> None:

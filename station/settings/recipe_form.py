@@ -46,8 +46,8 @@ def recipe_of(document: Document) -> Recipe:
     form = values.get("schema_version") if isinstance(values, dict) else None
     if isinstance(form, int) and form > FORM:
         place, field = document.locate(("schema_version",))
-        told = f"expected at most {FORM}, got {form} of a newer fruit-station: install that, or write the older form"
-        problem = Problem(place, field, told)
+        message = f"expected at most {FORM}, got {form} of a newer fruit-station: install that, or write the older form"
+        problem = Problem(place, field, message)
         document = replace(document, problems=(problem,), doubtful=frozenset({()}))
     if isinstance(values, dict) and not document.problems:
         upgrade(values)

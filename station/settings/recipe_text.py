@@ -67,8 +67,8 @@ def _round_trip(text: str, source: str) -> tuple[YAML, Any]:
     try:
         return yaml, yaml.load(text)
     except YAMLError as error:
-        told = f"expected text that can be changed with its comments kept: {shortened(str(error), 200)}"
-        raise SettingsError([Problem(source, "file", told)]) from error
+        message = f"expected text that can be changed with its comments kept: {shortened(str(error), 200)}"
+        raise SettingsError([Problem(source, "file", message)]) from error
 
 
 def _dumped(yaml: YAML, values: Any) -> str:

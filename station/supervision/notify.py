@@ -13,7 +13,7 @@ SOCKET_VARIABLE = "NOTIFY_SOCKET"
 WATCHDOG_VARIABLE = "WATCHDOG_USEC"
 PARENT_VARIABLE = "SUPERVISOR_PID"
 _FEEDS_PER_TIMEOUT = 4
-_LOOK_S = 0.5
+_POLL_S = 0.5
 
 
 def notify(message: str) -> None:
@@ -44,7 +44,7 @@ async def feed_watchdog(progressing: Callable[[], bool]) -> None:
     """
     timeout_s = int(os.environ.get(WATCHDOG_VARIABLE, "0")) / 1e6
     parent = int(os.environ.get(PARENT_VARIABLE, "0"))
-    pause_s = min(_LOOK_S, timeout_s / _FEEDS_PER_TIMEOUT) if timeout_s else _LOOK_S
+    pause_s = min(_POLL_S, timeout_s / _FEEDS_PER_TIMEOUT) if timeout_s else _POLL_S
     while True:
         if timeout_s and progressing():
             notify("WATCHDOG=1")

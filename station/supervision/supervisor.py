@@ -217,8 +217,8 @@ class Supervisor:
 
     def _feed(self) -> None:
         """Feed systemd's watchdog once all running programs, if there are any, have notified since the last time."""
-        kept = [child for child in self._children if not child.given_up]
-        if kept and all(child.ready and child.heard_s > self._fed_s for child in kept):
+        running = [child for child in self._children if not child.given_up]
+        if running and all(child.ready and child.heard_s > self._fed_s for child in running):
             notify("WATCHDOG=1")
             self._fed_s = time.monotonic()
 

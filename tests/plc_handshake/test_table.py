@@ -247,7 +247,7 @@ def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid
     made.feed(ev.OutcomeReceived, made.outcome())
     made.write("enable")
     made.feed(ev.PlcWrote, made.inputs, frozenset())
-    assert made.state.result is Result.SHOWN
+    assert made.state.result is Result.PUBLISHED
     made.write("enable", acknowledged_sequence=41)
     assert made.state.result is Result.EMPTY
     made.write("enable", "acknowledge")
@@ -264,7 +264,7 @@ def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
     assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
     made.write("enable", acknowledged_sequence=41 << 16)
     assert made.state.counters["count_communication"] == 2
-    assert (made.state.result, made.of(do.NotifyAcknowledged)) == (Result.SHOWN, [])
+    assert (made.state.result, made.of(do.NotifyAcknowledged)) == (Result.PUBLISHED, [])
     made.write("enable", "clear_error")
     assert made.state.faults == ()
     assert len(made.of(do.ClearFaults)) == 1

@@ -67,13 +67,15 @@ class Panel(NamedTuple):
     """Its content, and what to do about a bad value."""
     link: str
     """The alarm's or the subject's document, below `docs/`."""
-    asks: tuple[Prom, ...] | tuple[Sql, ...]
+    queries: tuple[Prom, ...] | tuple[Sql, ...]
     width: int = 8
     largest: float | None = None
     """Of the axis, where it is known."""
 
 
-def prom(kind: str, title: str, unit: str, about: str, link: str, *asks: tuple[str, str] | str, **more: Any) -> Panel:
+def prom(
+    kind: str, title: str, unit: str, about: str, link: str, *queries: tuple[str, str] | str, **more: Any
+) -> Panel:
     """Make a panel with Prometheus queries.
 
     Args:
@@ -82,10 +84,10 @@ def prom(kind: str, title: str, unit: str, about: str, link: str, *asks: tuple[s
         unit: see there.
         about: see there.
         link: see there.
-        asks: expressions, alone or with their legend.
+        queries: expressions, alone or with their legend.
         more: other fields of `Panel`.
     """
-    questions = tuple(Prom(ask) if isinstance(ask, str) else Prom(*ask) for ask in asks)
+    questions = tuple(Prom(ask) if isinstance(ask, str) else Prom(*ask) for ask in queries)
     return Panel(kind, title, unit, about, link, questions, **more)
 
 
@@ -137,13 +139,13 @@ def built(panel: Panel, number: int) -> Any:
         number: unique on the dashboard.
     """
     making = _MAKERS[panel.kind](panel)
-    source = PROMETHEUS if isinstance(panel.asks[0], Prom) else POSTGRESQL
+    source = PROMETHEUS if isinstance(panel.queries[0], Prom) else POSTGRESQL
     link = dashboard.DashboardLink("What to do").type(DashboardLinkType.LINK).url(f"{DOCS}/{panel.link}")
     making = (
         making.id(number).title(panel.title).description(panel.about).unit(panel.unit).datasource(source)
         .links([link.target_blank(target_blank=True)]).span(panel.width).height(4 if panel.kind == "number" else HEIGHT)
     )  # fmt: skip
-    for letter, ask in zip(_letters(), panel.asks, strict=False):
+    for letter, ask in zip(_letters(), panel.queries, strict=False):
         making = making.with_target(_with_query(panel, letter, ask))
     return making
 

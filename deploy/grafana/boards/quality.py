@@ -55,7 +55,7 @@ TRENDS = (
         FROM inspections JOIN recipes ON recipes.sha256 = inspections.recipe_sha256 WHERE {HERE}
         GROUP BY 1, 2, 3 ORDER BY 4 DESC"""),
 )  # fmt: skip
-TOLD = (
+REPLICATION = (
     sql("table", "How far each station has told", "short",
         "An old time is a station whose outbox does not reach this database.", "alarms.md#outbox-behind",
         "SELECT station, max(told) AS told, sum(last_entry) AS entries FROM stations "
@@ -76,5 +76,5 @@ def dashboard() -> Any:
                several=True),
     )  # fmt: skip
     about = "Whose fruit is good, and what changes over the season?"
-    rows = {"Lots": LOTS, "Growers": GROWERS, "Trends": TRENDS, "The stations' records": TOLD}
+    rows = {"Lots": LOTS, "Growers": GROWERS, "Trends": TRENDS, "The stations' records": REPLICATION}
     return board("fruit-quality", "Quality", about, variables, rows)

@@ -136,7 +136,7 @@ class ArmLink:
             async with asyncio.timeout(limit_s):
                 await self._lock.acquire()
         except TimeoutError as error:
-            busy = ArmFault(ArmCause.BUSY, f"the arm's link was busy for {limit_s:g} s when asked {request.asked}")
+            busy = ArmFault(ArmCause.BUSY, f"the arm's link was busy for {limit_s:g} s when asked {request.purpose}")
             raise self.fault or busy from error
         try:
             process = self._process

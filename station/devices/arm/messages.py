@@ -11,13 +11,13 @@ Position = tuple[float, float, float]
 class Watch(Message):
     """Connect to receive the controller's state."""
 
-    asked: ClassVar[str] = "to receive the controller's state"
+    purpose: ClassVar[str] = "to receive the controller's state"
 
 
 class Command(Message):
     """Connect to command the arm, which uploads the control program."""
 
-    asked: ClassVar[str] = "to start the control program"
+    purpose: ClassVar[str] = "to start the control program"
     tool_centre_mm: Position
     payload_kg: float
     payload_centre_mm: Position
@@ -27,20 +27,20 @@ class Command(Message):
 class Upload(Message):
     """Send the control program again over the standing connection and see that it plays."""
 
-    asked: ClassVar[str] = "to upload the control program again"
+    purpose: ClassVar[str] = "to upload the control program again"
 
 
 class Beat(Message):
     """Tell the state; the station is healthy for so long from now."""
 
-    asked: ClassVar[str] = "for the arm's state"
+    purpose: ClassVar[str] = "for the arm's state"
     healthy_for_s: float
 
 
 class Beside(Message):
     """Ask for the joint positions that bring the tool beside other joint positions' place, not turned."""
 
-    asked: ClassVar[str] = "for the way to a place beside"
+    purpose: ClassVar[str] = "for the way to a place beside"
     joints_rad: Six
     offset_mm: Position
     """Along the tool's own x, y and z."""
@@ -49,7 +49,7 @@ class Beside(Message):
 class Move(Message):
     """Begin a motion to joint positions, straight for the tool or straight for the joints."""
 
-    asked: ClassVar[str] = "to begin a motion"
+    purpose: ClassVar[str] = "to begin a motion"
     joints_rad: Six
     straight: bool
     speed: float
@@ -61,14 +61,14 @@ class Move(Message):
 class Reachable(Message):
     """Ask whether joint positions are within the safety limits and have a solution."""
 
-    asked: ClassVar[str] = "whether the pose is reachable"
+    purpose: ClassVar[str] = "whether the pose is reachable"
     joints_rad: Six
 
 
 class Halt(Message):
     """Brake to rest."""
 
-    asked: ClassVar[str] = "to brake"
+    purpose: ClassVar[str] = "to brake"
     deceleration_rad_s2: float
 
 

@@ -251,7 +251,7 @@ class Laws:
 
     def _acknowledgement(self, event: ev.Event, before: State, after: State, *, due: bool) -> None:
         now_s = event.at.s
-        if after.queue and after.result is not Result.SHOWN:
+        if after.queue and after.result is not Result.PUBLISHED:
             assert now_s < self.since_s.setdefault("waiting", now_s) + self.settings.handshake_timeout_s
         else:
             self.since_s.pop("waiting", None)
@@ -259,7 +259,9 @@ class Laws:
             assert Fault.ACKNOWLEDGE_NOT_RESET in after.faults
         if due:
             return
-        if after.result is Result.SHOWN and (before.result is not Result.SHOWN or before.shown != after.shown):
+        if after.result is Result.PUBLISHED and (
+            before.result is not Result.PUBLISHED or before.published != after.published
+        ):
             assert after.toggle != before.toggle
         if self._rises(event, before, "acknowledge") and before.seen is not None:
             sequence = event.inputs.acknowledged_sequence  # type: ignore[union-attr]
