@@ -180,7 +180,7 @@ async def inspect(configuration: Configuration) -> dict[str, Pace]:
         async def ready(*, at_rest: bool = False) -> None:
             deadline_s = time.monotonic() + PATIENCE_S
             while True:
-                state = await client.ask(LINE, StationState, deadline_s=20)
+                state = await client.request(LINE, StationState, deadline_s=20)
                 if state.ready and (not at_rest or state.packml_state is PackmlState.IDLE):
                     return
                 if time.monotonic() > deadline_s:
@@ -192,20 +192,20 @@ async def inspect(configuration: Configuration) -> dict[str, Pace]:
             began_s = time.monotonic()
             length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
             trigger = Begin(trigger_id=number, encoder=0, lot="", fruit_length_mm_x10=length)
-            begun = await client.ask(trigger, BeginReply, deadline_s=5)
+            begun = await client.request(trigger, BeginReply, deadline_s=5)
             if begun.sequence is None:
                 raise SystemExit(f"the station refuses: {begun.refusal}")
-            outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
+            outcome = await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
             told_s = time.monotonic() - began_s
             await ready()
             again_s = time.monotonic() - began_s
-            await client.ask(Published(outcome=outcome), Noted, deadline_s=5)
-            await client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
+            await client.request(Published(outcome=outcome), Noted, deadline_s=5)
+            await client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
             return Inspected(told_s, again_s, outcome.sequence, outcome.outcome)
 
         for kind, seed in FRUIT:
             order = Command(command=CommandName.CHANGE_RECIPE, argument=recipes[kind].plc_number)
-            await client.ask(order, CommandDone, deadline_s=40)
+            await client.request(order, CommandDone, deadline_s=40)
             ask("127.0.0.1", CONSOLE, {"do": "fruit", "kind": kind, "seed": seed})
             alone = [await one(kind, seed, 1 + number, at_rest=True) for number in range(REPEATS)]
             began_s = time.monotonic()

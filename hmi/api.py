@@ -66,7 +66,7 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 @router.get("/health", tags=["health"])
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     """Readiness of the station, and the state of each of its parts."""
-    reply = await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
     return HealthAnswer(
         ready=reply.ready,
         why=reply.why,
@@ -102,7 +102,7 @@ async def inspections(
         to_utc_ms=_utc_ms(begun_to),
     )
     query = FindInspections(search=search, limit=limit, below=below)
-    page = await hmi.gateway.ask(query, InspectionPage, deadline_s=DEADLINE_S)
+    page = await hmi.gateway.request(query, InspectionPage, deadline_s=DEADLINE_S)
     return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
 
 
@@ -110,7 +110,7 @@ async def inspections(
 async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDetails:
     """One inspection with its curve."""
     try:
-        reply = await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
+        reply = await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
     except RefusedError as error:
         raise HTTPException(404, str(error)) from error
     return InspectionDetails.of(reply)
@@ -119,35 +119,35 @@ async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDe
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
     """The state of every recipe."""
-    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return RecipeList(recipes=[RecipeSummary(**_short(row)) for row in reply.rows])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
 async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     """One recipe, with the values in force."""
-    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     row = next((each for each in reply.rows if each.name == name), None)
     if row is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
     values = None
     if row.in_force is not None:
         query = GetRecipe(name=name, revision=row.in_force)
-        values = (await hmi.gateway.ask(query, RecipeView, deadline_s=DEADLINE_S)).values
+        values = (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
     return RecipeDetails(**_short(row), values=values)
 
 
 @router.get("/lots", tags=["lots"])
 async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
     """The latest lots."""
-    reply = await hmi.gateway.ask(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
     return LotList(lots=[LotAnswer.of(each) for each in reply.lots])
 
 
 @router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
 async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
     """One lot."""
-    reply = await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
     if not reply.lots:
         raise HTTPException(404, f"nobody told of a lot {name}")
     return LotAnswer.of(reply.lots[0])
@@ -157,16 +157,16 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     query = StartLot(name=name, grower=begin.grower, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
 async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
     """End a lot. Idempotent."""
-    if not (await hmi.gateway.ask(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
+    if not (await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
     query = EndLot(name=name, actor=actor)
-    return LotAnswer.of(await hmi.gateway.ask(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
 def _short(row: RecipeRow) -> dict[str, Any]:

@@ -69,7 +69,7 @@ class Gateway:
         """True while `state` is recent enough to be shown as live."""
         return self.age_s is not None and self.age_s <= STALE_S
 
-    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
+    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
         """Send a request to the station and return its answer.
 
         Args:
@@ -83,13 +83,13 @@ class Gateway:
         """
         if self._client is None:
             raise DeadlineError("the channel to the station is not open")
-        return await self._client.ask(request, reply, deadline_s=deadline_s)
+        return await self._client.request(request, reply, deadline_s=deadline_s)
 
     async def note(self, what: PersonNoted) -> None:
         """Write an event into the audit trail, and into the log if the station does not answer."""
         log.info("%s (%s): %s %s", what.person.who, what.person.role, what.what, what.subject)
         try:
-            await self.ask(what, Noted)
+            await self.request(what, Noted)
         except StationError as error:
             log.warning("the audit trail does not have it: %s", error)
 
@@ -101,9 +101,9 @@ class Gateway:
         while True:
             began_s = time.monotonic()
             with contextlib.suppress(ChannelError):
-                state = await self.ask(GetPanelState(), PanelState, deadline_s=_POLL_DEADLINE_S)
+                state = await self.request(GetPanelState(), PanelState, deadline_s=_POLL_DEADLINE_S)
                 if (newest := (state.boot, state.last_sequence)) != self._known:
-                    self.recent = await self.ask(GetRecent(most=200), Recent)
+                    self.recent = await self.request(GetRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()
             polled, self._polled = self._polled, asyncio.Event()
@@ -115,7 +115,7 @@ class Gateway:
         if sequence is None:
             return None
         with contextlib.suppress(RefusedError):
-            return await self.ask(GetFruit(sequence=sequence), Fruit)
+            return await self.request(GetFruit(sequence=sequence), Fruit)
         return None
 
 

@@ -106,7 +106,7 @@ class StationLink:
         while True:
             self._beat_now.clear()
             try:
-                state = await self._client.ask(self._line(), StationState, deadline_s=deadline_s)
+                state = await self._client.request(self._line(), StationState, deadline_s=deadline_s)
             except ChannelError as error:
                 if str(error) != self._logged:
                     log.warning("%s", error)
@@ -129,7 +129,7 @@ class StationLink:
             size_class=action.size_class,
         )
         try:
-            begun = await self._client.ask(request, BeginReply, deadline_s=self._settings.begin_deadline_s)
+            begun = await self._client.request(request, BeginReply, deadline_s=self._settings.begin_deadline_s)
         except ChannelError as error:
             log.warning("%s", error)
             self._feed(ev.BeginFailed(now(), action.number))
@@ -139,7 +139,7 @@ class StationLink:
     async def _outcome(self, action: do.RequestOutcome) -> None:
         request = AwaitOutcome(sequence=action.sequence)
         try:
-            outcome = await self._client.ask(request, Outcome, deadline_s=action.within_s + OUTCOME_GRACE_S)
+            outcome = await self._client.request(request, Outcome, deadline_s=action.within_s + OUTCOME_GRACE_S)
         except ChannelError as error:
             self._forget_outcome(action.sequence)
             self._feed(ev.OutcomeFailed(now(), action.sequence, str(error)))
@@ -154,7 +154,7 @@ class StationLink:
 
     async def _open(self, action: do.RequestOpen) -> None:
         try:
-            opened = await self._client.ask(Resume(), Open, deadline_s=self._settings.station_lost_after_s)
+            opened = await self._client.request(Resume(), Open, deadline_s=self._settings.station_lost_after_s)
         except ChannelError as error:
             self._feed(ev.RequestFailed(now(), str(error)))
         else:
@@ -163,7 +163,7 @@ class StationLink:
     async def _command(self, action: do.RequestCommand) -> None:
         request = Command(command=action.command, argument=action.argument)
         try:
-            done = await self._client.ask(request, CommandDone, deadline_s=self._settings.command_deadline_s)
+            done = await self._client.request(request, CommandDone, deadline_s=self._settings.command_deadline_s)
         except RefusedError as error:
             self._feed(ev.CommandAnswered(now(), action.number, done=False, why=str(error)))
         except ChannelError as error:
@@ -179,7 +179,7 @@ class StationLink:
             published = isinstance(action, do.NotifyPublished)
             request = Published(outcome=action.outcome) if published else Acknowledged(sequence=action.sequence)
             try:
-                await self._client.ask(request, Noted, deadline_s=self._settings.station_lost_after_s)
+                await self._client.request(request, Noted, deadline_s=self._settings.station_lost_after_s)
             except RefusedError as error:
                 log.warning("the station did not take a note: %s", error)
             except ChannelError as error:

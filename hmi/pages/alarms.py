@@ -55,7 +55,7 @@ async def alarms(request: Request) -> Response:
 @router.get("/alarms/history")
 async def history(request: Request, hmi: HmiNow) -> Response:
     """Show recent changes of alarms."""
-    found = await hmi.gateway.ask(GetAlarmHistory(most=_LAST), AlarmHistory)
+    found = await hmi.gateway.request(GetAlarmHistory(most=_LAST), AlarmHistory)
     return show(request, "alarms_history.html.j2", changes=found.changes)
 
 
@@ -108,7 +108,7 @@ async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
 
 
 async def _done(gateway: Gateway, request: Message) -> None:
-    done = await gateway.ask(request, CommandDone)
+    done = await gateway.request(request, CommandDone)
     if not done.done:
         raise RefusedError(done.why)
 

@@ -66,7 +66,7 @@ PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
 @router.get("/change")
 async def change(request: Request, hmi: HmiNow) -> Response:
     """Show the fruit to select from."""
-    found = await hmi.gateway.ask(GetRecipes(), Recipes)
+    found = await hmi.gateway.request(GetRecipes(), Recipes)
     return show(request, "change.html.j2", recipes=found.recipes, active=found.active, problems=found.problems)
 
 
@@ -81,7 +81,7 @@ async def confirm(
     request: Request, hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]
 ) -> Response:
     """Show the differences from the active recipe."""
-    found = await hmi.gateway.ask(GetRecipes(), Recipes)
+    found = await hmi.gateway.request(GetRecipes(), Recipes)
     chosen = next((each for each in found.recipes if each.number == number), None)
     if chosen is None:
         raise Problem(404, "change.gone")
@@ -102,7 +102,7 @@ async def carry_out(
 ) -> Response:
     """Change the fruit in the same way as the PLC's command."""
     request = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.CHOOSE_RECIPE, argument=str(number))
-    await hmi.gateway.ask(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
+    await hmi.gateway.request(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
     return go_to("/change/progress")
 
 

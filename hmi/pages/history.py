@@ -89,8 +89,8 @@ async def search(
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
         find = FindInspections(search=wanted, limit=PAGE, below=below)
-        found = await hmi.gateway.ask(find, InspectionPage, deadline_s=DEADLINE_S)
-    recipes = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+        found = await hmi.gateway.request(find, InspectionPage, deadline_s=DEADLINE_S)
+    recipes = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,
         "history.html.j2",
@@ -125,7 +125,7 @@ async def export(
     if wanted is None:
         raise Problem(400, "problem.bad_form")
     query = StartExport(search=wanted, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(query, JobView, deadline_s=DEADLINE_S)
+    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
@@ -138,7 +138,7 @@ async def report(
 ) -> Response:
     """Start a lot's report."""
     query = StartLotReport(lot=lot, form=form, actor=_actor(caller))
-    job = await hmi.gateway.ask(query, JobView, deadline_s=DEADLINE_S)
+    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 
 
@@ -146,14 +146,14 @@ async def report(
 async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
     """Show the latest rows of the audit trail."""
     query = ReadAudit(limit=100, action=action, subject=subject)
-    reply = await hmi.gateway.ask(query, AuditRows, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(query, AuditRows, deadline_s=DEADLINE_S)
     return show(request, "history_audit.html.j2", rows=reply.rows, action=action, subject=subject)
 
 
 @router.get("/image/{sha256}.png")
 async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
     """Send a stored image; its address is its content hash, so the browser fetches it once."""
-    reply = await hmi.gateway.ask(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
     return Response(reply.data, media_type=reply.media_type, headers=_FOR_EVER)
 
 
@@ -213,7 +213,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
         return known
     if not (0 < sequence < 2**32 and 0 <= step <= 1000):
         raise Problem(404, "problem.not_found")
-    reply = await hmi.gateway.ask(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
     _STAGES[sequence, step] = reply
     while len(_STAGES) > _KEPT_STAGES:
         _STAGES.popitem(last=False)
@@ -223,7 +223,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
 async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
     if not 0 < sequence < 2**32:
         raise Problem(404, "problem.not_found")
-    return await hmi.gateway.ask(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
+    return await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
 
 
 def _steps(reply: InspectionView) -> list[dict[str, Any]]:

@@ -32,14 +32,14 @@ async def logged_in(request: Request) -> None:
 @router.get("/{job}")
 async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
     """Show a job."""
-    reply = await hmi.gateway.ask(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
     return show(request, "job.html.j2", job=reply, back=back)
 
 
 @router.get("/{job}/part")
 async def part(hmi: HmiNow, locale: LocaleNow, job: JobId) -> Response:
     """Render the same as a part of the page, for polling."""
-    reply = await hmi.gateway.ask(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
     html = hmi.renderer.render("job_part.html.j2", locale, {"job": reply})
     return Response(
         html, media_type="text/html", headers={"x-over": "" if reply.state in {"waiting", "running"} else "1"}
@@ -51,7 +51,7 @@ async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
     """Cancel a job."""
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role="operator")
-    await hmi.gateway.ask(EndJob(job=job), JobView, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(EndJob(job=job), JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job}")
 
 
@@ -71,7 +71,7 @@ async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
 
 async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
     """Send a file in pieces; each is fetched after the browser has taken the one before."""
-    reply = await hmi.gateway.ask(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
     found = next((each for each in reply.files if each.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
@@ -80,7 +80,7 @@ async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Respo
         offset = 0
         while offset < found.size_bytes:
             query = ReadJobFile(job=job, name=name, offset=offset)
-            chunk = await hmi.gateway.ask(query, Chunk, deadline_s=DEADLINE_S)
+            chunk = await hmi.gateway.request(query, Chunk, deadline_s=DEADLINE_S)
             if not chunk.data:
                 raise Problem(409, "problem.refused")
             offset += len(chunk.data)

@@ -89,7 +89,7 @@ async def hand(
 async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
     """Set manual mode, in which no fruit is accepted, or production again."""
     query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
-    command = await hmi.gateway.ask(query, OperatorCommandView, deadline_s=DEADLINE_S)
+    command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=DEADLINE_S)
     until_s = time.monotonic() + MODE_S
     while command.state == "executing" and time.monotonic() < until_s:
         await asyncio.sleep(0.1)
@@ -113,7 +113,7 @@ async def jog(
         query = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
     except ValueError:
         raise Problem(400, "problem.bad_form") from None
-    jogged = await hmi.gateway.ask(query, Jogged, deadline_s=MOVE_DEADLINE_S)
+    jogged = await hmi.gateway.request(query, Jogged, deadline_s=MOVE_DEADLINE_S)
     return go_to(f"/maintenance/hand?at_mm={jogged.width_mm:.1f}")
 
 
@@ -121,7 +121,7 @@ async def jog(
 async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
     query = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
-    await hmi.gateway.ask(query, LedsSet, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(query, LedsSet, deadline_s=DEADLINE_S)
     return go_to("/maintenance/hand?lit=yes")
 
 
@@ -168,7 +168,7 @@ async def sensor_picture(
     name: Literal["area.png", "field.png", "reference.png"],
 ) -> Response:
     """Send a plot of the calibration in force."""
-    reply = await hmi.gateway.ask(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
     return Response(reply.data, media_type=reply.media_type)
 
 
@@ -185,21 +185,21 @@ async def begin(
         raise Problem(400, "problem.bad_form")
     wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
     query = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
-    await hmi.gateway.ask(query, CalibrationRunView, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(query, CalibrationRunView, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/go-on")
 async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
     """Confirm that the ball is in place."""
-    await hmi.gateway.ask(ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/end")
 async def end(hmi: HmiNow, caller: Maintainer) -> Response:
     """Cancel the run."""
-    await hmi.gateway.ask(EndCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=MOVE_DEADLINE_S)
+    await hmi.gateway.request(EndCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=MOVE_DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
@@ -218,7 +218,7 @@ async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
 @router.get("/log")
 async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
     """Show the last lines of the station's log."""
-    reply = await hmi.gateway.ask(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
     return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
 
 
@@ -227,12 +227,12 @@ _FRAMES: OrderedDict[str, Picture] = OrderedDict()
 
 
 async def _health(hmi: Hmi) -> dict[str, Any]:
-    return {"health": await hmi.gateway.ask(GetHealth(), Health, deadline_s=DEADLINE_S)}
+    return {"health": await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)}
 
 
 async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     try:
-        reply = await hmi.gateway.ask(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
+        reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
     except ChannelError as error:
         return {"live_image": None, "why": str(error), "histograms": (), "place": ""}
     place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
@@ -244,11 +244,11 @@ async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
 
 
 async def _calibration(hmi: Hmi) -> dict[str, Any]:
-    return {"now": await hmi.gateway.ask(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)}
+    return {"now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)}
 
 
 async def _registers(hmi: Hmi) -> Registers:
-    return await hmi.gateway.ask(GetRegisters(), Registers, deadline_s=DEADLINE_S)
+    return await hmi.gateway.request(GetRegisters(), Registers, deadline_s=DEADLINE_S)
 
 
 async def _part(

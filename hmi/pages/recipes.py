@@ -61,7 +61,9 @@ Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
 @router.get("")
 async def recipes(request: Request, hmi: HmiNow) -> Response:
     """Show the state of all recipes."""
-    return show(request, "recipes.html.j2", reply=await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S))
+    return show(
+        request, "recipes.html.j2", reply=await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    )
 
 
 @router.get("/{name}")
@@ -71,7 +73,7 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
     changes: tuple[Change, ...] = ()
     if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
         query = CompareRecipe(name=name, new=standing.waiting)
-        changes = (await hmi.gateway.ask(query, Changes, deadline_s=DEADLINE_S)).changes
+        changes = (await hmi.gateway.request(query, Changes, deadline_s=DEADLINE_S)).changes
     values = await _values(hmi, name, standing)
     drawn = None if values is None else await _drawn(hmi, name, values)
     return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
@@ -80,14 +82,14 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
 @router.get("/{name}/edit")
 async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show the form."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     return await _form(request, hmi, locale, reply, {}, "")
 
 
 @router.get("/{name}/chart")
 async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     typed: dict[str, Any] = {}
     for path, text in _typed(request.query_params).items():
         try:
@@ -106,7 +108,7 @@ async def save(
     """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
-    reply = await hmi.gateway.ask(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
     typed = _typed(texts)
     try:
         changes = changed(reply.values, typed)
@@ -118,7 +120,7 @@ async def save(
         return await _form(request, hmi, locale, reply, typed, locale.text("recipes.nothing_changed"), reason)
     try:
         query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
-        await hmi.gateway.ask(query, RecipeRow, deadline_s=DEADLINE_S)
+        await hmi.gateway.request(query, RecipeRow, deadline_s=DEADLINE_S)
     except RefusedError as error:
         return await _form(request, hmi, locale, reply, typed, str(error), reason)
     return go_to(f"/recipes/{name}")
@@ -164,7 +166,7 @@ async def history(
 ) -> Response:
     """Show the revisions: author, approver, dates, differences."""
     query = GetRecipeHistory(name=name, below=below)
-    reply = await hmi.gateway.ask(query, RecipeHistory, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(query, RecipeHistory, deadline_s=DEADLINE_S)
     return show(request, "recipe_history.html.j2", row=await _row(hmi, name), reply=reply, tab="history")
 
 
@@ -173,14 +175,14 @@ async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the file's text, with its comments."""
-    reply = await hmi.gateway.ask(GetRecipe(name=name, revision=revision), RecipeView, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetRecipe(name=name, revision=revision), RecipeView, deadline_s=DEADLINE_S)
     return show(request, "recipe_text.html.j2", row=reply.row, text=reply.text, revision=revision, tab="text")
 
 
 @router.get("/{name}/export")
 async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
     """Send the file, to be edited elsewhere and imported again."""
-    reply = await hmi.gateway.ask(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
     headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
     return Response(reply.text, media_type="application/yaml", headers=headers)
 
@@ -196,9 +198,13 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
     if not text or len(text) > LARGEST_TEXT:
         raise Problem(400, "problem.bad_form")
     actor = actor_of(caller)
-    row = await hmi.gateway.ask(ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
+    row = await hmi.gateway.request(
+        ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
+    )
     if row.file_state == "draft":
-        await hmi.gateway.ask(SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S)
+        await hmi.gateway.request(
+            SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
+        )
     return go_to(f"/recipes/{row.name}")
 
 
@@ -207,14 +213,14 @@ async def whatif(
     hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
 ) -> Response:
     """Judge the latest fruit again by the file as it is."""
-    job = await hmi.gateway.ask(
+    job = await hmi.gateway.request(
         StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobView, deadline_s=DEADLINE_S
     )
     return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
 
 
 async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
-    await hmi.gateway.ask(order, RecipeRow, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(order, RecipeRow, deadline_s=DEADLINE_S)
     return go_to(f"/recipes/{order.name}")
 
 
@@ -230,7 +236,7 @@ async def _form(
     decimal = locale.number(0.5, 1)[1]
     made = groups(reply.values)
     texts = {field.path: typed.get(field.path, formatted(field, decimal)) for group in made for field in group.fields}
-    caller, known = caller_of(request), await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    caller, known = caller_of(request), await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,
         "recipe_edit.html.j2",
@@ -265,7 +271,7 @@ def _typed(texts: Mapping[str, str]) -> dict[str, str]:
 
 
 async def _row(hmi: Hmi, name: str) -> RecipeRow:
-    reply = await hmi.gateway.ask(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     found = next((row for row in reply.rows if row.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
@@ -278,13 +284,13 @@ async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
     if revision is None:
         return None
     query = GetRecipe(name=name, revision=revision)
-    return (await hmi.gateway.ask(query, RecipeView, deadline_s=DEADLINE_S)).values
+    return (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
 
 
 async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the limits on past curves; an empty result before the first inspection."""
     try:
-        past = (await hmi.gateway.ask(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
+        past = (await hmi.gateway.request(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
     except RefusedError:  # there is no good file, or there are no records yet
         past = ()
     damage, early = values["damage"], values["early_stop"]

@@ -131,7 +131,7 @@ async def run(request: Request) -> Response:
 async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequence) -> Response:
     """Show one of the latest fruit; an older one is in the history."""
     try:
-        found = await hmi.gateway.ask(GetFruit(sequence=sequence), Fruit)
+        found = await hmi.gateway.request(GetFruit(sequence=sequence), Fruit)
     except RefusedError:
         return go_to(f"/history/{sequence}")
     return show(request, "fruit.html.j2", **fruit_values(found, locale))
@@ -140,7 +140,7 @@ async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequ
 @router.get("/fruit/{sequence}/picture.svg")
 async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
     """Send a fruit's picture with the contact's outline; it never changes, so a browser fetches it once."""
-    found = await hmi.gateway.ask(GetPicture(sequence=sequence), Picture)
+    found = await hmi.gateway.request(GetPicture(sequence=sequence), Picture)
     base64.b64decode(found.jpeg, validate=True)
     corners = " ".join(f"{x},{y}" for x, y in found.outline)
     size = f'width="{found.width_px}" height="{found.height_px}"'
@@ -169,7 +169,7 @@ async def order(
     if order not in _ORDERS:
         raise Problem(400, "problem.bad_form")
     request = OperatorCommand(person=actor_of(caller), order=order, argument=argument, grower=grower)
-    await hmi.gateway.ask(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
+    await hmi.gateway.request(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
     return go_to("/")
 
 

@@ -53,7 +53,7 @@ class ChannelClient:
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
         """Send a request and return its reply.
 
         Args:

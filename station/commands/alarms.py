@@ -96,7 +96,7 @@ async def _ask(config: Path | None, request: Message, reply: type[ReplyT]) -> Re
     site = load_configuration(config)
     async with ChannelClient(line_endpoint(site.handshake, site.home), "the station") as station:
         try:
-            return await station.ask(request, reply, deadline_s=_DEADLINE_S)
+            return await station.request(request, reply, deadline_s=_DEADLINE_S)
         except DeadlineError as error:
             raise StationError(f"{error}; alarms are a running station's: see whether one runs") from error
 

@@ -139,7 +139,7 @@ async def _inspect(
     async with Scanner(modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order)) as scanner:
         simulator = LineSimulator(program, scanner, nest, pace)
         with LineDisplay(Console(), simulator.summary, lambda sequence: _sketch(site, sequence)) as display:
-            simulator.on_passage, simulator.on_scan = display.passed, display.doing
+            simulator.on_passage, simulator.on_scan = display.passed, display.show_activity
             running = asyncio.create_task(simulator.run(count))
             waiting = asyncio.create_task(ended.wait())
             try:

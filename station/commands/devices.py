@@ -80,11 +80,11 @@ async def _recovered_by_the_station(configuration: Configuration, what: Recovery
     endpoint = line_endpoint(configuration.handshake, configuration.home)
     async with ChannelClient(endpoint, "the station") as station:
         try:
-            await station.ask(Resume(), Open, deadline_s=_STATION_DEADLINE_S)
+            await station.request(Resume(), Open, deadline_s=_STATION_DEADLINE_S)
         except DeadlineError:
             return False
         deadline_s = configuration.arm.recovery_deadline_s + _STATION_DEADLINE_S
-        done = await station.ask(Recover(what=what), CommandDone, deadline_s=deadline_s)
+        done = await station.request(Recover(what=what), CommandDone, deadline_s=deadline_s)
     if not done.done:
         raise StationError(done.why)
     return True

@@ -170,30 +170,30 @@ async def inspected(site, store, calibration):
             assert time.monotonic() < deadline_s, state.why_not_ready
             if "No recipe is active" in state.why_not_ready:
                 command = Command(command=CommandName.CHANGE_RECIPE, argument=1)
-                await client.ask(command, CommandDone, deadline_s=40)
+                await client.request(command, CommandDone, deadline_s=40)
             elif "never verified" in state.why_not_ready:
                 asked = True
                 assert "never verified" in (await glance(configuration)).check_due
                 store.add_verification(verification(calibration, datetime.now(UTC)), {})
             elif state.boot and not reset:
                 reset = (
-                    await client.ask(Command(command=CommandName.RESET, argument=0), CommandDone, deadline_s=40)
+                    await client.request(Command(command=CommandName.RESET, argument=0), CommandDone, deadline_s=40)
                 ).done
             await asyncio.sleep(0.1)
         assert asked
         site.ask(do="fruit", kind="strawberry", seed=2)
-        begun = await client.ask(Begin(trigger_id=1, encoder=0, lot="A"), BeginReply, deadline_s=40)
+        begun = await client.request(Begin(trigger_id=1, encoder=0, lot="A"), BeginReply, deadline_s=40)
         assert begun.sequence is not None, begun
-        return await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
+        return await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
 
 
 async def glance(configuration):
     """What the pages are told."""
     async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as client:
-        return await client.ask(GetPanelState(), PanelState, deadline_s=20)
+        return await client.request(GetPanelState(), PanelState, deadline_s=20)
 
 
 async def beat(client):
     with contextlib.suppress(Exception):
-        return await client.ask(LINE, StationState, deadline_s=10)
+        return await client.request(LINE, StationState, deadline_s=10)
     return StationState.model_construct(boot="", ready=False, why_not_ready="it does not answer yet")

@@ -89,7 +89,7 @@ def with_peer(tmp_path, body):
 
 def test_each_of_many_requests_gets_its_own_answer(tmp_path):
     async def body(client, peer, endpoint):
-        answers = await asyncio.gather(*(client.ask(Add(a=i, b=i), Sum, deadline_s=5.0) for i in range(100)))
+        answers = await asyncio.gather(*(client.request(Add(a=i, b=i), Sum, deadline_s=5.0) for i in range(100)))
         assert [answer.total for answer in answers] == [2 * i for i in range(100)]
 
     with_peer(tmp_path, body)
@@ -97,13 +97,13 @@ def test_each_of_many_requests_gets_its_own_answer(tmp_path):
 
 def test_a_slow_answer_is_given_up_and_does_not_hold_up_others(tmp_path):
     async def body(client, peer, endpoint):
-        slow = asyncio.create_task(client.ask(Sleep(duration_s=30.0), Sum, deadline_s=0.3))
+        slow = asyncio.create_task(client.request(Sleep(duration_s=30.0), Sum, deadline_s=0.3))
         begun = time.monotonic()
-        assert (await client.ask(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
+        assert (await client.request(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
         with pytest.raises(DeadlineError, match=r"the peer gave no answer within 0\.3 s when asked to rest a while"):
             await slow
         assert time.monotonic() - begun < 10.0
-        assert (await client.ask(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
+        assert (await client.request(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
 
     with_peer(tmp_path, body)
 
@@ -113,9 +113,9 @@ def test_a_request_that_nobody_took_in_time_is_not_begun_later(tmp_path):
         endpoint, peer = f"ipc://{tmp_path}/channel", Peer()
         async with ChannelClient(endpoint, "the peer") as client:
             with pytest.raises(DeadlineError):
-                await client.ask(Add(a=1, b=1), Sum, deadline_s=0.1)
+                await client.request(Add(a=1, b=1), Sum, deadline_s=0.1)
             serving = asyncio.create_task(peer.serve(endpoint))
-            assert (await client.ask(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
+            assert (await client.request(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
             assert [request.a for request in peer.begun] == [2]
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
@@ -134,8 +134,8 @@ def test_a_request_that_nobody_took_in_time_is_not_begun_later(tmp_path):
 def test_a_refusal_carries_the_peers_words(tmp_path, request_, words):
     async def body(client, peer, endpoint):
         with pytest.raises(RefusedError, match=words):
-            await client.ask(request_, Sum, deadline_s=5.0)
-        assert (await client.ask(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
+            await client.request(request_, Sum, deadline_s=5.0)
+        assert (await client.request(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
 
     with_peer(tmp_path, body)
 
@@ -143,7 +143,7 @@ def test_a_refusal_carries_the_peers_words(tmp_path, request_, words):
 def test_an_answer_of_another_type_is_an_error(tmp_path):
     async def body(client, peer, endpoint):
         with pytest.raises(ChannelError, match="something else than Other"):
-            await client.ask(Add(a=1, b=2), Other, deadline_s=5.0)
+            await client.request(Add(a=1, b=2), Other, deadline_s=5.0)
 
     with_peer(tmp_path, body)
 
@@ -165,7 +165,7 @@ def test_rubbish_does_not_end_the_server(tmp_path):
             [struct.pack(">Qd", 7, float("nan")), b"Add", b'{"a": 1, "b": NaN}'],
         ):
             await raw.send_multipart(frames)
-        assert (await client.ask(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
+        assert (await client.request(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
         assert all(request == Add(a=1, b=2) for request in peer.begun)
         raw.close(linger=0)
         context.term()
@@ -175,14 +175,14 @@ def test_rubbish_does_not_end_the_server(tmp_path):
 
 def test_closing_ends_what_is_under_way(tmp_path):
     async def body(client, peer, endpoint):
-        asking = asyncio.create_task(client.ask(Sleep(duration_s=30.0), Sum, deadline_s=60.0))
+        asking = asyncio.create_task(client.request(Sleep(duration_s=30.0), Sum, deadline_s=60.0))
         await asyncio.wait_for(peer.sleeping.wait(), 5)
         await client.close()
         with pytest.raises(ChannelError, match="was closed"):
             await asking
         await client.close()
         with pytest.raises(ChannelError, match="was closed"):
-            await client.ask(Sleep(duration_s=0.0), Sum, deadline_s=1.0)
+            await client.request(Sleep(duration_s=0.0), Sum, deadline_s=1.0)
 
     with_peer(tmp_path, body)
 

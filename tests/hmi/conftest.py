@@ -205,7 +205,7 @@ class Cell:
     @staticmethod
     async def _ask(endpoint: str, requests: Any, deadline_s: float = PATIENCE_S) -> list[Any]:
         async with ChannelClient(endpoint, "the station") as client:
-            return [await client.ask(request, reply, deadline_s=deadline_s) for request, reply in requests]
+            return [await client.request(request, reply, deadline_s=deadline_s) for request, reply in requests]
 
 
 @contextlib.contextmanager

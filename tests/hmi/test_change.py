@@ -39,10 +39,10 @@ def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypa
     gateway, values = pages.context.gateway, json.dumps(load_recipes()["blueberry"].model_dump(mode="json"))
     chosen = RecipeSummary(number=2, name="blueberry", title="Blueberry", revision="1", values=values)
 
-    async def ask(*_, **__):
+    async def answer(*_, **__):
         return Recipes(recipes=(chosen,), active=chosen, problems=())
 
-    monkeypatch.setattr(gateway, "ask", ask)
+    monkeypatch.setattr(gateway, "request", answer)
     for due in (DUE, ""):
         gateway.state = state(due)
         status, _, body = pages("GET", path, headers={"accept-language": "de"})

@@ -144,11 +144,11 @@ class Site:
         return self.asked(work, panel_endpoint(self.configuration.hmi, self.home))
 
     def state(self) -> StationState:
-        return self.asked(lambda client: client.ask(LINE, StationState, deadline_s=20))
+        return self.asked(lambda client: client.request(LINE, StationState, deadline_s=20))
 
     def order(self, command: CommandName, argument: int = 0) -> CommandDone:
         request = Command(command=command, argument=argument)
-        return self.asked(lambda client: client.ask(request, CommandDone, deadline_s=40))
+        return self.asked(lambda client: client.request(request, CommandDone, deadline_s=40))
 
     def ready(self) -> bool:
         """Whether fruit is taken; where not, a person resets: on a busy machine moves come late, which stops it."""
@@ -165,11 +165,11 @@ class Site:
         async def steps(client: ChannelClient) -> Outcome:
             size = {"fruit_length_mm_x10": 480, "size_class": 3} if bruised else {}
             request = Begin(trigger_id=next(self._triggers), encoder=7, lot="LOT 1", **size)
-            begun = await client.ask(request, BeginReply, deadline_s=20)
+            begun = await client.request(request, BeginReply, deadline_s=20)
             assert begun.sequence is not None, begun
-            outcome = await client.ask(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
-            await client.ask(Published(outcome=outcome), Noted, deadline_s=20)
-            await client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
+            outcome = await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
+            await client.request(Published(outcome=outcome), Noted, deadline_s=20)
+            await client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
             return outcome
 
         outcome = self.asked(steps)

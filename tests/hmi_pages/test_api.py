@@ -92,7 +92,7 @@ def test_a_lot_is_begun_and_ended_and_the_trail_knows_by_whom(orchard: Any, api:
     assert api("POST", "/api/v1/lots/L-7/end", token=writing).body["ended"] is not None
     assert api("GET", "/api/v1/lots/L-7", token=writing).body["ended"] is not None
     rows = orchard.over_the_panel(
-        lambda client: client.ask(ReadAudit(action="lot.", subject="L-7"), AuditRows, deadline_s=20)
+        lambda client: client.request(ReadAudit(action="lot.", subject="L-7"), AuditRows, deadline_s=20)
     ).rows
     assert {(row.who, row.role, row.action) for row in rows} == {
         ("writing", "operator", "lot.told"),

@@ -35,7 +35,7 @@ OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clie
 
 def audited(site: Any, action: str) -> list[Any]:
     asked = ReadAudit(action=action)
-    return list(site.over_the_panel(lambda client: client.ask(asked, AuditRows, deadline_s=20)).rows)
+    return list(site.over_the_panel(lambda client: client.request(asked, AuditRows, deadline_s=20)).rows)
 
 
 def edit(page: Page, field: str, value: str) -> None:

@@ -74,25 +74,25 @@ class LineClient:
     ids: Any = field(default_factory=lambda: itertools.count(1))
 
     async def state(self, *faults: str) -> StationState:
-        return await self.client.ask(LINE.model_copy(update={"faults": faults}), StationState, deadline_s=20)
+        return await self.client.request(LINE.model_copy(update={"faults": faults}), StationState, deadline_s=20)
 
     async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
-        return await self.client.ask(Command(command=command, argument=argument), CommandDone, deadline_s=40)
+        return await self.client.request(Command(command=command, argument=argument), CommandDone, deadline_s=40)
 
     async def begin(self, trigger_id: int | None = None) -> BeginReply:
         request = Begin(trigger_id=trigger_id or next(self.ids), encoder=7, lot="LOT 1")
-        return await self.client.ask(request, BeginReply, deadline_s=20)
+        return await self.client.request(request, BeginReply, deadline_s=20)
 
     async def outcome(self, sequence: int | None) -> Outcome:
         assert sequence is not None
-        return await self.client.ask(AwaitOutcome(sequence=sequence), Outcome, deadline_s=PATIENCE_S)
+        return await self.client.request(AwaitOutcome(sequence=sequence), Outcome, deadline_s=PATIENCE_S)
 
     async def publish(self, outcome: Outcome) -> None:
-        await self.client.ask(Published(outcome=outcome), Noted, deadline_s=20)
-        await self.client.ask(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
+        await self.client.request(Published(outcome=outcome), Noted, deadline_s=20)
+        await self.client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
 
     async def open(self) -> Open:
-        return await self.client.ask(Resume(), Open, deadline_s=20)
+        return await self.client.request(Resume(), Open, deadline_s=20)
 
     async def ready(self) -> StationState:
         async def look() -> StationState | None:

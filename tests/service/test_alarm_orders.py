@@ -79,7 +79,7 @@ def test_what_cannot_be_done_to_an_alarm_is_refused_and_said(bench):
 
             async def shelve(alarm="disk_low", who="Ida", reason="why", for_s=60.0):
                 request = ShelveAlarm(alarm=alarm, who=who, role="operator", reason=reason, for_s=for_s)
-                return await client.ask(request, CommandDone, deadline_s=20)
+                return await client.request(request, CommandDone, deadline_s=20)
 
             assert "never hidden" in (await shelve("protective_stop")).why
             assert "a reason is needed" in (await shelve(reason=" ")).why
@@ -89,9 +89,9 @@ def test_what_cannot_be_done_to_an_alarm_is_refused_and_said(bench):
             with pytest.raises(RefusedError, match="audit: who"):
                 await shelve(who="a\nb")
             request = AcknowledgeAlarm(alarm="disk_low", who="Ida", role="operator")
-            assert "does not stand" in (await client.ask(request, CommandDone, deadline_s=20)).why
+            assert "does not stand" in (await client.request(request, CommandDone, deadline_s=20)).why
             assert (await shelve()).done, "also one whose cause is not there yet"
-            listed = await client.ask(ListAlarms(), AlarmList, deadline_s=20)
+            listed = await client.request(ListAlarms(), AlarmList, deadline_s=20)
             (hidden,) = [each for each in listed.alarms if each.alarm == "disk_low"]
             assert (hidden.state, hidden.active, hidden.shelved_by) == ("shelved_normal", False, "Ida")
             assert hidden.document == "docs/alarms.md#disk-low"

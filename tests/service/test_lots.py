@@ -67,4 +67,4 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
 
 async def begin(cell, trigger_id, lot):
     await cell.line.ready()
-    return await cell.line.client.ask(Begin(trigger_id=trigger_id, encoder=7, lot=lot), BeginReply, deadline_s=20)
+    return await cell.line.client.request(Begin(trigger_id=trigger_id, encoder=7, lot=lot), BeginReply, deadline_s=20)

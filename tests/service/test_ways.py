@@ -90,7 +90,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                     await asyncio.sleep(0.05)
             assert "claim registers" in cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail
             faults.clear()
-            done = await line.client.ask(Recover(what="program"), CommandDone, deadline_s=60)
+            done = await line.client.request(Recover(what="program"), CommandDone, deadline_s=60)
             assert done.done, done.why
             await line.ready()
 

@@ -106,7 +106,7 @@ class ArmProcess:
         Raises:
             ArmFault: no answer in time, the process has ended, or it refused.
         """
-        asking = asyncio.create_task(self._channel.ask(request, reply, deadline_s=deadline_s))
+        asking = asyncio.create_task(self._channel.request(request, reply, deadline_s=deadline_s))
         dying = asyncio.create_task(self._process.wait())
         try:
             await asyncio.wait({asking, dying}, return_when=asyncio.FIRST_COMPLETED)
