@@ -55,7 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
     parser.add_argument("--during-lot", action="store_true", help="upgrade or roll back though a lot is under way")
     parser.add_argument(
-        "--root", type=Path, default=Path("/"), metavar="DIR", help="a folder that stands for /; nothing is started"
+        "--root", type=Path, default=Path("/"), metavar="DIR", help="a scratch root; nothing is started"
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(

@@ -52,7 +52,7 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
 def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
     status, _ = _get(*address, "/livez")
     if status != http.HTTPStatus.OK:
-        return "/livez says that it stands still"
+        return "/livez reports no progress"
     found = _get(*address, "/version")[1].get("fruit-station")
     if found != version:
         return f"version {found} answers, not {version}"

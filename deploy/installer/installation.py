@@ -104,7 +104,7 @@ class Installation:
                 print_progress(str(error))
                 roll_back(self._layout, self._services, self._limit_s)
                 raise Failed(
-                    f"{self.release.name} is not in use: {self._describe_old()} is again; mend the cause"
+                    f"{self.release.name} is not in use: {self._describe_old()} is again; correct the cause"
                 ) from error
 
     def _describe_old(self) -> str:

@@ -73,7 +73,7 @@ def check_no_lot(layout: Layout, release: Path) -> None:
         lately = station(layout, release, "records", "list", "--last", "1", "--from", since).splitlines()
     except Failed as error:
         raise Refused(
-            f"the records cannot be asked whether a lot is under way; --during-lot goes on without: {error}"
+            f"the records do not show whether a lot is under way; --during-lot skips this check: {error}"
         ) from error
     if running := [line.split(":")[0] for line in lots if line.endswith(", runs")]:
         raise Refused(

@@ -34,7 +34,7 @@ COMPARED = (
          "alarms.md#reference-drifting", (f"station_reference_drift_grey_levels{{{HERE}}}", "{{station}}")),
     prom("lines", "Free space", "bytes", "On the records' disks.", "alarms.md#disk-low",
          (f"station_records_free_bytes{{{HERE}}}", "{{station}}")),
-    prom("lines", "Behind by", "s", "How old the first record is that another system was not told.",
+    prom("lines", "Behind by", "s", "Age of the oldest record that is not delivered to another system.",
          "alarms.md#outbox-behind", (f"station_outbox_lag_seconds{{{HERE}}}", "{{station}}, {{destination}}")),
     prom("table", "Calibrations", "s", "Their ages: the oldest is calibrated next.", "alarms.md#calibration-old",
          f"sort_desc(max by (station) (station_calibration_age_seconds{{{HERE}}}))", width=12),
@@ -46,5 +46,5 @@ COMPARED = (
 def dashboard() -> Any:
     """The dashboard."""
     station = chosen("station", "Stations", "label_values(station_build_info, station)", several=True)
-    about = "Which station needs somebody?"
+    about = "Which station needs attention?"
     return board("fruit-fleet", "Fleet", about, (station,), {"Now": ROWS, "Side by side": COMPARED})

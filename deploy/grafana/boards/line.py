@@ -11,7 +11,7 @@ REJECTS, UNJUDGED, LATE = "alarms.md#reject-rate", "alarms.md#many-no-result", "
 NOW = (
     prom(
         "number", "Rejected, last hour", "percentunit",
-        "Share of the judged fruit that failed. The alert RejectRateHigh tells when it is more than usual.",
+        "Share of the judged fruit that failed. The alert RejectRateHigh reports an unusual share.",
         REJECTS, (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{fruit}}"), width=6,
     ),
     prom(
@@ -89,7 +89,7 @@ FRUIT = (
     ),
     prom(
         "lines", "Late, and triggers refused", "short",
-        "In the last hour. Late fruit is NO_RESULT; a refused trigger is a fruit that nobody inspected.", LATE,
+        "In the last hour. Late fruit is NO_RESULT; a refused trigger is a fruit without an inspection.", LATE,
         (f"sum by (fruit) (increase(station_inspections_late_total{{{HERE}}}[1h]))", "{{fruit}}, late"),
         ('sum by (reason) (increase(station_triggers_refused_total{station=~"$station"}[1h]))', "refused: {{reason}}"),
     ),

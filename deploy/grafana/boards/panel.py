@@ -161,7 +161,7 @@ def board(uid: str, title: str, about: str, variables: tuple[Any, ...], rows: di
         rows: panels under their headings.
     """
     docs = dashboard.TextBoxVariable("docs").label("Documents").default_value("/docs").description(
-        "Where the station's documents are kept: links lead there."
+        "Address of the station's documents, the target of links."
     )  # fmt: skip
     others = dashboard.DashboardLink("Dashboards").type(DashboardLinkType.DASHBOARDS).tags(["fruit-station"])
     making = (

@@ -56,7 +56,7 @@ TRENDS = (
         GROUP BY 1, 2, 3 ORDER BY 4 DESC"""),
 )  # fmt: skip
 REPLICATION = (
-    sql("table", "How far each station has told", "short",
+    sql("table", "Replication of each station", "short",
         "An old time is a station whose outbox does not reach this database.", "alarms.md#outbox-behind",
         "SELECT station, max(told) AS told, sum(last_entry) AS entries FROM stations "
         "WHERE station IN (${station:sqlstring}) GROUP BY station ORDER BY 2"),

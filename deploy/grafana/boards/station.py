@@ -29,7 +29,7 @@ HEALTH = (
     prom("number", "Runs", "none", "The program's version and its Python.", "metrics.md",
          (f"station_build_info{{{HERE}}}", "{{version}}, Python {{python}}"), width=8),
     prom("table", "Every alarm", "bool_yes_no",
-         "Those that stand are on top. What each asks for is in its document.", "alarms.md",
+         "Active alarms are on top. The document of each describes the action.", "alarms.md",
          f"sort_desc(max by (id, priority) (station_alarms_active{{{HERE}}}))"),
     prom("lines", "Last heard", "s",
          "Time since each device, process and the PLC's heartbeat were heard: seconds mean that it is away.",
@@ -77,7 +77,7 @@ SENSOR = (
          width=4),
 )  # fmt: skip
 LINE = (
-    prom("lines", "PLC", "s", "Time since its heartbeat changed, and since its interface's process asked.",
+    prom("lines", "PLC", "s", "Time since its heartbeat changed, and since the last query of its interface's process.",
          "alarms.md#plc-heartbeat-lost", (f'station_link_age_seconds{{{HERE}, link=~"plc.*"}}', "{{link}}")),
     prom("lines", "Outcomes that wait", "short", "For the PLC's acknowledgement.", "plc/handshake.md",
          (f"station_outcomes_waiting{{{HERE}}}", "waiting")),
@@ -101,13 +101,13 @@ RECORDS = (
          (f"station_records_last_write_age_seconds{{{HERE}}}", "age")),
 )  # fmt: skip
 OUTBOX = (
-    prom("lines", "Not yet told", "short", "Entries that wait for another system, and events that it did not take.",
+    prom("lines", "Undelivered", "short", "Entries that wait for another system, and events that it did not take.",
          "alarms.md#outbox-behind", (f"station_outbox_waiting{{{HERE}}}", "{{destination}}"),
          (f"station_outbox_refused_total{{{HERE}}}", "{{destination}}, refused")),
     prom("lines", "Behind by", "s", "Age of the first entry that waits, and time since the outbox was heard.",
          "alarms.md#outbox-behind", (f"station_outbox_lag_seconds{{{HERE}}}", "{{destination}}"),
          (f"station_outbox_heard_age_seconds{{{HERE}}}", "outbox heard")),
-    prom("lines", "Connected", "bool_yes_no", "Whether the other system can be told.", "outbox.md",
+    prom("lines", "Connected", "bool_yes_no", "Whether the other system can be reached.", "outbox.md",
          (f"station_outbox_connected{{{HERE}}}", "{{destination}}"), largest=1),
 )  # fmt: skip
 MACHINE = (
