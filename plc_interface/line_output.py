@@ -125,8 +125,8 @@ class RejectGate:
 
     async def stop(self) -> None:
         """Stop the heartbeat: the gate sets its safe output. The next run orders the pending rejects."""
-        for shot in self._rejects:
-            shot.cancel()
+        for pending in self._rejects:
+            pending.cancel()
         await asyncio.gather(*self._rejects, return_exceptions=True)
         await self._io.stop()
 
@@ -142,9 +142,9 @@ class RejectGate:
             self._order(outcome.sequence, at_count)
 
     def _order(self, sequence: int, at_count: int) -> None:
-        shot = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
-        self._rejects.add(shot)
-        shot.add_done_callback(self._rejects.discard)
+        pending = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
+        self._rejects.add(pending)
+        pending.add_done_callback(self._rejects.discard)
 
     async def _divert(self, sequence: int, at_count: int) -> None:
         logged = ""

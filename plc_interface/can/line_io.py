@@ -163,7 +163,7 @@ class LineIo:
         link, now = self._link, self.encoder_count()
         if not self.ready or link is None or now is None:
             raise NotReadyError(f"shot {sequence} was not ordered: {self.why_not_ready}")
-        with self._rejects.under_way(Order(sequence, lane, at_count)) as shot:
+        with self._rejects.under_way(Order(sequence, lane, at_count)) as pending:
             if ahead(now.value, at_count) <= 0:
                 raise LateRejectError(
                     sequence,
@@ -174,35 +174,35 @@ class LineIo:
             self._counters["shots_ordered"] += 1
             link.send(
                 0x200 + self._settings.gate_node,
-                ORDER.pack(shot.order.on_wire, lane, self._settings.pulse_ms, at_count),
+                ORDER.pack(pending.order.on_wire, lane, self._settings.pulse_ms, at_count),
             )
-            report = await self._confirmed(shot)
+            report = await self._confirmed(pending)
             confirmed_s = time.monotonic() - began_s
             while report.fired != Fired.FIRED:
-                report = await self._fired(shot, began_s)
+                report = await self._fired(pending, began_s)
             self._counters["shots_fired"] += 1
             return DivertEcho(sequence, lane, at_count, report.encoder_count, confirmed_s)
 
-    async def _confirmed(self, shot: PendingReject) -> Report:
+    async def _confirmed(self, pending: PendingReject) -> Report:
         try:
             async with asyncio.timeout(self._settings.echo_deadline_s):
-                return await shot.next()
+                return await pending.next()
         except TimeoutError:
             self._counters["echoes_missing"] += 1
             raise EchoMissingError(
-                shot.order.sequence,
+                pending.order.sequence,
                 f"the gate did not confirm the order within {self._settings.echo_deadline_s:g} s; look at the gate, "
                 "and take the fruit for not diverted",
             ) from None
 
-    async def _fired(self, shot: PendingReject, began_s: float) -> Report:
+    async def _fired(self, pending: PendingReject, began_s: float) -> Report:
         """Wait until the belt reaches the count, however slowly, and then for the report."""
-        at = shot.order.at_count
+        at = pending.order.at_count
         passed_s: float | None = None
         while True:
             with suppress(TimeoutError):
                 async with asyncio.timeout(_POLL_S):
-                    return await shot.next()
+                    return await pending.next()
             now_s, count = time.monotonic(), self.encoder_count()
             if passed_s is None and count and ahead(count.value, at) <= 0:
                 passed_s = now_s
@@ -213,7 +213,7 @@ class LineIo:
             else:
                 continue
             self._counters["echoes_missing"] += 1
-            raise EchoMissingError(shot.order.sequence, what)
+            raise EchoMissingError(pending.order.sequence, what)
 
     @property
     def _healthy(self) -> bool:

@@ -121,9 +121,9 @@ class PendingRejects:
         """
         if order.on_wire in self._pending:
             raise RejectRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
-        shot = self._pending[order.on_wire] = PendingReject(order, self._tolerance_counts)
+        pending = self._pending[order.on_wire] = PendingReject(order, self._tolerance_counts)
         try:
-            yield shot
+            yield pending
         except RejectError as error:
             self.blame(error)
             raise
@@ -138,8 +138,8 @@ class PendingRejects:
 
     def on_report(self, report: Report) -> None:
         """Assign a report of the gate to its order."""
-        if shot := self._pending.get(report.sequence):
-            shot.reports.put_nowait(report)
+        if pending := self._pending.get(report.sequence):
+            pending.reports.put_nowait(report)
         elif report.sequence in self._ended:
             self._counters["echoes_late"] += 1
         else:
@@ -150,8 +150,8 @@ class PendingRejects:
 
     def lose(self, why: str) -> None:
         """End all orders: the gate is lost, and its actions are unknown."""
-        for shot in self._pending.values():
+        for pending in self._pending.values():
             lost = RejectLostError(
-                shot.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
+                pending.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
             )
-            shot.reports.put_nowait(lost)
+            pending.reports.put_nowait(lost)
