@@ -57,7 +57,7 @@ class Interface:
         self._written: dict[str, Value] = {}
         self._writer: Peer | None = None
         journal.write(self._state.journal, durable=True)
-        self._show()
+        self._publish()
 
     def start(self, statistics: Statistics) -> None:
         """Start the requests to the station.
@@ -108,7 +108,7 @@ class Interface:
         for action in actions:
             if isinstance(action, do.SaveJournal):
                 self._journal.write(action.journal, durable=action.durable)
-        self._show()
+        self._publish()
         for action in actions:
             self._carry_out(action)
         if isinstance(event, ev.Beat) and self._state.link is Link.UP and event.station.healthy:
@@ -121,7 +121,7 @@ class Interface:
         if self._output.ready != self._state.diverts:
             self.feed(ev.OutputChanged(now(), self._output.ready))
 
-    def _show(self) -> None:
+    def _publish(self) -> None:
         values = view(self._state) | self._server_counts()
         changed = {name: value for name, value in values.items() if self._written.get(name, _NEVER) != value}
         self._image.commit(changed)

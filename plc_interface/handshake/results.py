@@ -21,8 +21,8 @@ def one_waits(work: Work) -> bool:
     return bool(work.state.queue)
 
 
-def show(work: Work) -> None:
-    """Show the oldest result, toggle."""
+def publish_oldest(work: Work) -> None:
+    """Publish the oldest result, toggle."""
     work.state.toggle = not work.state.toggle
     work.state.published = work.state.queue[0].sequence
 
@@ -65,13 +65,13 @@ def wrong(work: Work) -> None:
 EMPTY, PUBLISHED, TAKEN = Result.EMPTY, Result.PUBLISHED, Result.TAKEN
 
 ROWS = (
-    row(EMPTY, Signal.QUEUED, show, to=PUBLISHED),
+    row(EMPTY, Signal.QUEUED, publish_oldest, to=PUBLISHED),
     row(EMPTY, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
     row(EMPTY, Signal.ACKNOWLEDGE_OFF, enable_bit),
     row(EMPTY, Signal.WRITER_LOST, enable_bit),
     row(PUBLISHED, Signal.ACKNOWLEDGED, take, watch, to=TAKEN, when=bit_is_high),
-    row(PUBLISHED, Signal.ACKNOWLEDGED, take, show, when=another_waits),
+    row(PUBLISHED, Signal.ACKNOWLEDGED, take, publish_oldest, when=another_waits),
     row(PUBLISHED, Signal.ACKNOWLEDGED, take, to=EMPTY),
     row(PUBLISHED, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(PUBLISHED, Signal.QUEUED),
@@ -81,10 +81,10 @@ ROWS = (
     row(TAKEN, Signal.ACKNOWLEDGED, take),
     row(TAKEN, Signal.QUEUED),
     row(TAKEN, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
-    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, show, to=PUBLISHED, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, publish_oldest, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.ACKNOWLEDGE_OFF, end_watch, to=EMPTY),
-    row(TAKEN, Signal.WRITER_LOST, end_watch, show, to=PUBLISHED, when=one_waits),
+    row(TAKEN, Signal.WRITER_LOST, end_watch, publish_oldest, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.WRITER_LOST, end_watch, to=EMPTY),
-    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, show, to=PUBLISHED, when=one_waits),
+    row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, publish_oldest, to=PUBLISHED, when=one_waits),
     row(TAKEN, Signal.ACKNOWLEDGE_TIMEOUT, not_reset, to=EMPTY),
 )
