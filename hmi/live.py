@@ -96,13 +96,13 @@ class Live:
             if news or loop.time() >= beat_at_s:
                 beat_at_s = loop.time() + BEAT_S
                 age_s = self._gateway.age_s
-                reply = {
+                event = {
                     "age_ms": None if age_s is None else round(1000 * age_s),
                     "utc_ms": 0 if self._gateway.state is None else self._gateway.state.utc_ms,
                     "boot": self._boot,
                     "caller": f"{who.name}|{who.role}",
                     "parts": {name: [each.digest, each.html] for name, each in news.items()},
                 }
-                yield f"data: {json.dumps(reply, ensure_ascii=False)}\n\n".encode()
+                yield f"data: {json.dumps(event, ensure_ascii=False)}\n\n".encode()
                 sent |= {name: each.digest for name, each in news.items()}
             await self._gateway.polled()

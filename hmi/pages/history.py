@@ -84,7 +84,7 @@ async def search(
     typed = number.translate(_BETWEEN_DIGITS)
     if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
         return go_to(f"/history/{int(typed)}")
-    typed = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
+    terms = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
@@ -95,7 +95,7 @@ async def search(
         request,
         "history.html.j2",
         status=200 if wanted is not None else 400,
-        typed={**typed, "from": begun_from, "to": begun_to},
+        terms={**terms, "from": begun_from, "to": begun_to},
         bad=wanted is None,
         found=found,
         below=below,

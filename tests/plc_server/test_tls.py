@@ -147,8 +147,8 @@ class TestRoles:
     def test_one_that_closes_while_the_server_ends_does_not_keep_it(self, serving, dial, authority):
         """A TLS transport that was closed once is closed again."""
         dial(*authority.issue("line-plc", "writer")).read(REFERENCE, 1)
-        (member,) = serving.server._hub._members.values()
-        serving.call(lambda: (member.transport.close(), serving.server._hub.close()))
+        (member,) = serving.server._manager._members.values()
+        serving.call(lambda: (member.transport.close(), serving.server._manager.close()))
         serving.wait(lambda: member.transport is None)
         assert serving.server.connections == 0
 
