@@ -22,7 +22,7 @@ class Add(Message):
 
 
 class Sleep(Message):
-    asked = "to rest a while"
+    purpose = "to rest a while"
     duration_s: float
 
 
