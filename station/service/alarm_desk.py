@@ -1,4 +1,4 @@
-"""Which alarms stand: raised and cleared by what is seen, remembered by the records, told to the PLC."""
+"""Alarm manager: raises and clears alarms, stores them in the records, and reports them to the PLC."""
 
 import asyncio
 import logging
@@ -40,7 +40,7 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
     GRIPPER: frozenset({AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
     CAMERA: frozenset({AlarmId.CAMERA_LOST, AlarmId.CAMERA_STALE}),
 }
-"""What only the devices' watches tell; all of it is cleared once each of its devices is well."""
+"""Alarms that only the device monitors raise; all are cleared once each of their devices is healthy."""
 
 _MOST_UNSAVED = 1000
 _ARM = {
@@ -61,11 +61,10 @@ _GRIPPER_LINK = (GripperUnreachableError, GripperLinkLostError, GripperSilentErr
 
 
 def alarm_of(device: str, fault: StationError) -> AlarmId:
-    """The alarm that a device's fault is told by.
+    """Return the alarm that reports a device's fault.
 
     Args:
         device: `arm`, `gripper` or `camera`.
-        fault: what is wrong with it.
     """
     match fault:
         case FramesError():
@@ -82,10 +81,10 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
 
 
 class AlarmDesk:
-    """The station's alarms. Every verb is immediate; `keep` makes them durable afterwards.
+    """Alarm states of the station. Every method is immediate; `keep` makes the changes durable afterwards.
 
     Args:
-        metrics: shows which are active.
+        metrics: receives the active alarms.
     """
 
     def __init__(self, metrics: Metrics) -> None:
@@ -99,36 +98,30 @@ class AlarmDesk:
 
     @property
     def alarms(self) -> Alarms:
-        """All of them, as a value."""
+        """Return all alarms, as a value."""
         return self._alarms
 
     def raise_(self, alarm: AlarmId, detail: str) -> None:
-        """Its cause is there; told once for as long as it is.
+        """Raise an alarm; it is published once for as long as its cause is present.
 
         Args:
-            alarm: which.
-            detail: what was seen.
+            detail: the finding.
         """
         if alarm not in self._present:
             self._present.add(alarm)
             self._set(self._alarms.raise_(alarm, time.time(), detail), alarm, "raised", detail)
 
     def clear(self, alarm: AlarmId) -> None:
-        """Its cause is gone.
-
-        Args:
-            alarm: which; one whose cause was not there is left alone.
-        """
+        """Mark an alarm's cause as gone; an alarm whose cause was not present does not change."""
         if alarm in self._present:
             self._present.discard(alarm)
             self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared", "")
 
     def show(self, alarm: AlarmId, detail: str) -> None:
-        """Raise it where there is something to say, clear it where not.
+        """Raise the alarm if `detail` is given, else clear it.
 
         Args:
-            alarm: which.
-            detail: what was seen; empty where its cause is gone.
+            detail: the finding; empty if the cause is gone.
         """
         if detail:
             self.raise_(alarm, detail)
@@ -136,11 +129,11 @@ class AlarmDesk:
             self.clear(alarm)
 
     def device(self, device: str, fault: StationError | None) -> None:
-        """Tell what is wrong with a device, or that it is well.
+        """Raise the alarm of a device's fault, or clear the alarms of a healthy device.
 
         Args:
             device: `arm`, `gripper` or `camera`.
-            fault: None where nothing is.
+            fault: None if the device is healthy.
         """
         told = None if fault is None else alarm_of(device, fault)
         before, self._told[device] = self._told.get(device), told
@@ -151,10 +144,7 @@ class AlarmDesk:
             self.raise_(told, str(fault))
 
     def acknowledge(self, alarm: AlarmId) -> bool:
-        """A person has seen it.
-
-        Args:
-            alarm: which.
+        """Acknowledge an alarm.
 
         Returns:
             Whether that changed anything.
@@ -162,13 +152,12 @@ class AlarmDesk:
         return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged", "")
 
     def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
-        """Hide it for a time.
+        """Shelve an alarm for a time.
 
         Args:
-            alarm: which; a latched one, and one that is shelved, stays as it is.
-            for_s: how long, `LONGEST_SHELVED_S` at most.
-            by: who.
-            reason: why.
+            alarm: a latched alarm, and one that is shelved already, does not change.
+            for_s: at most `LONGEST_SHELVED_S`.
+            by: the person's name.
 
         Returns:
             Whether that changed anything.
@@ -177,10 +166,7 @@ class AlarmDesk:
         return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
 
     def unshelve(self, alarm: AlarmId) -> bool:
-        """Show it again; one whose cause is there has to be acknowledged anew.
-
-        Args:
-            alarm: which.
+        """Unshelve an alarm; if its cause is present, it has to be acknowledged again.
 
         Returns:
             Whether that changed anything.
@@ -188,29 +174,25 @@ class AlarmDesk:
         return self._set(self._alarms.unshelve(alarm), alarm, "unshelved", "")
 
     def acknowledge_returned(self) -> None:
-        """Acknowledge every alarm whose cause is gone: what the PLC's command does."""
+        """Acknowledge every alarm that has returned to normal: the PLC's command."""
         self._set_all(self._alarms.acknowledge_returned(), "acknowledged")
 
     def reset(self) -> None:
-        """Let go every latched alarm whose cause is gone: a person has reset the station."""
+        """Unlatch every latched alarm whose cause is gone, after a person's reset."""
         alarms = self._alarms
         for alarm in self._alarms.known:
             alarms = alarms.reset(alarm)
         self._set_all(alarms, "reset")
 
     def tick(self) -> None:
-        """Let time end what it ends; about once a second."""
+        """Apply what depends on time, as the end of shelving; call it about once a second."""
         later = self._alarms.tick(time.time())
         if later != self._alarms:
             self._alarms = later
             self._show()
 
     async def recall(self, records: Records) -> None:
-        """Take up the alarms of the start before; their causes are there until the contrary is seen.
-
-        Args:
-            records: as opened.
-        """
+        """Restore the alarms of the previous start; their causes count as present until a check clears them."""
         self._alarms = Alarms.from_data(
             [
                 {
@@ -229,11 +211,7 @@ class AlarmDesk:
         self._show()
 
     async def keep(self, records: Records) -> None:
-        """Make every change durable, until cancelled; what could not be written is tried again with the next.
-
-        Args:
-            records: as opened.
-        """
+        """Store every change until cancelled; a change that could not be stored is tried again with the next one."""
         while True:
             await self._changed.wait()
             self._changed.clear()

@@ -1,4 +1,4 @@
-"""What people do with alarms, from the panel or by a command: each told to the audit trail."""
+"""Alarm commands of people, from the panel or the command line; each goes into the audit log."""
 
 from datetime import UTC, datetime
 
@@ -22,12 +22,7 @@ from station.service.trail import Trail, alarm_changed
 
 
 class AlarmOrders:
-    """Answers what a person asks of the alarms.
-
-    Args:
-        desk: the alarms.
-        trail: told of every change.
-    """
+    """Handlers of alarm requests."""
 
     def __init__(self, desk: AlarmDesk, trail: Trail) -> None:
         self._desk, self._trail = desk, trail
@@ -40,19 +35,19 @@ class AlarmOrders:
         """For a channel's server."""
 
     async def listed(self, _request: ListAlarms) -> AlarmList:
-        """Which alarms are not in their normal state."""
+        """List the alarms that are not in their normal state."""
         return AlarmList(alarms=self.standing(), longest_shelved_s=LONGEST_SHELVED_S)
 
     def standing(self) -> tuple[ListedAlarm, ...]:
-        """The same, most urgent first."""
+        """List the same alarms, most urgent first."""
         return tuple(_listed(alarm) for alarm in self._desk.alarms.standing)
 
     async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:
-        """A person has seen an alarm.
+        """Acknowledge an alarm.
 
         Raises:
             BadInputError: there is no such alarm.
-            BadRecordError: who or the role is nothing that the audit trail can hold.
+            BadRecordError: the audit log cannot store the name or the role.
         """
         alarm, entry = self._taken(request, "acknowledged")
         if self._desk.alarms.get(alarm).state is AlarmState.NORMAL:
@@ -60,11 +55,11 @@ class AlarmOrders:
         return self._done(self._desk.acknowledge(alarm), entry)
 
     async def shelve(self, request: ShelveAlarm) -> CommandDone:
-        """Hide an alarm for a time.
+        """Shelve an alarm for a time.
 
         Raises:
             BadInputError: there is no such alarm.
-            BadRecordError: who, the role or the reason is nothing that the audit trail can hold.
+            BadRecordError: the audit log cannot store the name, the role or the reason.
         """
         alarm, entry = self._taken(request, "shelved", request.reason)
         known = self._desk.alarms.get(alarm)
@@ -80,17 +75,17 @@ class AlarmOrders:
         return self._done(self._desk.shelve(alarm, request.for_s, request.who, request.reason), entry)
 
     async def unshelve(self, request: UnshelveAlarm) -> CommandDone:
-        """Show an alarm again.
+        """Unshelve an alarm.
 
         Raises:
             BadInputError: there is no such alarm.
-            BadRecordError: who or the role is nothing that the audit trail can hold.
+            BadRecordError: the audit log cannot store the name or the role.
         """
         alarm, entry = self._taken(request, "unshelved")
         return self._done(self._desk.unshelve(alarm), entry)
 
     def _taken(self, request: OfAlarm, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
-        """The alarm, and the trail's row, which is checked before anything is done."""
+        """Return the alarm and its audit entry, which is validated before anything changes."""
         if request.alarm not in set(AlarmId):
             raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")
         entry = alarm_changed(request.who, request.role, change, request.alarm, reason)

@@ -1,4 +1,4 @@
-"""The station's gripper and camera, to press a ball with; the arm, where there is one, goes to the nest and back."""
+"""Calibration rig of the running station: its gripper, its camera, and its arm if there is one."""
 
 from collections.abc import Awaitable, Callable, Sequence
 
@@ -12,12 +12,11 @@ _OPEN_WITHIN_MM = 2.0
 
 
 class BallBench:
-    """A bench for the procedures of `station.calibration`.
+    """Rig for the procedures of `station.calibration`; the arm moves only between the nest and home.
 
     Args:
-        cell: the devices, opened.
-        recipe: the ball's.
-        lay: has the ball laid at a place; returns once it lies there.
+        cell: the opened devices.
+        lay: has the ball laid at a place; returns once it is there.
         patience: factor on the longest wait for a frame.
     """
 
@@ -28,10 +27,7 @@ class BallBench:
         self._grip = Grip(cell, recipe, FRAME_DEADLINE_S * patience)
 
     async def untouched(self, number: int) -> Sequence[Image]:
-        """Open the jaws, away from the nest where there is an arm, and take frames of the untouched gel.
-
-        Args:
-            number: how many.
+        """Open the jaws, away from the nest if there is an arm, and take frames of the untouched gel.
 
         Raises:
             GripError: the jaws do not open.
@@ -52,10 +48,7 @@ class BallBench:
         return frames
 
     async def press_to(self, width_mm: float) -> Pressed:
-        """Go to a width and take the step's frames there.
-
-        Args:
-            width_mm: the width to ask for.
+        """Move to a width and take the step's frames there.
 
         Raises:
             StationError: a device's fault.
@@ -67,7 +60,7 @@ class BallBench:
         """Have the ball laid at another place.
 
         Args:
-            place: from the first one.
+            place: relative to the first place.
         """
         await self._lay(place)
 
@@ -75,7 +68,7 @@ class BallBench:
         """Open the jaws and bring the arm home.
 
         Raises:
-            GripError: one of them could not be done.
+            GripError: one of the two failed.
         """
         if left := await self._grip.let_go():
             raise GripError(left)

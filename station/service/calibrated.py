@@ -1,4 +1,4 @@
-"""The sensor's calibration as the station uses it: scale, gate, golden reference, age, and whether it is due."""
+"""Active calibration of the sensor: scale, contact gate, golden reference, age, and due verification."""
 
 import time
 from collections.abc import Callable
@@ -14,17 +14,17 @@ _DAY_S, _HOUR_S = 86_400.0, 3_600.0
 
 
 class InUse(NamedTuple):
-    """What a fruit is measured by."""
+    """Scale that a fruit is measured by."""
 
     mm_per_px: float
     words: str
-    """For its record."""
+    """For the fruit's record."""
     scale_uncertainty: float
     """Relative standard uncertainty of `mm_per_px`."""
 
 
 class Figures(NamedTuple):
-    """For the metrics; None where there is nothing to tell."""
+    """Calibration figures for the metrics; None where there is no value."""
 
     age_s: float | None
     verification_age_s: float | None
@@ -32,11 +32,10 @@ class Figures(NamedTuple):
 
 
 class Calibrated:
-    """The newest calibration of the sensor that is in use; read again when another one is stored.
+    """Newest calibration of the sensor in use; read again when another one is stored.
 
     Args:
-        configuration: home folder, camera, limits.
-        serial: tells the sensor's serial number.
+        serial: returns the sensor's serial number.
         clock: seconds since 1970, as calibrations are dated.
     """
 
@@ -53,13 +52,13 @@ class Calibrated:
 
     @property
     def calibration(self) -> Calibration | None:
-        """The one in force; None where the sensor has none."""
+        """Return the calibration in force; None if the sensor has none."""
         self._look()
         return self._calibration
 
     @property
     def in_force(self) -> InUse:
-        """The scale that areas are told by, and whose it is."""
+        """Return the scale that areas are reported in, and its source."""
         calibration = self.calibration
         if calibration is None:
             allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
@@ -72,16 +71,16 @@ class Calibrated:
 
     @property
     def gate_factor(self) -> float:
-        """What the recipe's contact gate is raised by on this unit."""
+        """Return the factor that raises the recipe's contact gate on this unit."""
         return 1.0 if self.calibration is None else self.calibration.noise.gate_factor
 
     def golden(self) -> Path | None:
-        """The file of the untouched gel as it was calibrated."""
+        """Return the file of the untouched gel as it was calibrated."""
         return None if self.calibration is None else self._store.folder(self.calibration) / REFERENCE
 
     @property
     def figures(self) -> Figures:
-        """Ages and drift now."""
+        """Return ages and drift now."""
         calibration, verified = self.calibration, self._verification
         return Figures(
             None if calibration is None else self._clock() - calibration.made_at.timestamp(),
@@ -90,7 +89,7 @@ class Calibrated:
         )
 
     def refusal(self) -> str:
-        """Why nothing may be inspected, with what to do; empty where all that is demanded was done."""
+        """Return why inspections are refused, with the remedy; empty if all that is required was done."""
         limit_h, calibration = self._settings.verify_every_h, self.calibration
         if calibration is None and (self._required or limit_h is not None):
             return (
@@ -111,7 +110,7 @@ class Calibrated:
         return ""
 
     def trouble(self) -> str:
-        """What the alarm calibration_old tells; empty where there is nothing."""
+        """Return the detail of the alarm calibration_old; empty for no alarm."""
         calibration, verified = self.calibration, self._verification
         if calibration is None:
             return "the sensor is not calibrated: calibrate it first" if self._required and self._serial() else ""

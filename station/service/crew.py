@@ -1,4 +1,4 @@
-"""The station's devices: opened, watched, and brought back where that is safe."""
+"""Device manager: opens and monitors the devices, and recovers them where that is safe."""
 
 import asyncio
 import contextlib
@@ -25,23 +25,22 @@ from station.settings.configuration import Configuration
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
 STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
-"""What the arm's safety controller decided and a person has to look at."""
+"""Stops by the arm's safety controller that a person has to check at the cell."""
 _BAD_FRAMES = 3
 _STALE_LOOKS = 3
-"""So often in a row a device may look ill before it counts: a moment's delay of this machine is no fault of its."""
+"""Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
 _ARM_PAUSE_S = 0.5
-"""The driver tries to reach the arm by itself, and is only asked."""
+"""The driver reconnects to the arm by itself; only its state is read."""
 _OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
 
 class Crew:
-    """Camera, gripper and arm of one station with their watches.
+    """Camera, gripper and arm of one station with their monitors.
 
     Args:
-        configuration: which devices, and where.
-        on_change: told a device's name and what is wrong with it from now on, None for nothing.
-        on_progress: told a device's name whenever its watch got something done.
+        on_change: gets a device's name and its fault from now on, None for no fault.
+        on_progress: gets a device's name after each of its checks.
     """
 
     def __init__(
@@ -78,7 +77,7 @@ class Crew:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def open(self) -> None:
-        """Begin to watch; a device that is away is waited for."""
+        """Start the monitors; they wait for a device that is away."""
         if self._arm is not None:
             await self._arm.open()
         self._tasks = [
@@ -86,7 +85,7 @@ class Crew:
         ]
 
     async def close(self) -> None:
-        """Let the devices go. Nothing is moved."""
+        """Close the devices. Nothing is moved."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -98,18 +97,18 @@ class Crew:
 
     @property
     def names(self) -> dict[str, str]:
-        """Who takes part, for the records."""
+        """Return the devices' names for the records."""
         camera, gripper = self.cell.camera.description.name, self._configuration.gripper.driver
         names = {CAMERA: camera, GRIPPER: f"Robotiq 2F-85 by {gripper}"}
         return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
 
     @property
     def faults(self) -> dict[str, StationError]:
-        """What is wrong, by device; empty where all are well."""
+        """Return the faults by device; empty if all are healthy."""
         return {name: watch.fault for name, watch in self.watches.items() if watch.fault is not None}
 
     def well_since(self, since_s: float) -> bool:
-        """Whether every device was found well after a time, and nothing is wrong with any.
+        """Check that every device was found healthy after a time, and none has a fault.
 
         Args:
             since_s: monotonic time.
@@ -118,20 +117,16 @@ class Crew:
         return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
 
     def use(self, *, by_inspection: bool) -> None:
-        """Leave the devices to an inspection, or watch them again; the arm is watched always.
+        """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored.
 
         Args:
-            by_inspection: whether one is under way.
+            by_inspection: whether an inspection is under way.
         """
         for name in (CAMERA, GRIPPER):
             self.watches[name].in_use = by_inspection
 
     def failed(self, fault: StationError) -> None:
-        """Somebody who worked with a device ran into this.
-
-        Args:
-            fault: as raised.
-        """
+        """Report a fault that a caller met while it worked with a device."""
         match fault:
             case ArmFault():
                 self.watches[ARM].failed(fault)
@@ -144,11 +139,11 @@ class Crew:
 
     @property
     def standing_stop(self) -> StationError | None:
-        """The safety stop that stands and is a person's."""
+        """Return the active safety stop that only a person may end."""
         return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
 
     def renew_health(self, lease_s: float) -> None:
-        """Let the arm move for a while; when the lease runs out its controller stops it.
+        """Let the arm move for a time; its controller stops it when the lease runs out.
 
         Args:
             lease_s: seconds from now.
@@ -157,7 +152,7 @@ class Crew:
             self._arm.renew_health(lease_s)
 
     async def halt(self) -> None:
-        """Stop arm and gripper where they are. Never raises: what does not answer is watched anyway."""
+        """Stop arm and gripper where they are. Never raises: the monitors find a device that does not answer."""
 
         async def quietly(stop: Callable[[], object]) -> None:
             with contextlib.suppress(StationError, TimeoutError):
@@ -170,13 +165,13 @@ class Crew:
         )
 
     async def recover(self, what: RecoveryName) -> None:
-        """Bring the arm back after a stop, as a person at the cell has asked for; nothing moves by it.
+        """Recover the arm after a stop, as a person at the cell requested; nothing moves by it.
 
         Args:
-            what: which stop the person has looked at.
+            what: the stop that the person has checked.
 
         Raises:
-            ArmFault: it could not be brought back.
+            ArmFault: the recovery failed.
         """
         if self._arm is None:
             return
@@ -190,10 +185,10 @@ class Crew:
         self.watches[ARM].look_again()
 
     async def play_again(self) -> None:
-        """Have the arm's program play again after a stop whose cause is gone; a playing one is left alone.
+        """Restart the arm's program after a stop whose cause is gone; a playing one does not change.
 
         Raises:
-            ArmFault: it does not play.
+            ArmFault: the program does not play.
         """
         if self._arm is not None:
             await self._arm.upload_again()
@@ -201,21 +196,21 @@ class Crew:
 
     @property
     def program_to_play_again(self) -> bool:
-        """Whether the arm stands only because this station was too slow for the controller's watchdog.
+        """Check whether the arm stopped only because this station was too slow for the controller's watchdog.
 
-        That stop is the station's own, as after a lost link: with the station healthy again nothing asks for a person.
+        Such a stop is the station's own, as after a lost link: once the station is healthy no person is needed.
         """
         fault = self.watches[ARM].fault if ARM in self.watches else None
         return isinstance(fault, ArmFault) and fault.cause is ArmCause.WATCHDOG
 
     async def activate_if_safe(self) -> None:
-        """Activate a gripper that lost its activation, unless a fruit may be between the jaws, which it would crush.
+        """Activate a gripper that lost its activation, unless a fruit may be between the jaws: it would be crushed.
 
-        Nothing is between them where the arm stands away from the nest, or where a person has said so. With the jaws
-        open at the nest the arm leaves it first.
+        Nothing is between them if the arm is away from the nest, or a person has confirmed it. With the jaws open at
+        the nest the arm leaves the nest first.
 
         Raises:
-            StationError: it may not be activated, with what a person can do; or it could not be.
+            StationError: activation is not safe, with the remedy; or it failed.
         """
         reading = await self.cell.gripper.read()
         if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
@@ -277,6 +272,6 @@ class Crew:
 
 
 def _is_stop(fault: StationError) -> bool:
-    """Whether it is a safety stop, as the arm or the gripper that it carries tells."""
+    """Check whether a fault is a safety stop, as the arm or the gripper on it reports it."""
     stopped_arm = isinstance(fault, ArmFault) and fault.cause in STANDING_STOPS
     return stopped_arm or isinstance(fault, GripperEmergencyStopError)

@@ -23,8 +23,8 @@ from station.vision.step import mean_image
 ResultT = TypeVar("ResultT")
 
 _SWITCH_S = 0.0005
-"""How long the measuring thread may keep the interpreter from the loop, which asks a moving gripper some twenty things
-in a step; Python's own 5 ms made that step up to 30 ms longer."""
+"""Longest time for which the measuring thread may hold the interpreter's lock against the event loop, which queries a
+moving gripper some twenty times in a step; Python's own 5 ms made that step up to 30 ms longer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,15 +38,15 @@ class Seen:
 
 
 class Eye:
-    """The measurement against one reference at a time.
+    """Measurement against one reference at a time.
 
     The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
     compression only rises: each step is measured with the contact of the step before. One thread does the work in the
     order of the calls, so a frame's measurement ahead always uses the same earlier step as its step's measurement.
 
     Args:
-        golden: the reference that every new one is compared with.
-        settings: what makes a reference good enough.
+        golden: reference that every new one is compared with.
+        settings: limits for a good reference.
     """
 
     def __init__(self, golden: Golden, settings: ReferenceSettings) -> None:
@@ -61,23 +61,23 @@ class Eye:
         self._follows = False
 
     def close(self) -> None:
-        """End the thread, after what it is doing."""
+        """Finish the work under way and end the thread."""
         self._worker.shutdown()
 
     async def take_reference(self, frames: Sequence[Frame], segmentation: Segmentation) -> tuple[Image, Looks]:
-        """Examine frames of the untouched gel, and measure against them from now on.
+        """Check frames of the untouched gel, and measure against them from now on.
 
         The first reference of a sensor becomes the golden one.
 
         Args:
             frames: of one shape.
-            segmentation: the recipe's method.
+            segmentation: of the recipe.
 
         Returns:
-            The reference, shape (height, width, 3), dtype uint8, BGR, and what it looks like.
+            The reference, shape (height, width, 3), dtype uint8, BGR, and its properties.
 
         Raises:
-            BadReferenceError: they cannot serve; there is no reference then.
+            BadReferenceError: the frames give no good reference; there is none then.
         """
 
         def take() -> tuple[Image, Looks]:
@@ -95,7 +95,7 @@ class Eye:
         return await self._do(take)
 
     async def begin_press(self) -> None:
-        """Measure each step by itself again, against the same reference: the jaws were opened."""
+        """Measure each step by itself again, against the same reference, after the jaws were opened."""
 
         def begin() -> None:
             self._tracker, self._follows = None, False
@@ -115,7 +115,7 @@ class Eye:
         await self._do(follow)
 
     def look_ahead(self, frame: Frame) -> None:
-        """Begin to measure one frame of the next step while more are captured; `measure` then has less to do.
+        """Start measuring one frame of the next step while more are captured; `measure` then has less to do.
 
         Args:
             frame: of the reference's shape.

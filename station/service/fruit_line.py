@@ -1,4 +1,4 @@
-"""One fruit in one line of the log, for a person who reads along."""
+"""Log line of one fruit, for people who follow the log."""
 
 from collections.abc import Sequence
 
@@ -7,12 +7,12 @@ from station.records.wording import sparkline
 
 
 def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_mm2: Sequence[float | None]) -> str:
-    """One fruit in one line that a person reads: sequence, fruit, curve as a sparkline, outcome, why, time.
+    """Describe one fruit in one line: sequence, fruit, curve as a sparkline, outcome, explanation, time.
 
     Args:
-        outcome: what the PLC is told.
+        outcome: as published to the PLC.
         fruit: the recipe's name.
-        explanation: why, in sentences.
+        explanation: in sentences.
         areas_mm2: the curve, step by step.
     """
     area = "no area" if outcome.area_mm2 is None else f"{outcome.area_mm2:.1f} mm²"

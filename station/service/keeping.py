@@ -1,4 +1,4 @@
-"""Small files of the home folder that have to survive a crash in the middle of writing them."""
+"""State files of the home folder, written so that a crash leaves the old or the new content."""
 
 import contextlib
 import logging
@@ -10,13 +10,13 @@ log = logging.getLogger(__name__)
 
 
 class Kept:
-    """A folder of such files. A file that cannot be read or written is logged, and never stops the station."""
+    """Folder of state files. A file that cannot be read or written is logged, and never stops the station."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def read(self, name: str) -> bytes | None:
-        """What a file holds; None where it is not there or cannot be read.
+        """Return a file's content; None if it is missing or cannot be read.
 
         Args:
             name: relative to the folder.
@@ -30,14 +30,14 @@ class Kept:
             return None
 
     def write(self, name: str, data: bytes) -> bool:
-        """Put a file in the place of the one there, whole or not at all.
+        """Replace a file atomically.
 
         Args:
             name: relative to the folder.
-            data: its content; nothing is written where the file holds it already.
+            data: nothing is written if the file has this content already.
 
         Returns:
-            Whether it is there now.
+            Whether the file has this content now.
         """
         path = self.folder / name
         if self.read(name) == data:

@@ -1,4 +1,4 @@
-"""Every trigger's record: begun before it is accepted, concluded before its outcome is told, none left open."""
+"""Inspection registry: stores every trigger before it is accepted and every outcome before it is published."""
 
 import asyncio
 import logging
@@ -20,13 +20,13 @@ log = logging.getLogger(__name__)
 
 
 class Ledger:
-    """What the records hold of this start's inspections.
+    """Records of this start's inspections; none is left without an outcome.
 
     Args:
-        records: opened, or to be opened again once `fault` is mended.
-        triggers: those who wait for outcomes.
-        crew: whose names stand in the records.
-        versions: of the programs, likewise.
+        records: opened, or reopened once `fault` is repaired.
+        triggers: receives the outcomes for the callers that wait.
+        crew: gives the device names for the records.
+        versions: of the programs, for the records.
     """
 
     def __init__(self, records: Records, triggers: Triggers, crew: Crew, versions: Mapping[str, str]) -> None:
@@ -42,17 +42,17 @@ class Ledger:
 
     @property
     def running(self) -> Inspection | None:
-        """The first inspection without a durable outcome, if there is one."""
+        """Return the first inspection without a durable outcome, if any."""
         return next((now for now in self._begun if now.standing is None), None)
 
     async def begin(self, pending: Pending) -> None:
         """Make a trigger durable.
 
         Args:
-            pending: it is given its record's number.
+            pending: gets its record's number.
 
         Raises:
-            RecordsError: it could not be.
+            RecordsError: the trigger could not be stored.
         """
         pending.recording = asyncio.ensure_future(self.records.begin(pending.inspection.trigger))
         try:
@@ -62,22 +62,15 @@ class Ledger:
             raise
 
     def accepted(self, now: Inspection) -> None:
-        """An inspection needs an outcome from now on.
-
-        Args:
-            now: with its number.
-        """
+        """Note that an inspection needs an outcome from now on."""
         self._begun = [known for known in self._begun if known.standing is None]
         self._begun.append(now)
 
     async def conclude(self, now: Inspection) -> Event:
-        """Make an inspection's outcome durable; the one that the records hold already stands.
-
-        Args:
-            now: with its number.
+        """Make an inspection's outcome durable; one that the records have already is not changed.
 
         Raises:
-            RecordsError: it could not be.
+            RecordsError: the outcome could not be stored.
         """
         if now.sequence is None:
             raise RuntimeError("an inspection without a number is recorded")
@@ -91,10 +84,10 @@ class Ledger:
         return Event.RECORDED
 
     def tell(self, now: Inspection) -> None:
-        """Give a durable outcome to who waits for it.
+        """Pass a durable outcome to the callers that wait for it.
 
         Args:
-            now: nothing is told of one that has none.
+            now: without an outcome nothing is passed on.
         """
         if now.standing is not None:
             self._triggers.ended(now.standing)
@@ -104,10 +97,10 @@ class Ledger:
                 log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))
 
     async def close_unfinished(self) -> Event:
-        """Give NO_RESULT to every inspection that has no durable outcome.
+        """Store NO_RESULT for every inspection that has no durable outcome.
 
         Raises:
-            RecordsError: not yet.
+            RecordsError: it cannot be stored now.
         """
         async with self._closing:
             while (now := self.running) is not None:
@@ -119,11 +112,7 @@ class Ledger:
         return Event.UNFINISHED_CLOSED
 
     async def outcome(self, sequence: int) -> Outcome:
-        """Wait for an inspection's outcome; of an earlier start of the station it is there at once.
-
-        Args:
-            sequence: its number.
-        """
+        """Wait for an inspection's outcome; that of an earlier start is returned at once."""
         if self._triggers.inspection(sequence) is None:
             for outcome in (await self.records.open_inspections()).ended:
                 if outcome.sequence == sequence:
@@ -131,7 +120,7 @@ class Ledger:
         return await self._triggers.outcome(sequence)
 
     async def open(self) -> Open:
-        """What was begun and not acknowledged."""
+        """Return the inspections that began and were not acknowledged."""
         held, now = await self.records.open_inspections(), self.running
         running = None if now is None or now.sequence is None else (now.sequence, now.trigger.trigger_id)
         return Open(running=running, outcomes=held.ended)

@@ -1,4 +1,4 @@
-"""The station's end of the channel: what the PLC interface and a person at the cell ask, answered."""
+"""Channel server of the station: answers the PLC interface and the commands of people at the cell."""
 
 from station.channel.line import (
     Acknowledged,
@@ -26,15 +26,15 @@ from station.vocabulary import Refusal
 
 
 class LineServer:
-    """Answers the PLC interface, until cancelled.
+    """Server for the PLC interface.
 
     Args:
-        endpoint: where; bound at once.
+        endpoint: bound when the server is made.
         service: the cycle and its outcomes.
-        orders: the commands, and what the line says of itself.
-        gate: whether a trigger is accepted.
+        orders: the PLC's commands, and the line's state.
+        gate: decides whether a trigger is accepted.
         lots: freezes the recipe at a lot's first trigger.
-        alarms: what people do with alarms.
+        alarms: alarm commands of people.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class LineServer:
         )
 
     async def serve(self) -> None:
-        """Answer until cancelled."""
+        """Answer requests until cancelled."""
         await self._server.serve()
 
     async def _begin(self, request: Begin) -> Begun:

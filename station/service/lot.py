@@ -1,4 +1,4 @@
-"""The lot under way, and the control recipe that is frozen for it."""
+"""Lot manager: the current lot, and the control recipe that is frozen for it."""
 
 import asyncio
 import logging
@@ -13,12 +13,11 @@ log = logging.getLogger(__name__)
 
 
 class LotKeeper:
-    """Freezes the recipe when a lot begins: what is approved, edited or retired meanwhile concerns the next lot.
+    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot.
 
     Args:
-        service: inspects by the recipe.
-        book: what is in force.
-        trail: told of every lot.
+        service: inspects by the frozen recipe.
+        book: the recipes in force.
     """
 
     def __init__(self, service: Service, book: RecipeBook, trail: Trail) -> None:
@@ -34,35 +33,32 @@ class LotKeeper:
         """Why the last lot could not begin: PLC number, name and content of the recipe do not belong together."""
 
     def recall(self) -> None:
-        """Go on with the lot and the recipe of the start before. Blocks for some milliseconds."""
+        """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
         remembered = self._book.remembered()
         if remembered is not None:
             self._service.active, self.lot = remembered
 
     def chosen(self, active: Active) -> bool:
-        """A recipe was chosen for what comes next; the lot under way, if there is one, goes on by it.
-
-        Args:
-            active: the recipe.
+        """Set the recipe of the next lot; a lot under way continues with its own.
 
         Returns:
-            Whether it is kept over a restart.
+            Whether the choice is stored for a restart.
         """
         self.mismatch = ""
         self._service.active = active
         return self._book.remember(active, self.lot)
 
     def of(self, told: str) -> str:
-        """The lot of a fruit.
+        """Return the lot of a fruit.
 
         Args:
-            told: as the PLC names it; may be empty.
+            told: the lot as the PLC names it; may be empty.
         """
         self.plc_names = bool(told)
         return told or self.named
 
     def name(self, lot: str) -> None:
-        """A person starts or ends a lot; with the next fruit what is in force of the recipe is frozen anew.
+        """Start or end a lot for a person; the next fruit freezes the recipe in force again.
 
         Args:
             lot: its name; empty for none.
@@ -70,13 +66,13 @@ class LotKeeper:
         self.named, self.lot = lot, None
 
     async def begin(self, lot: str) -> bool:
-        """A fruit of a lot has come. The first of another lot freezes what is in force of the active recipe.
+        """Begin a fruit of a lot. The first fruit of another lot freezes the active recipe's revision in force.
 
         Args:
             lot: its name, as the PLC gives it.
 
         Returns:
-            Whether it may be inspected; `mismatch` says why not.
+            Whether it may be inspected; if not, `mismatch` is the reason.
         """
         async with self._turn:
             active = self._service.active

@@ -1,4 +1,4 @@
-"""What the line's PLC orders between fruits, and what it says of itself."""
+"""PLC commands between fruits, and the line's state as the PLC interface reports it."""
 
 import asyncio
 import logging
@@ -24,7 +24,7 @@ from station.vocabulary import Refusal
 log = logging.getLogger(__name__)
 
 DEADLINE_S = 25.0
-"""Less than the PLC interface's own patience with a command."""
+"""Less than the PLC interface's own deadline for a command."""
 LINE_SILENT_S = 2.0
 MODES = (1, 2, 3)
 _STOPPED = "stopped_by_a_person"
@@ -32,16 +32,13 @@ _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "rese
 
 
 class Orders:
-    """Carries the PLC's commands out, one after the other.
+    """Executes the PLC's commands, one after the other.
 
     Args:
-        service: the cycle.
-        crew: the devices.
-        book: the recipes.
-        lots: told of a recipe that is chosen.
-        trail: told of every command.
-        metrics: notes the line's signs of life.
-        kept: a person's stop outlives a restart there.
+        lots: gets a chosen recipe.
+        trail: gets every command.
+        metrics: gets the line's signs of life.
+        kept: stores a person's stop for a restart.
     """
 
     def __init__(
@@ -70,24 +67,20 @@ class Orders:
 
     @property
     def line_age_s(self) -> float | None:
-        """Time since the PLC interface was heard; None where it never was."""
+        """Return the time since the PLC interface's last message; None if there was none."""
         return None if self._line_at_s is None else time.monotonic() - self._line_at_s
 
     @property
     def told(self) -> Line | None:
-        """What the PLC interface said last; None where it never did."""
+        """Return the PLC interface's last message; None if there was none."""
         return self._line
 
     def recall(self) -> None:
-        """A station that a person has stopped stays so over a restart, until somebody starts it."""
+        """Restore a person's stop after a restart; it lasts until a reset."""
         self._service.stop_wanted = self._kept.read(_STOPPED) == b"yes"
 
     def line(self, line: Line) -> None:
-        """Note what the PLC interface says with its beat.
-
-        Args:
-            line: as it came.
-        """
+        """Store the PLC interface's beat."""
         self._line, self._line_at_s = line, time.monotonic()
         if line.registers:
             self._registers, self.registers_wanted = (line.registers, time.monotonic()), False
@@ -98,11 +91,11 @@ class Orders:
 
     @property
     def registers(self) -> tuple[tuple[RegisterTold, ...], float]:
-        """The PLC's registers as they were told last, and the monotonic time of that; none and 0 before the first."""
+        """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
         return self._registers
 
     def line_trouble(self) -> str:
-        """What is wrong with the line, as far as is known; empty where nothing is."""
+        """Return the line's fault, as far as known; empty for none."""
         age_s = self.line_age_s
         if self._line is None or age_s is None:
             return ""
@@ -111,7 +104,7 @@ class Orders:
         return "" if self._line.plc_alive or not self._line.enabled else "the PLC's heartbeat stands still"
 
     def show_line(self) -> None:
-        """Raise and clear the alarms that the line's state asks for."""
+        """Raise and clear the alarms of the line's state."""
         age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
         if line is None or age_s is None:
             return
@@ -124,11 +117,10 @@ class Orders:
         alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
 
     async def carry_out(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
-        """Carry out one command.
+        """Execute one command.
 
         Args:
-            command: as it came.
-            by: who gives it, and in what role.
+            by: name and role of who gave it.
         """
         log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
         before, alarms = self._before(command.command), self._service.alarms.alarms
@@ -149,7 +141,7 @@ class Orders:
         return done
 
     def _before(self, command: CommandName) -> dict[str, Any]:
-        """What a command is about to change, for the trail."""
+        """Return the value that a command is about to change, for the audit log."""
         active = self._service.active
         match command:
             case CommandName.CHANGE_RECIPE:
@@ -207,10 +199,10 @@ class Orders:
         return ""
 
     async def stop(self) -> str:
-        """Take no more triggers until the next reset, also over a restart; the fruit under way is inspected to its end.
+        """Accept no trigger until the next reset, also over a restart; the fruit under way is inspected to its end.
 
         Returns:
-            Why it does not stand as told, empty where it does.
+            Why the stop is not complete; empty if it is.
         """
         service = self._service
         service.stop_wanted = True
@@ -223,11 +215,10 @@ class Orders:
         return "" if kept else "the station stands, but its next start forgets that: the home folder cannot be written"
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
-        """Bring the arm back after a stop that a person has looked at; the station goes on after a reset.
+        """Recover the arm after a stop that a person has checked; the station continues after a reset.
 
         Args:
-            request: which stop.
-            by: who gives it, and in what role.
+            by: name and role of who gave it.
         """
         if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
             return CommandDone(done=False, why="an inspection is under way")
@@ -250,7 +241,7 @@ class Orders:
         return ""
 
     def no_reset(self) -> str:
-        """Why a reset would do nothing now; empty where it would."""
+        """Return why a reset would do nothing now; empty if it would work."""
         if self._service.stop_asked:
             return "the station is told to end"
         if stop := self._crew.standing_stop:

@@ -1,4 +1,4 @@
-"""Looks at the last outcomes together: what one fruit cannot tell."""
+"""Outcome monitor: raises alarms from the last outcomes together."""
 
 from collections import deque
 
@@ -12,10 +12,10 @@ _MANY = 5
 
 
 class OutcomeWatch:
-    """The last outcomes that the PLC was told.
+    """Last outcomes that were published to the PLC.
 
     Args:
-        alarms: told of many that could not be judged, or were rejected.
+        alarms: gets an alarm if many could not be judged, or were rejected.
     """
 
     def __init__(self, alarms: AlarmDesk) -> None:
@@ -23,11 +23,7 @@ class OutcomeWatch:
         self._last: deque[OutcomeName] = deque(maxlen=_LAST)
 
     def saw(self, outcome: Outcome) -> None:
-        """Take one more into account.
-
-        Args:
-            outcome: as told.
-        """
+        """Add one outcome."""
         self._last.append(outcome.outcome)
         last = list(self._last)
         unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY

@@ -1,4 +1,4 @@
-"""What the HMI's process asks of the running station, answered from memory; nothing here waits for a device."""
+"""Panel server: answers the HMI's process from memory; nothing here waits for a device."""
 
 import asyncio
 import logging
@@ -49,23 +49,19 @@ from station.vocabulary import Refusal
 log = logging.getLogger(__name__)
 
 SILENT_S = 3.0
-"""A process that was killed and started again is back by then, on a machine that has nothing else to do."""
+"""Time for a killed HMI process to restart, on a machine that is otherwise idle."""
 
 
 class Panel:
-    """Answers the HMI.
+    """Channel server for the HMI.
 
     Args:
-        gate: the state and why it is not ready.
-        service: the cycle.
-        crew: the devices.
-        lots: the lot under way.
-        book: the recipes in force.
-        line: what the PLC interface says.
-        records: told of lots, and asked about alarms.
-        alarms: people's hands on alarms.
-        trail: told of what people do.
-        calibrated: whether the check with the ball is due.
+        gate: the state, and why the station is not ready.
+        line: the PLC interface's last report.
+        records: gets lots; read for alarms.
+        alarms: alarm commands of people.
+        trail: gets what people do.
+        calibrated: whether the verification with the ball is due.
     """
 
     def __init__(
@@ -102,7 +98,7 @@ class Panel:
         """For a channel's server."""
 
     async def recall(self) -> None:
-        """Show the last fruit of the start before, and count on with their lots."""
+        """Restore the last fruit of the previous start, and the counts of their lots."""
         pacing = self._service.pacing
         try:
             found = await asyncio.to_thread(
@@ -114,11 +110,11 @@ class Panel:
         self._memory.recall(*found)
 
     async def close(self) -> None:
-        """Give up the orders that are under way."""
+        """Cancel the commands under way."""
         await self._orders.close()
 
     def trouble(self) -> str:
-        """What is wrong with the HMI's process; empty where nothing is, or it was never heard."""
+        """Return the fault of the HMI's process; empty for none, and before its first message."""
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
         return f"the pages' process has not asked for {age_s:.0f} s" if age_s > SILENT_S else ""
 

@@ -1,4 +1,4 @@
-"""Calibrating and verifying with the ball while the station runs, in manual mode, guided by a person at the panel."""
+"""Calibration and verification with the ball from the panel, in manual mode, guided by a person."""
 
 import asyncio
 import contextlib
@@ -66,17 +66,15 @@ class _Run:
 
 
 class PanelBall:
-    """Answers about the calibration, and runs the procedures of `station.calibration`.
+    """Requests about the calibration, and runs of the procedures of `station.calibration`.
 
     Args:
-        configuration: the ball, its recipe, the home folder.
-        crew: the devices.
-        orders: the mode, which has to stay.
-        calibrated: what is in force.
-        records: the trail's row and the result are stored together.
-        trail: told of what was begun and called off.
-        worker: files are read and made there.
-        refusal: why nothing may be moved by hand now.
+        orders: the mode, which must not change during a run.
+        calibrated: the calibration in force.
+        records: stores the audit entry and the result together.
+        trail: gets the start and the cancellation of runs.
+        worker: reads and writes files in its thread.
+        refusal: returns why nothing may be moved by hand now.
     """
 
     def __init__(
@@ -96,7 +94,7 @@ class PanelBall:
         self._run: _Run | None = None
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             GetCalibration: self.state,
             GetCalibrationPicture: self.picture,
@@ -106,13 +104,13 @@ class PanelBall:
         }
 
     async def close(self) -> None:
-        """Call off what runs; the jaws open. Idempotent."""
+        """Cancel the run under way; the jaws open. Idempotent."""
         if self._run is not None and self._run.task is not None:
             self._run.task.cancel()
             await asyncio.gather(self._run.task, return_exceptions=True)
 
     async def state(self, _request: GetCalibration) -> CalibrationState:
-        """How the sensor stands."""
+        """Return the sensor's calibration state."""
         serial = self._crew.cell.camera.description.serial
 
         def read() -> tuple[Calibration | None, Verification | None]:
@@ -137,7 +135,7 @@ class PanelBall:
         )
 
     async def picture(self, request: GetCalibrationPicture) -> Picture:
-        """A plot of what is in force."""
+        """Return a plot of the calibration in force."""
 
         def read() -> Picture:
             calibration = self._calibrated.calibration
@@ -154,7 +152,7 @@ class PanelBall:
         return await self._worker.do(read)
 
     async def begin(self, request: BeginBallRun) -> BallRunTold:
-        """Begin a run; the gripper closes on the ball."""
+        """Start a run; the gripper closes on the ball."""
         if why := self._why_not(self._crew.cell.camera.description.serial):
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
@@ -165,7 +163,7 @@ class PanelBall:
         return _told(run)
 
     async def go_on(self, _request: GoOnBallRun) -> BallRunTold:
-        """The ball was laid."""
+        """Continue after the ball was laid."""
         run = self._run
         if run is None or run.state != "waiting":
             raise BadInputError("nothing waits for the ball at this moment; look at the run again")
@@ -174,7 +172,7 @@ class PanelBall:
         return _told(run)
 
     async def end(self, request: EndBallRun) -> BallRunTold:
-        """Call the run off."""
+        """Cancel the run."""
         run = self._run
         if run is None:
             raise BadInputError("nothing was begun with the ball; begin it first")
@@ -260,7 +258,7 @@ class PanelBall:
         return "; ".join(f"{check.name}: {check.found}: {check.remedy}" for check in made.checks if not check.passed)
 
     async def _lay(self, run: _Run, place: Place) -> None:
-        """Ask the person, and wait until the ball lies there."""
+        """Request the ball from the person, and wait until it is in place."""
         run.laid.clear()
         run.state = "waiting"
         run.request = (

@@ -1,4 +1,4 @@
-"""What a page asks for and takes long: the station's own commands, each as a process that gives way to the cycle.
+"""Long jobs of the pages: the station's own commands, each in a process with less priority than the cycle.
 
 A thread would share Python's one interpreter lock with the cycle; a process shares only the processor, at the lowest
 priority.
@@ -23,7 +23,7 @@ from station.errors import StationError
 FOLDER = "panel_jobs"
 LONGEST_S = 1800.0
 KEPT = 8
-"""Jobs whose files are kept, the newest."""
+"""Number of the newest jobs whose files are stored."""
 MOST_WAITING = 4
 _STOP_S = 5.0
 _LEAST_FREE_BYTES = 64 * 1024 * 1024
@@ -42,12 +42,12 @@ log = logging.getLogger(__name__)
 
 
 class JobError(StationError):
-    """A job that cannot be begun, or is not known."""
+    """A job that cannot start, or does not exist."""
 
 
 @dataclass(slots=True)
 class Job:
-    """One command on its way."""
+    """One command of the queue."""
 
     id: str
     kind: Kind
@@ -60,16 +60,16 @@ class Job:
 
     @property
     def open(self) -> bool:
-        """Whether it is not over."""
+        """Whether the job is not finished."""
         return self.state in {"waiting", "running"}
 
 
 class PanelJobs:
-    """Runs one job after the other.
+    """Queue that runs one job after the other.
 
     Args:
         home: the station's home folder.
-        command: what the arguments are given to.
+        command: the command line that gets the arguments.
     """
 
     def __init__(self, home: Path, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
@@ -78,7 +78,7 @@ class PanelJobs:
         self._turn = asyncio.Lock()
 
     def folder(self) -> Path:
-        """A new job's folder, whose name is its id.
+        """Make a new job's folder, whose name is its id.
 
         Raises:
             JobError: too many wait, or the disk is full.
@@ -98,13 +98,12 @@ class PanelJobs:
         return folder
 
     def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobTold:
-        """Begin a job. Not idempotent.
+        """Queue a job. Not idempotent.
 
         Args:
-            kind: what it is.
-            folder: from `folder`; what it leaves there are its files.
+            folder: from `folder`; the job writes its files there.
             arguments: of the station's command line.
-            of: how much there is to do, where that is known.
+            of: number of steps, where it is known.
         """
         job = Job(folder.name, kind, folder, arguments, of)
         self._jobs[job.id] = job
@@ -113,13 +112,10 @@ class PanelJobs:
         return self.told(job.id)
 
     def told(self, job_id: str) -> JobTold:
-        """How a job does.
-
-        Args:
-            job_id: its id.
+        """Return a job's state.
 
         Raises:
-            JobError: there is none.
+            JobError: there is no such job.
         """
         job = self._get(job_id)
         files = tuple(
@@ -132,12 +128,11 @@ class PanelJobs:
         )
 
     def read(self, job_id: str, name: str, offset: int) -> Chunk:
-        """A piece of a job's file. Blocks.
+        """Return a part of a job's file. Blocks.
 
         Args:
-            job_id: of a job that is done.
-            name: the file's.
-            offset: bytes from its beginning.
+            job_id: of a finished job.
+            offset: bytes from the file's start.
 
         Raises:
             JobError: there is no such file.
@@ -154,11 +149,7 @@ class PanelJobs:
             raise JobError(f"{name} cannot be read: {error.strerror}; begin the job again") from error
 
     async def end(self, job_id: str) -> JobTold:
-        """Call a job off. Idempotent.
-
-        Args:
-            job_id: its id.
-        """
+        """Cancel a job. Idempotent."""
         job = self._get(job_id)
         if job.task is not None and job.open:
             job.task.cancel()
@@ -168,7 +159,7 @@ class PanelJobs:
         return self.told(job_id)
 
     async def close(self) -> None:
-        """End what runs. Idempotent."""
+        """End the running job. Idempotent."""
         for job_id in list(self._jobs):
             await self.end(job_id)
 
@@ -192,7 +183,7 @@ class PanelJobs:
                 shutil.rmtree(job.folder, ignore_errors=True)
 
     async def _carry_out(self, job: Job) -> tuple[int, str]:
-        """Exit code and last words."""
+        """Return the exit code and the last output."""
         environment = {
             **{name: value for name, value in os.environ.items() if not name.startswith("STATION_")},
             "STATION_HOME": str(self._home),
@@ -218,7 +209,7 @@ class PanelJobs:
         return process.returncode or 0, words[-1][:1000] if process.returncode and words else ""
 
     def _done(self, job: Job) -> int:
-        """Of a what-if, from the file that it appends to; its first line is a heading."""
+        """Return a what-if's progress from the file that it appends to; the first line is a heading."""
         if job.state == "done":
             return job.of
         with contextlib.suppress(OSError):
@@ -238,7 +229,7 @@ class PanelJobs:
 
 
 async def _ended(process: asyncio.subprocess.Process) -> None:
-    """Whatever happens, the process and all that it has started are gone."""
+    """Kill the process and all that it started, whatever happens."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()

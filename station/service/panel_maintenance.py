@@ -1,4 +1,4 @@
-"""What the maintenance page asks: health, jogging in manual mode, the live image, the PLC's registers, the log."""
+"""Maintenance page's requests: health, jogging in manual mode, live image, PLC registers, log."""
 
 import asyncio
 import time
@@ -54,31 +54,28 @@ JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
 FRAME_DEADLINE_S = 2.0
 REGISTERS_DEADLINE_S = 3.0
 _JOGGED = {State.IDLE, State.STOPPED, State.CARRIED}
-"""Where the cycle moves nothing by itself."""
+"""States in which the cycle moves nothing."""
 _SATURATED_LEVEL = 250
 _JPEG_QUALITY = 85
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 
 
 class NotNowError(StationError):
-    """What a person asks for is not done in this state; the message says what has to be done first."""
+    """A request that is refused in this state; the message gives what has to be done first."""
 
 
 class PanelMaintenance:
-    """Answers the maintenance page.
+    """Requests of the maintenance page.
 
     Args:
-        service: the cycle.
-        crew: the devices.
-        orders: the mode, and what the PLC interface told.
-        gate: what inspecting needs, with ages.
-        liveness: what has to make progress.
+        orders: the mode, and the PLC interface's report.
+        gate: the dependencies of an inspection, with ages.
+        liveness: the progress of tasks.
         calibrated: the scale, and the golden reference.
-        trail: told of everything that is moved.
-        home: where the golden reference of a sensor that is not calibrated lies.
-        worker: pictures are made there.
+        trail: gets every manual motion.
+        home: folder of the golden reference of a sensor that is not calibrated.
+        worker: makes pictures in its thread.
         log: the last lines.
-        versions: of the programs.
     """
 
     def __init__(
@@ -102,7 +99,7 @@ class PanelMaintenance:
         self._method: tuple[object, Method] | None = None
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             GetHealth: self.health,
             JogGripper: self.jog,
@@ -113,7 +110,7 @@ class PanelMaintenance:
         }
 
     def refusal(self) -> str:
-        """Why nothing may be moved by hand now, with what to do; empty where it may."""
+        """Return why nothing may be moved by hand now, with the remedy; empty if it may."""
         service, facts, mode = self._service, STATES[self._service.state], self._orders.mode
         if service.stop_asked:
             return "The station is told to end."
@@ -128,7 +125,7 @@ class PanelMaintenance:
         return ""
 
     async def health(self, _request: GetHealth) -> Health:
-        """How everything does."""
+        """Return the health of all dependencies."""
         readiness, records, figures = self._gate.readiness(), self._service.ledger.records, self._calibrated.figures
         status = await self._worker.do(records.status)
         return Health(
@@ -162,8 +159,8 @@ class PanelMaintenance:
         """Move the fingers, or stop them.
 
         Raises:
-            NotNowError: it is not the time for it.
-            GripperError: they did not get there.
+            NotNowError: refused in this state.
+            GripperError: the fingers did not reach the width.
         """
         gripper, width_mm = self._crew.cell.gripper, request.width_mm
         if (request.to == "width") != (width_mm is not None):
@@ -196,7 +193,7 @@ class PanelMaintenance:
         return Lit()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
-        """The newest image; it is only measured while nothing is inspected."""
+        """Return the newest image; it is measured only while nothing is inspected."""
         frame = await self._crew.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
         active = self._service.active
         why = ""
@@ -208,7 +205,7 @@ class PanelMaintenance:
         return await self._worker.do(lambda: self._live(frame, segmentation, why))
 
     async def registers(self, _request: GetRegisters) -> Registers:
-        """The PLC's registers, asked for with the next beat; after a while what was told last."""
+        """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
         asked_s = time.monotonic()
         self._orders.registers_wanted = True
         while self._orders.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
@@ -217,7 +214,7 @@ class PanelMaintenance:
         return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
 
     async def log_lines(self, request: ReadLog) -> Log:
-        """The last lines of the log."""
+        """Return the last lines of the log."""
         return Log(lines=self._log.last(request.limit, request.level))
 
     def _check(self, actor: Actor, command: str, subject: str) -> None:
@@ -252,7 +249,7 @@ class PanelMaintenance:
         )
 
     def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, str]:
-        """The contact against the golden reference, or why there is none measured."""
+        """Return the contact against the golden reference, or why none is measured."""
         path = self._calibrated.golden() or self._home / GOLDEN
         try:
             key = (path, path.stat().st_mtime_ns, segmentation)

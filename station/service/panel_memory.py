@@ -1,4 +1,4 @@
-"""The last fruit as the panel shows them: their curves, and a picture of each, made when somebody asks for it."""
+"""Recent inspections for the run page: their curves, and a picture of each, made at the first request."""
 
 import asyncio
 import base64
@@ -25,15 +25,15 @@ MOST_IN_FULL = 24
 MOST_IN_SHORT = 200
 _JPEG_QUALITY = 82
 _CORNER_PX = 1.0
-"""The outline's corners lie as close to the contact's edge."""
+"""Greatest distance of the outline's corners from the contact's edge."""
 
 
 class ForgottenError(StationError):
-    """The fruit is not among the last any more."""
+    """The fruit is not among the recent ones any more."""
 
 
 Look = Callable[[], tuple[Image, Mask]]
-"""Gives a step's image and the contact in it; blocks where they lie on the disk."""
+"""Returns a step's image and the contact in it; blocks if they have to be read from the disk."""
 
 
 class Remembered(NamedTuple):
@@ -41,7 +41,7 @@ class Remembered(NamedTuple):
 
     fruit: Fruit
     look: Look | None
-    """None where no image was kept."""
+    """None if no image was stored."""
 
 
 @dataclass(slots=True)
@@ -52,7 +52,7 @@ class _Kept:
 
 
 class PanelMemory:
-    """The last fruit; all that was ever inspected is in the records."""
+    """Recent inspections in memory; the records have all of them."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[int, _Kept] = OrderedDict()
@@ -62,29 +62,25 @@ class PanelMemory:
 
     @property
     def last_sequence(self) -> int | None:
-        """Of the last fruit with an outcome."""
+        """Return the sequence of the last fruit with an outcome."""
         return self._short[-1].sequence if self._short else None
 
     def recall(
         self, short: Iterable[FruitShort], full: Iterable[Remembered], lots: Mapping[str, Mapping[str, int]]
     ) -> None:
-        """Go on where the start before has ended.
+        """Restore the recent inspections of the previous start.
 
         Args:
             short: the last fruit, oldest first.
             full: those of them that are known in full, oldest first.
-            lots: how each lot's fruit ended.
+            lots: count of each outcome, by lot.
         """
         self._short.extend(short)
         self._kept.update((each.fruit.short.sequence, _Kept(each.fruit, each.look)) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
 
     def ended(self, now: Inspection) -> None:
-        """An inspection has its durable outcome.
-
-        Args:
-            now: with it.
-        """
+        """Add an inspection with its durable outcome."""
         if now.standing is None:
             return
         fruit, look = _told(now, now.standing)
@@ -97,11 +93,7 @@ class PanelMemory:
             self._lots.popitem(last=False)
 
     def stands(self, outcome: Outcome) -> None:
-        """The PLC was told this, which stands, also against what the station had found.
-
-        Args:
-            outcome: as told.
-        """
+        """Set the outcome that was published to the PLC; it overrides the station's own result."""
         kept = self._kept.get(outcome.sequence)
         if kept is None or kept.fruit.short.outcome == outcome.outcome:
             return
@@ -114,16 +106,16 @@ class PanelMemory:
             counted.update([now.outcome])
 
     def counts(self, lot: str | None) -> Counts:
-        """How a lot's fruit ended; of fruit without a lot's name, since this start of the station.
+        """Count a lot's outcomes; for fruit without a lot, since this start of the station.
 
         Args:
-            lot: its name; None for none.
+            lot: None for fruit without a lot.
         """
         counted = self._lots.get(lot or "", Counter())
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
 
     def recent(self, most: int) -> tuple[FruitShort, ...]:
-        """The last fruit, newest first.
+        """Return the last fruit, newest first.
 
         Args:
             most: at most so many.
@@ -131,10 +123,7 @@ class PanelMemory:
         return tuple(reversed(self._short))[:most]
 
     def fruit(self, sequence: int) -> Fruit:
-        """One of the last fruit.
-
-        Args:
-            sequence: its number.
+        """Return one of the recent fruit.
 
         Raises:
             ForgottenError: it is not among them.
@@ -142,13 +131,10 @@ class PanelMemory:
         return self._find(sequence).fruit
 
     async def picture(self, sequence: int) -> Picture:
-        """Its picture, made in a thread at the first time.
-
-        Args:
-            sequence: its number.
+        """Return a fruit's picture, made in a thread at the first request.
 
         Raises:
-            ForgottenError: it is not among the last, or nothing was seen of it.
+            ForgottenError: it is not among them, or has no image.
         """
         kept = self._find(sequence)
         async with self._turn:
@@ -168,15 +154,13 @@ class PanelMemory:
 def fruit_of(
     standing: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
 ) -> Fruit:
-    """A fruit as the panel shows it.
+    """Make the page's view of a fruit.
 
     Args:
-        standing: what the PLC was told.
-        record: the station's own view.
-        recipe: it was inspected by.
-        revision: of the recipe.
-        deadline_s: the longest that the inspection might take.
-        picture: of which step there is one.
+        standing: as published to the PLC.
+        record: the station's own result.
+        deadline_s: longest duration of the inspection.
+        picture: step that has a picture.
     """
     onset_mm = record.measures.get("onset_mm")
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
@@ -212,12 +196,12 @@ def fruit_of(
 
 
 def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
-    """A fruit in a list.
+    """Make the view of a fruit in a list.
 
     Args:
-        standing: what the PLC was told.
+        standing: as published to the PLC.
         recipe: the recipe's name.
-        areas_mm2: of the steps since the onset.
+        areas_mm2: of the steps since the contact onset.
     """
     return FruitShort(
         sequence=standing.sequence,
@@ -234,7 +218,7 @@ def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) 
 
 
 def _told(now: Inspection, standing: Outcome) -> tuple[Fruit, Look | None]:
-    """A fruit that was just inspected, with the picture that says most: of the step that decided, else the last."""
+    """Make the view of a new fruit, with the picture of its deciding step."""
     record, revision = now.record(), now.active.snapshot.revision
     step = deciding_step(record)
     look = None if step is None else _look(now.seen[step])
@@ -242,11 +226,7 @@ def _told(now: Inspection, standing: Outcome) -> tuple[Fruit, Look | None]:
 
 
 def deciding_step(record: InspectionRecord) -> int | None:
-    """The step whose picture says most: the one that decided, else the last; None where there is none.
-
-    Args:
-        record: with its curve.
-    """
+    """Return the step whose picture shows most: the one that decided, else the last; None if there is no step."""
     decided_mm = record.closing_mm
     for point in record.curve:
         if decided_mm is not None and point.closing_mm is not None and abs(point.closing_mm - decided_mm) < 1e-6:

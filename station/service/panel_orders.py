@@ -1,4 +1,4 @@
-"""What people order at the panel: begun at once, followed to its end, and told to all panels and to the audit trail."""
+"""Operator commands from the panel: started at once, followed to their end, shown on all panels, and audited."""
 
 import asyncio
 import contextlib
@@ -23,7 +23,7 @@ from station.service.service import Service
 from station.service.trail import Trail
 
 AT_ONCE_S = 0.4
-"""So long an order's answer waits for the order's end."""
+"""Longest time for which a command's answer waits for the command's end."""
 _REMEMBERED = 8
 _RECOVERIES: dict[ArmCause, RecoveryName] = {
     ArmCause.PROTECTIVE_STOP: "protective-stop",
@@ -41,19 +41,16 @@ _COMMANDS = {
     OrderName.CALL_OFF: CommandName.CALL_OFF,
     OrderName.SET_MODE: CommandName.SET_MODE,
 }
-"""What the PLC may order too goes the PLC's way."""
+"""Commands that the PLC has too are executed as the PLC's."""
 
 
 class PanelOrders:
-    """Carries people's orders out.
+    """Executes operators' commands.
 
     Args:
-        orders: the PLC's, whose way they go where there is one.
-        service: the cycle.
-        crew: the devices.
-        lots: the lot under way.
-        records: told of lots with a grower.
-        trail: told of what the PLC's way does not tell.
+        orders: executes commands that the PLC has too.
+        records: gets lots with a grower.
+        trail: gets the commands that `orders` does not audit.
     """
 
     def __init__(
@@ -66,26 +63,26 @@ class PanelOrders:
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
     async def close(self) -> None:
-        """Give up what is under way."""
+        """Cancel the commands under way."""
         for task in self._tasks.values():
             task.cancel()
         await asyncio.gather(*self._tasks.values(), return_exceptions=True)
 
     @property
     def shown(self) -> tuple[OrderShown, ...]:
-        """The last orders, newest first."""
+        """Return the last commands, newest first."""
         return tuple(reversed(self._shown))
 
     @property
     def recoveries(self) -> tuple[RecoveryName, ...]:
-        """What stands to be recovered from by a person who has looked at the cell."""
+        """Return the stops that a person may recover from after a check of the cell."""
         fault = self._crew.watches[ARM].fault if ARM in self._crew.watches else None
         found = _RECOVERIES.get(fault.cause) if isinstance(fault, ArmFault) else None
         return () if found is None else (found,)
 
     @property
     def possible(self) -> tuple[OrderName, ...]:
-        """What would be begun now."""
+        """Return the commands that would be started now."""
         service, state = self._service, self._service.state
         conditions = {
             OrderName.CHOOSE_RECIPE: not self._orders.recipe_changing,
@@ -100,11 +97,7 @@ class PanelOrders:
         return tuple(order for order, possible in conditions.items() if possible)
 
     async def order(self, request: PanelOrder) -> OrderShown:
-        """Begin an order, and wait a moment for its end.
-
-        Args:
-            request: as it came.
-        """
+        """Start a command, and wait a moment for its end."""
         same = next((each for each in self.shown if _under_way(each, request)), None)
         shown = same or OrderShown(
             ticket=next(self._tickets),

@@ -1,4 +1,4 @@
-"""Stored images for the pages, and what the measurement makes of them, stage by stage."""
+"""Pictures for the pages: stored images, and the measurement's stages on them."""
 
 from pathlib import Path
 
@@ -26,22 +26,22 @@ _JPEG_QUALITY = 88
 
 
 class PanelPictures:
-    """Answers with pictures.
+    """Requests for pictures.
 
     Args:
-        folder: the records' folder.
-        worker: what blocks is done there.
+        folder: of the records.
+        worker: runs what blocks.
     """
 
     def __init__(self, folder: Path, worker: PanelWorker) -> None:
         self._folder, self._worker = folder, worker
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {GetImage: self.image, GetStages: self.stages}
 
     async def image(self, request: GetImage) -> Picture:
-        """One stored image."""
+        """Return one stored image."""
 
         def read() -> Picture:
             return Picture(media_type="image/png", data=_file(image_path(self._folder, request.sha256)))
@@ -49,7 +49,7 @@ class PanelPictures:
         return await self._worker.do(read)
 
     async def stages(self, request: GetStages) -> Stages:
-        """One step measured again with its stages."""
+        """Measure one step again and return its stages."""
         return await self._worker.do(lambda: self._stages(request))
 
     def _stages(self, request: GetStages) -> Stages:
@@ -81,7 +81,7 @@ class PanelPictures:
 
 
 def _gate_factor(record: FullRecord) -> float:
-    """By which the sensor's calibration had raised the gate in an inspection; 1 where it did not."""
+    """Return the factor by which the sensor's calibration raised the gate in an inspection; 1 for none."""
     factor = record.judged.measures.get("gate_factor") if record.judged is not None else None
     return float(factor or 1.0)
 

@@ -1,4 +1,4 @@
-"""The last fruit out of the records: after a start the panel goes on where it was."""
+"""Recent inspections restored from the records after a start."""
 
 import json
 from collections import Counter
@@ -46,7 +46,7 @@ _COUNTS = (
 
 
 class Recalled(NamedTuple):
-    """What `PanelMemory.recall` takes."""
+    """Arguments of `PanelMemory.recall`."""
 
     short: tuple[FruitShort, ...]
     full: tuple[Remembered, ...]
@@ -54,14 +54,14 @@ class Recalled(NamedTuple):
 
 
 def recalled(folder: Path, deadline_s: Callable[[Recipe], float]) -> Recalled:
-    """Read the last fruit, and the counts of their lots. Blocks for some tens of milliseconds.
+    """Read the recent inspections, and the counts of their lots. Blocks for some tens of milliseconds.
 
     Args:
-        folder: the records' folder.
-        deadline_s: the longest that an inspection by a recipe may take.
+        folder: of the records.
+        deadline_s: returns the longest duration of an inspection by a recipe.
 
     Raises:
-        RecordsError: they cannot be read.
+        RecordsError: the records cannot be read.
     """
     with reading(folder) as connection:
         database = plain(connection)
@@ -79,7 +79,7 @@ def recalled(folder: Path, deadline_s: Callable[[Recipe], float]) -> Recalled:
 def _full(
     connection: Connection, folder: Path, sequence: int, deadline_s: Callable[[Recipe], float]
 ) -> Remembered | None:
-    """A fruit in full; None where that is not known, as of one that a crash has ended."""
+    """Return a fruit in full; None if it is not known in full, as one that a crash ended."""
     record = read_inspection(connection, sequence, folder)
     snapshot, judged = record.trigger.recipe, record.judged
     if snapshot is None or judged is None or record.standing is None:
@@ -96,7 +96,7 @@ def _full(
 
 
 def _look(record: FullRecord, step: int) -> Look | None:
-    """Reads the image once it is asked for; None where it was not kept."""
+    """Return a reader of the image; None if no image was stored."""
     kept = {image.kind: image for image in record.images if image.step == step}
     image, mask = kept.get("step"), kept.get("mask")
     if image is None or mask is None:

@@ -1,4 +1,4 @@
-"""What the pages ask about recipes, and a person's changes to them; the recipe store does the work."""
+"""Recipe requests of the pages, carried out by the recipe store."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -52,7 +52,7 @@ from station.settings.recipe import Recipe, shipped_folder
 from station.settings.recipe_form import content_sha256
 
 _REVISIONS = 20
-"""Of one page of a history."""
+"""Revisions on one page of a history."""
 _LONGEST_VALUE = 400
 _JUDGED = (
     "SELECT i.sequence, i.outcome, json_extract(i.measures, '$.onset_mm') FROM inspections i "
@@ -66,13 +66,12 @@ _POINTS = (
 
 
 class PanelRecipes:
-    """Answers about recipes, and changes them.
+    """Requests about recipes, and changes of them.
 
     Args:
-        home: the station's home folder.
         folder: the site's recipe files; None for those shipped.
-        worker: what blocks is done there.
-        jobs: a what-if is done there.
+        worker: runs what blocks.
+        jobs: runs what-ifs.
     """
 
     def __init__(self, home: Path, folder: Path | None, worker: PanelWorker, jobs: PanelJobs) -> None:
@@ -82,7 +81,7 @@ class PanelRecipes:
         self._records, self._worker, self._jobs = records_folder(home), worker, jobs
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             ListRecipes: self.recipes,
             GetRecipe: self.recipe,
@@ -100,7 +99,7 @@ class PanelRecipes:
         }
 
     async def recipes(self, _request: ListRecipes) -> Recipes:
-        """How all stand."""
+        """List the recipes with their states."""
 
         def read() -> Recipes:
             standings, problems = self._store.read()
@@ -116,7 +115,7 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def recipe(self, request: GetRecipe) -> RecipeTold:
-        """One recipe's file, or one of its revisions."""
+        """Return one recipe's file, or one of its revisions."""
 
         def read() -> RecipeTold:
             row = _row(self._store.standing(request.name))
@@ -131,7 +130,7 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def history(self, request: GetRecipeHistory) -> RecipeHistory:
-        """A page of a recipe's revisions."""
+        """Return a page of a recipe's revisions."""
 
         def read() -> RecipeHistory:
             self._store.standing(request.name)
@@ -145,7 +144,7 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def compare(self, request: CompareRecipe) -> Changes:
-        """What differs between two forms of a recipe."""
+        """Return the differences between two forms of a recipe."""
 
         def read() -> Changes:
             standing = self._store.standing(request.name)
@@ -189,7 +188,7 @@ class PanelRecipes:
         return await self._change(request.name, lambda: self._store.approve(request.name, person, request.revision))
 
     async def reject(self, request: RejectRecipe) -> RecipeRow:
-        """Retire a draft; nothing else can be retired by this."""
+        """Retire a draft; no other revision can be retired here."""
 
         def reject() -> None:
             status = self._store.revision(request.name, request.revision).status
@@ -208,7 +207,7 @@ class PanelRecipes:
         return await self._change(request.name, lambda: self._editor.revert(request.name, person, request.revision))
 
     async def export(self, request: ExportRecipe) -> RecipeText:
-        """A recipe's text, to be imported again."""
+        """Return a recipe's text, to be imported again."""
         return RecipeText(text=await self._worker.do(lambda: self._editor.export_text(request.name, request.revision)))
 
     async def import_text(self, request: ImportRecipe) -> RecipeRow:
@@ -218,7 +217,7 @@ class PanelRecipes:
         return _row(standing)
 
     async def past_curves(self, request: GetPastCurves) -> PastCurves:
-        """The last judged curves of a recipe's fruit."""
+        """Return the last judged curves of a recipe's fruit."""
 
         def read() -> PastCurves:
             recipe = self._store.good_file(request.name).recipe

@@ -1,4 +1,4 @@
-"""What answers the pages Recipes, History and Maintenance, put together for the panel's server."""
+"""Page handlers for Recipes, History and Maintenance, put together for the panel's server."""
 
 import contextlib
 from collections.abc import Mapping
@@ -26,19 +26,14 @@ from station.settings.configuration import Configuration
 
 
 class PanelRooms:
-    """Their handlers; keep it open with `async with` for as long as they answer, and close it before the devices.
+    """Handlers of these pages; use them inside `async with`, and close before the devices.
 
     Args:
-        configuration: the site's.
-        records: opened, or to be opened.
-        service: the cycle.
-        crew: the devices.
         orders: the mode.
-        gate: what inspecting needs.
-        liveness: what has to make progress.
+        gate: the dependencies of an inspection.
+        liveness: the progress of tasks.
         calibrated: the scale.
-        trail: told of everything that a person does.
-        versions: of the programs.
+        trail: gets everything that a person does.
     """
 
     def __init__(
@@ -84,7 +79,7 @@ class PanelRooms:
         self._open = contextlib.AsyncExitStack()
 
     async def __aenter__(self) -> Self:
-        """Keep the log from now on."""
+        """Store log lines from now on."""
         self._open.callback(self._worker.close)
         self._open.enter_context(self._log)
         self._open.push_async_callback(self._jobs.close)
@@ -92,5 +87,5 @@ class PanelRooms:
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        """Call off what runs."""
+        """Cancel what runs."""
         await self._open.aclose()

@@ -1,4 +1,4 @@
-"""Whether a trigger would be accepted now, and else why not: one sentence with the remedy."""
+"""Readiness for a trigger, or the reason against it: one sentence with the remedy."""
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
@@ -16,17 +16,14 @@ _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 
 class Gate:
-    """Looks at everything that a trigger needs.
+    """Interlock: checks everything that a trigger needs.
 
     Args:
         boot: this start of the station.
-        service: the cycle.
-        crew: the devices.
-        orders: the mode, and a recipe's change under way.
-        book: the recipes there are.
-        lots: why a lot could not begin.
-        liveness: what has to make progress.
-        calibrated: whether the sensor is calibrated, and verified where that is demanded.
+        orders: the mode, and a recipe change under way.
+        lots: why a lot cannot begin.
+        liveness: the progress of tasks.
+        calibrated: whether the sensor is calibrated, and verified where the site requires it.
     """
 
     def __init__(
@@ -45,7 +42,7 @@ class Gate:
         self._book, self._liveness = book, liveness
 
     def refusal(self) -> tuple[Refusal | None, str]:
-        """Why no trigger is accepted, for the PLC and for a person; None and nothing where one is."""
+        """Return why no trigger is accepted, for the PLC and for a person; None and empty if one is."""
         service, facts = self._service, STATES[self._service.state]
         if service.stop_asked:
             return Refusal.NOT_READY, "The station is told to end; start it again."
@@ -73,7 +70,7 @@ class Gate:
         return None, ""
 
     def state(self) -> StationState:
-        """The whole state, as the PLC interface gets it with every beat."""
+        """Return the whole state, as the PLC interface gets it with every beat."""
         service = self._service
         refusal, why = self.refusal()
         snapshot = None if service.active is None else service.active.snapshot
@@ -93,12 +90,12 @@ class Gate:
         )
 
     def _packml(self) -> PackmlState | None:
-        """The state's own; on the way to an end that was asked for it is stopping, whatever is still done."""
+        """Return the state's own; while an orderly end is under way it is stopping, whatever still runs."""
         facts = STATES[self._service.state]
         return PackmlState.STOPPING if self._service.stop_asked and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
-        """The same for supervisors, with every dependency's age."""
+        """Return the same for supervisors, with every dependency's age."""
         refusal, why = self.refusal()
         devices = [
             Dependency(

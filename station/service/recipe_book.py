@@ -1,4 +1,4 @@
-"""The recipes that the station may inspect by: the approved revisions, whatever becomes of files and history."""
+"""Active recipes: the approved revisions that the station may inspect by, also without files and history."""
 
 import contextlib
 import json
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Active:
-    """A recipe, frozen: what it is, and what the PLC and the records know it by."""
+    """A frozen recipe with its name for the PLC and the records."""
 
     recipe: Recipe
     snapshot: RecipeSnapshot
@@ -42,28 +42,28 @@ class Active:
 
         Args:
             recipe: as read.
-            revision: of it that is in force.
+            revision: the revision in force.
         """
         return cls(recipe, RecipeSnapshot.of(recipe.model_dump(mode="json"), revision))
 
 
 class Remembered(NamedTuple):
-    """What the station inspected by when it ended."""
+    """The recipe of the station's previous start."""
 
     active: Active
     lot: str | None
-    """The lot under way; None where none had begun with it."""
+    """The lot under way; None if none had begun with this recipe."""
 
 
 class RecipeBook:
-    """The site's recipes in force.
+    """Recipes in force on this site.
 
-    Each is kept in the home folder too: where the history cannot be read, the kept one stays in force. A file that was
-    removed takes its recipe with it; one that was edited takes nothing with it, and `problems` says so.
+    Each is stored in the home folder too: if the history cannot be read, the stored one stays in force. A recipe whose
+    file was removed is not in force any more; an edit of the file changes nothing, and `problems` reports it.
 
     Args:
         folder: the site's recipe files; None for those shipped.
-        kept: where recipes in force and the active one are kept.
+        kept: stores the recipes in force and the active one.
     """
 
     def __init__(self, folder: Path | None, kept: Kept) -> None:
@@ -78,7 +78,7 @@ class RecipeBook:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """The PLC's numbers of the recipes that can be chosen."""
+        """Return the PLC's numbers of the recipes that can be chosen."""
         return tuple(sorted(self._controls))
 
     def read(self) -> None:
@@ -106,27 +106,20 @@ class RecipeBook:
         self._keep(controls)
 
     def refresh(self) -> None:
-        """Read again where a file, its folder or the history has changed since. Blocks for some milliseconds."""
+        """Read again if a file, its folder or the history has changed since. Blocks for some milliseconds."""
         if self._store.signature() != self._signature:
             self.read()
 
     def find(self, number: int) -> Active | None:
-        """A recipe in force by the PLC's number.
-
-        Args:
-            number: as in the recipe's `plc_number`.
-        """
+        """Return the recipe in force with a PLC number."""
         control = self._controls.get(number)
         return None if control is None else Active.of(control.recipe, str(control.revision or ""))
 
     def current(self, active: Active) -> Active:
-        """What is in force now in the place of what a lot was inspected by.
-
-        Args:
-            active: the recipe frozen before.
+        """Return the recipe in force that replaces a lot's frozen one.
 
         Raises:
-            RecipeStoreError: number, name and content do not belong together any more; the message says how.
+            RecipeStoreError: number, name and content do not match any more; the message gives the difference.
         """
         name, number = active.recipe.name, active.recipe.plc_number
         found = self.find(number)
@@ -142,9 +135,9 @@ class RecipeBook:
         raise RecipeStoreError(f"{what}; choose a recipe again")
 
     def remembered(self) -> Remembered | None:
-        """What the station inspected by when it ended; None where nothing is in force in its place.
+        """Return the recipe of the previous start; None if nothing is in force in its place.
 
-        A lot goes on with the very recipe it began with, if that is still what its revision says.
+        A lot continues with exactly the recipe that it began with, if its revision still has that content.
         """
         data = self._kept.read(_ACTIVE)
         try:
@@ -161,21 +154,20 @@ class RecipeBook:
         return Remembered(active, lot) if whole and lot is not None else Remembered(current, None)
 
     def remember(self, active: Active, lot: str | None) -> bool:
-        """Keep over a restart what is inspected by.
+        """Store the active recipe for the next start.
 
         Args:
-            active: the recipe.
-            lot: the one under way; None where none has begun with it.
+            lot: the lot under way; None if none has begun with this recipe.
 
         Returns:
-            Whether it was kept.
+            Whether it was stored.
         """
         snapshot = active.snapshot
         told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
         return self._kept.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
 
     def _is_revision(self, active: Active) -> bool:
-        """Whether the history has this very content as this revision."""
+        """Check that the history has exactly this content as this revision."""
         with contextlib.suppress(StationError, ValueError):
             revision = self._store.revision(active.recipe.name, int(active.snapshot.revision))
             return revision.recipe == active.recipe
@@ -185,7 +177,7 @@ class RecipeBook:
         self._controls = {control.recipe.plc_number: control for control in controls}
 
     def _notice(self, standings: Iterable[Standing]) -> None:
-        """Note what became of files behind the commands' back, once for each content."""
+        """Audit what was done to files without the commands, once for each content."""
         for standing in standings:
             file, control, submitted = standing.file, standing.control, standing.submitted
             sha256 = str(standing.file_state) if file is None else content_sha256(file.recipe)

@@ -1,4 +1,4 @@
-"""The station's service: carries the cycle's actions out, and answers whoever asks for inspections."""
+"""Inspection service: carries out the cycle's actions, and answers requests for inspections."""
 
 import asyncio
 import contextlib
@@ -35,18 +35,15 @@ _LEASE_S = 2.0
 
 
 class Service:
-    """The cycle's performer, and the line's side of it.
+    """Performer of the cycle, and server of the line's requests.
 
     Args:
-        configuration: the site's.
-        records: opened.
-        crew: the devices; told of inspections.
+        crew: the devices; gets the start and end of inspections.
         inspector: carries out what needs the devices.
-        alarms: the desk.
-        metrics: counts.
-        liveness: fed with the cycle's progress.
+        alarms: raised and cleared by the cycle.
+        liveness: gets the cycle's progress.
         versions: of the programs, for the records.
-        calibrated: the scale that areas are told by.
+        calibrated: the scale that areas are reported in.
     """
 
     def __init__(
@@ -88,18 +85,18 @@ class Service:
 
     @property
     def state(self) -> State:
-        """Where the cycle is."""
+        """Return the cycle's state."""
         return self.conductor.state
 
     # What the line asks.
 
     async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> Begun:
-        """Begin an inspection, or say why not. The same request again, before its outcome was told, begins none.
+        """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
 
         Args:
             request: the trigger.
             refusal: why none may begin now.
-            lot: that the fruit belongs to.
+            lot: of the fruit.
         """
         async with self._beginning:
             if (same := self.triggers.repeated(request)) is not None:
@@ -123,10 +120,10 @@ class Service:
             return await self._pending.answered()
 
     async def published(self, outcome: Outcome) -> None:
-        """Note durably what the PLC was told, and count it, once; a fruit that is still inspected is called off by it.
+        """Store that the PLC was given an outcome, and count it, once; a fruit still under inspection is cancelled.
 
         Args:
-            outcome: what stands from now on.
+            outcome: the final one.
         """
         first = await self.ledger.records.published(outcome)
         self.triggers.published(outcome)
@@ -144,7 +141,7 @@ class Service:
     # What the cycle asks: see `Performer`.
 
     def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
-        """Carry an action of the cycle out."""
+        """Carry out an action of the cycle."""
         match action:
             case Action.OPEN_JAWS:
                 return self._inspector.open_jaws
@@ -190,21 +187,21 @@ class Service:
         await self._crew.halt()
 
     def raise_alarm(self, told: Raise, why: str) -> None:
-        """Raise an alarm of the cycle's."""
+        """Raise an alarm of the cycle."""
         self.alarms.raise_(told.alarm, why)
 
     def failed(self, fault: StationError) -> None:
-        """Let the device's watch know before the cycle asks how the devices do."""
+        """Report a fault to the device's monitor before the cycle reads the devices' state."""
         self._crew.failed(fault)
 
     def refused(self, state: State, event: Event) -> None:
-        """Count what the table does not list; a trigger among it is answered."""
+        """Count an event that the table does not list; a trigger among them is answered."""
         self._metrics.unexpected()
         if event is Event.TRIGGER and self._pending is not None and not self._pending.is_answered:
             self._pending.answer(self._refused(STATES[state].refusal or Refusal.NOT_READY))
 
     def entered(self, state: State, after: State, took_s: float) -> None:
-        """Keep the phases' times, and what hangs on a state."""
+        """Store the phase's time, and do what depends on the new state."""
         self._told_late = None
         if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
@@ -219,7 +216,7 @@ class Service:
             self.conductor.post(Event.RESET)
 
     def tick(self) -> None:
-        """Feed the watchdogs, and tell the cycle what time alone brings."""
+        """Feed the watchdogs, and give the cycle the events of elapsed time."""
         self._liveness.progress(CYCLE)
         if not self._liveness.stuck():
             self._crew.renew_health(_LEASE_S)
@@ -229,10 +226,10 @@ class Service:
             self.conductor.post(Event.STOP, "the station is told to end")
 
     def device_changed(self, fault: StationError | None) -> None:
-        """A watch has found a device to be otherwise than before.
+        """Handle a monitor's report that a device's state has changed.
 
         Args:
-            fault: what is wrong from now on, None for nothing.
+            fault: from now on; None for no fault.
         """
         if fault is not None:
             self.conductor.post(event_of(fault), str(fault))
@@ -270,7 +267,7 @@ class Service:
         self._take_on(pending)
 
     def _refuse(self, because: Happened) -> None:
-        """Nothing comes of the trigger: refused where it is not durable yet, else accepted and closed."""
+        """End a trigger without an inspection: refused if it is not durable yet, else accepted and closed."""
         pending, self._pending = self._pending, None
         if pending is None:
             return

@@ -1,4 +1,4 @@
-"""What the audit trail says of a start of the station, of its end, and of settings changed between two starts."""
+"""Audit entries of a start, of its end, and of settings changed between two starts."""
 
 import hashlib
 import json
@@ -11,20 +11,20 @@ from station.settings.configuration import Configuration
 
 _LAST = "audited_configuration.json"
 _HIDDEN = ("password", "secret", "token", "pin")
-"""Settings with these in their name are told by their hash."""
+"""Settings with these words in their name are audited by their hash."""
 
 
 def started(
     boot: str, configuration: Configuration, kept: Kept, versions: Mapping[str, str], broken: str
 ) -> tuple[AuditEntry, ...]:
-    """A start, with what is set otherwise than at the start before.
+    """Make the entries of a start, with the settings that changed since the previous start.
 
     Args:
-        boot: this start's name.
+        boot: name of this start.
         configuration: in force.
-        kept: remembers the configuration of the last start.
+        kept: stores the configuration of the last start.
         versions: of the programs.
-        broken: what is wrong with the configuration's file; its last good form is in force then.
+        broken: error of the configuration's file; its last good form is in force then.
     """
     values = dict(_flat(configuration.model_dump(mode="json"), ""))
     text = json.dumps(values, sort_keys=True)
@@ -41,11 +41,11 @@ def started(
 
 
 def ended(boot: str, *, asked: bool) -> AuditEntry:
-    """An end.
+    """Make the entry of an end.
 
     Args:
-        boot: the start's name.
-        asked: it was ordered, and is no failure's.
+        boot: name of the start.
+        asked: the end was requested, and is not caused by a failure.
     """
     return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": asked})
 

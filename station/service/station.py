@@ -1,4 +1,4 @@
-"""The station's process: everything put together, begun and ended in order."""
+"""Station process: makes all parts, starts them, and ends them in order."""
 
 import asyncio
 import contextlib
@@ -53,7 +53,7 @@ class Station:
 
     Args:
         configuration: the site's, or its last good form.
-        broken: what was wrong with the configuration's files; empty for nothing.
+        broken: the error of the configuration's files; empty for none.
     """
 
     def __init__(self, configuration: Configuration, broken: str = "") -> None:
@@ -66,17 +66,17 @@ class Station:
         """The recipes in force, likewise."""
 
     def stop(self) -> None:
-        """Ask for an orderly end; asking again changes nothing."""
+        """Request an orderly end; a second call changes nothing."""
         self._stop.set()
 
     async def run(self, on_started: Callable[[int], None]) -> None:
-        """Run until `stop` is called; by then the running inspection has its outcome and the jaws are open.
+        """Run until `stop` is called; then the running inspection gets its outcome and the jaws open before it returns.
 
         Args:
-            on_started: told the port of metrics and health once all is served. Devices may still be away.
+            on_started: gets the port of metrics and health once everything is served. Devices may still be away.
 
         Raises:
-            StationError: the station cannot even begin: an address is in use.
+            StationError: the station cannot start: an address is in use.
         """
         async with contextlib.AsyncExitStack() as stack:
             tasks, port = await self._put_together(stack)
@@ -169,7 +169,7 @@ class Station:
 
     @staticmethod
     async def _open_devices(stack: contextlib.AsyncExitStack, crew: Crew, rooms: PanelRooms) -> None:
-        """What a person moves at the panel ends before the devices are let go."""
+        """Open the devices; manual motions from the panel end before the devices are closed."""
         stack.push_async_callback(crew.close)
         await stack.enter_async_context(rooms)
         await crew.open()
@@ -186,14 +186,14 @@ class Station:
         self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
 
     async def _note_end(self, trail: Trail) -> None:
-        """The trail's last row of this start, as far as it can be written in time."""
+        """Write the last audit entry of this start, if it can be written in time."""
         trail.note(ended(self.boot, asked=self._stop.is_set()))
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(FLUSH_S):
                 await trail.flush()
 
     async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
-        """Wait for the order to end; a task that nothing works without and that ended by a bug ends the process."""
+        """Wait for the request to end; a required task that ends by a bug ends the process."""
         asked = asyncio.create_task(self._stop.wait(), name="order to end")
         try:
             done, _ = await asyncio.wait({asked, *needed}, return_when=asyncio.FIRST_COMPLETED)
@@ -205,7 +205,7 @@ class Station:
             await asyncio.gather(asked, return_exceptions=True)
 
     async def _end(self) -> None:
-        """Let the running inspection come to its outcome, the jaws open and the arm go home."""
+        """End the running inspection with its outcome, open the jaws and move the arm home."""
         service = self.service
         if service is None:
             return
@@ -230,7 +230,7 @@ class Station:
 
 
 def _made_room_for(endpoint: str) -> str:
-    """The endpoint, with its folder made where it is a socket file; only this user may reach it there."""
+    """Return the endpoint, and make the folder of a socket file; only this user may access it."""
     if endpoint.startswith("ipc://"):
         Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     return endpoint

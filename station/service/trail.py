@@ -1,4 +1,4 @@
-"""What is to go into the audit trail, on its way there: told at once, written behind, tried again until it is."""
+"""Audit logger: queues audit entries, writes them in the background, and tries again until they are stored."""
 
 import asyncio
 import logging
@@ -11,7 +11,7 @@ from station.records.records import Records
 
 PLC = "plc"
 PANEL = "panel"
-"""Who acts where the one at the panel is not known by name."""
+"""Actor of a command from a panel without a logged-in person."""
 RETRY_S = 2.0
 FLUSH_S = 3.0
 MOST_WAITING = 10_000
@@ -20,10 +20,10 @@ log = logging.getLogger(__name__)
 
 
 class Trail:
-    """The station's own way into the audit trail. `note` never waits; nothing that it is told is left out silently.
+    """Queue of audit entries. `note` never waits; no entry is dropped silently.
 
     Args:
-        records: opened, or to be opened again.
+        records: opened, or to be reopened.
     """
 
     def __init__(self, records: Records) -> None:
@@ -33,7 +33,7 @@ class Trail:
         self._writing = asyncio.Lock()
 
     def note(self, *entries: AuditEntry) -> None:
-        """Have something written.
+        """Queue entries to be written.
 
         Args:
             entries: in their order.
@@ -44,21 +44,22 @@ class Trail:
         self._told.set()
 
     def command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
-        """Note a command that was carried out, or refused.
+        """Queue the entry of a command that was carried out or refused.
 
         Args:
             who: `plc`, `panel` or a person's name.
-            command: its name.
-            subject: what it is about.
-            why_not: why it was not carried out; empty where it was.
-            role: in what capacity; as `who` where none is given.
+            command: name of the command.
+            subject: object of the command.
+            why_not: reason of the refusal; empty if it was carried out.
+            role: of `who`; by default the same as `who`.
             old: what was before, where that tells something.
+            **old: values before the command, where they matter.
         """
         new = {"done": not why_not} | ({"why": why_not} if why_not else {})
         self.note(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
 
     async def keep(self) -> None:
-        """Write what is told, until cancelled."""
+        """Write the queue until cancelled."""
         while True:
             await self._told.wait()
             self._told.clear()
@@ -67,7 +68,7 @@ class Trail:
                 self._told.set()
 
     async def flush(self) -> None:
-        """Write what waits, once; what cannot be written is logged."""
+        """Write the queue once; what cannot be written is logged."""
         if not await self._write():
             log.error("the audit trail could not take: %s", "; ".join(map(str, self._waiting)))
 
@@ -87,53 +88,52 @@ class Trail:
 
 
 def order_told(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
-    """What the trail says of a command of the PLC's, or the same of a person's.
+    """Make the entry of a command that the PLC or a person gave.
 
     Args:
-        command: as it came.
-        done: what came of it.
-        old: what was before; None where nothing tells.
-        by: who gave it, and in what role.
+        done: its result.
+        old: the value before; None if unknown.
+        by: name and role of who gave it.
     """
     new = {"argument": command.argument, **done.model_dump()}
     return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
 
 
 def calibration_stored(who: str, reason: str, subject: str, old: Any, new: Any) -> AuditEntry:
-    """What the trail says of a calibration; for `Records.audit`, or `append_audit` where no station runs.
+    """Make the entry of a calibration; for `Records.audit`, or `append_audit` if no station runs.
 
     Args:
         who: the person who made it.
-        reason: why, as `yearly`, `gel changed`.
-        subject: what was calibrated, as `scale of DIGIT D20966`.
-        old: what was in force before, None for nothing.
-        new: what is from now on.
+        reason: as `yearly`, `gel changed`.
+        subject: the calibrated thing, as `scale of DIGIT D20966`.
+        old: value in force before, None for none.
+        new: value in force from now on.
     """
     return AuditEntry(who, "service", "calibration.stored", subject, reason, old, new)
 
 
 def calibration_verified(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
-    """What the trail says of a verification.
+    """Make the entry of a verification.
 
     Args:
         who: the person who made it.
-        subject: what was verified, as `sensor D20966`.
-        calibration: the id of what it was compared with.
+        subject: the verified thing, as `sensor D20966`.
+        calibration: id of the calibration compared with.
         verification: its own id.
-        passed: whether all was within its tolerance.
+        passed: all values were within their tolerances.
     """
     new = {"calibration": calibration, "verification": verification, "passed": passed}
     return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
 
 
 def alarm_changed(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
-    """What the trail says of a person's or the PLC's hand on an alarm.
+    """Make the entry of an alarm that a person or the PLC changed.
 
     Args:
         who: `plc`, `panel` or a person's name.
-        role: in what capacity.
+        role: of `who`.
         change: `acknowledged`, `shelved`, `unshelved` or `reset`.
         alarm: its id.
-        reason: why, as for shelving.
+        reason: as for shelving.
     """
     return AuditEntry(who, role, f"alarm.{change}", f"alarm {alarm}", reason)

@@ -1,4 +1,4 @@
-"""Triggers and outcomes on their way: who waits for which answer, and what was already answered."""
+"""Triggers and outcomes in progress: the callers that wait for each, and those answered already."""
 
 import asyncio
 from collections import OrderedDict
@@ -11,7 +11,7 @@ _REMEMBERED = 64
 
 
 class Triggers:
-    """The last inspections by their sequence, with those who wait for them."""
+    """Last inspections by their sequence, with the callers that wait for them."""
 
     def __init__(self) -> None:
         self._outcomes: OrderedDict[int, asyncio.Future[Outcome]] = OrderedDict()
@@ -20,22 +20,18 @@ class Triggers:
         """The last accepted trigger, until its outcome was published."""
 
     def repeated(self, request: Begin) -> Inspection | None:
-        """The inspection that this very trigger has begun already: a retried request begins none.
+        """Return the inspection that this trigger has begun already: a retried request begins none.
 
-        The PLC never gives an id twice in a row; one that comes again before its outcome was told is the same fruit.
-
-        Args:
-            request: as it came.
+        The PLC never gives an id twice in a row; an id that repeats before its outcome was published is the same fruit.
         """
         if self._last is None or self._last[0] != request:
             return None
         return self._inspections.get(self._last[1])
 
     def accepted(self, request: Begin, now: Inspection) -> None:
-        """A trigger is durable and its inspection has begun; those before it were told and need no pictures any more.
+        """Add a durable trigger whose inspection has begun; earlier inspections are over and release their pictures.
 
         Args:
-            request: the trigger.
             now: with its sequence.
         """
         assert now.sequence is not None  # noqa: S101 (it is durable)
@@ -49,31 +45,23 @@ class Triggers:
             self._inspections.pop(forgotten, None)
 
     def ended(self, outcome: Outcome) -> None:
-        """Give an outcome to those who wait for it, or come for it later; the first one stands.
+        """Pass an outcome to the callers that wait for it now or later; a second one is ignored.
 
         Args:
-            outcome: as recorded.
+            outcome: as stored.
         """
         waiting = self._outcomes.get(outcome.sequence)
         if waiting is not None and not waiting.done():
             waiting.set_result(outcome)
 
     def published(self, outcome: Outcome) -> None:
-        """The PLC was told; the same trigger is from now on another fruit's.
-
-        Args:
-            outcome: what it was told.
-        """
+        """Note that an outcome was published; from now on the same trigger id is another fruit's."""
         if self._last is not None and self._last[1] == outcome.sequence:
             self._last = None
         self.ended(outcome)
 
     def inspection(self, sequence: int) -> Inspection | None:
-        """One of the last inspections.
-
-        Args:
-            sequence: its number.
-        """
+        """Return one of the last inspections."""
         return self._inspections.get(sequence)
 
     async def outcome(self, sequence: int) -> Outcome:
@@ -108,7 +96,7 @@ class Pending:
         return self._answer.done()
 
     def answer(self, begun: Begun) -> None:
-        """Answer the request; the first answer stands.
+        """Answer the request; a second answer is ignored.
 
         Args:
             begun: accepted or refused.

@@ -1,4 +1,4 @@
-"""Looks after what an inspection needs, outside of inspections: brings it back where that is safe, raises alarms."""
+"""Housekeeping outside of inspections: recovers what an inspection needs where that is safe, and raises alarms."""
 
 import asyncio
 import contextlib
@@ -36,20 +36,18 @@ class Upkeep:
     """One task beside the cycle.
 
     Args:
-        service: the cycle.
-        crew: the devices.
         gate: readiness, for the metrics.
-        orders: the line's own alarms.
-        book: the recipes; read again and again, since people edit and approve them.
-        trail: told of what was found.
-        metrics: shows what is ready.
-        liveness: fed with this task's progress.
-        calibrated: how old the sensor's calibration is.
-        pages_trouble: what is wrong with the HMI's process; empty for nothing.
-        outbox: says what is behind, empty for nothing.
-        broken: what was wrong with the configuration at the start; empty for nothing.
-        reserve_mb: space on the disk below which nothing is inspected.
-        longest_pause_s: between two tries to bring something back.
+        orders: raises the line's alarms.
+        book: the recipes; read again regularly, because people edit and approve them.
+        trail: gets the findings.
+        metrics: gets the readiness.
+        liveness: gets this task's progress.
+        calibrated: age of the sensor's calibration.
+        pages_trouble: returns the fault of the HMI's process; empty for none.
+        outbox: returns the outbox's delay, empty for none.
+        broken: error of the configuration at the start; empty for none.
+        reserve_mb: free disk space below which nothing is inspected.
+        longest_pause_s: between two attempts to recover something.
     """
 
     def __init__(
@@ -82,7 +80,7 @@ class Upkeep:
         self._restarts_counted: dict[str, int] = {}
 
     async def run(self) -> None:
-        """Look after everything until cancelled."""
+        """Run until cancelled."""
         while True:
             if self._service.state in _AWAY:
                 await self._bring_back()
@@ -98,7 +96,7 @@ class Upkeep:
             await asyncio.sleep(PERIOD_S)
 
     async def _look_into_book(self) -> None:
-        """Notice what people did to the recipes. The lot under way is not touched by it."""
+        """Read what people changed in the recipes. The current lot does not change."""
         await asyncio.to_thread(self._book.refresh)
         self._book_at_s = time.monotonic()
         noticed, self._book.noticed = self._book.noticed, []
@@ -113,7 +111,7 @@ class Upkeep:
             service.conductor.post(Event.READY)
 
     async def _mend(self) -> None:
-        """Try what may bring something back, with growing pauses; who watches it says why it could not be."""
+        """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
         activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
         play = self._crew.program_to_play_again and not self._liveness.stuck()
         if time.monotonic() < self._again_s or not (activate or play or self._service.ledger.fault is not None):

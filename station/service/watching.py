@@ -1,4 +1,4 @@
-"""Looks at one device again and again: whether it answers, how long ago it did, and what is wrong with it."""
+"""Device monitor: checks one device periodically, and stores the time of its last answer and its fault."""
 
 import asyncio
 import contextlib
@@ -15,7 +15,7 @@ MEETING_S = 15.0
 log = logging.getLogger(__name__)
 
 Look = Callable[[], Awaitable[None]]
-"""Asks the device; raises what is wrong with it. It ends by itself, whatever the device does."""
+"""Checks the device; raises its fault. It returns in time, whatever the device does."""
 
 
 class NotYetHeardError(StationError):
@@ -23,14 +23,14 @@ class NotYetHeardError(StationError):
 
 
 class DeviceWatch:
-    """One device's watch, a task of its own. It goes on for ever, with growing pauses while the device is away.
+    """Monitor task of one device. It runs for ever, with growing pauses while the device is away.
 
     Args:
-        name: the device's, as in messages.
-        look: how it is asked.
-        longest_pause_s: between two tries.
-        on_change: told what is wrong from now on, None for nothing.
-        on_progress: told after each look, whatever came of it.
+        name: of the device, as in messages.
+        look: checks the device.
+        longest_pause_s: between two checks.
+        on_change: gets the fault from now on, None for no fault.
+        on_progress: called after each check, whatever its result.
     """
 
     def __init__(
@@ -54,34 +54,30 @@ class DeviceWatch:
 
     @property
     def told_fault(self) -> StationError | None:
-        """What is wrong, where an operator is to know: a device that is only just being met has its time."""
+        """Return the fault that an operator has to see: a device has some time to answer after the start."""
         return None if self.heard_s is None and time.monotonic() < self._began_s + MEETING_S else self.fault
 
     @property
     def age_s(self) -> float | None:
-        """Time since it was last found well; None where it never was."""
+        """Return the time since it was last found healthy; None if it never was."""
         return None if self.heard_s is None else time.monotonic() - self.heard_s
 
     def heard(self) -> None:
-        """Somebody has just worked with it, and it did."""
+        """Note that a caller has just worked with the device successfully."""
         self.heard_s = time.monotonic()
         self._on_progress()
 
     def failed(self, fault: StationError) -> None:
-        """Somebody who works with it found this; the watch looks again at once.
-
-        Args:
-            fault: what is wrong.
-        """
+        """Note a fault that a caller met; the next check follows at once."""
         self._set(fault)
         self._again.set()
 
     def look_again(self) -> None:
-        """Somebody has mended something: do not wait for the next look's time."""
+        """Check again at once, after a repair, without waiting for the next check's time."""
         self._again.set()
 
     async def run(self) -> None:
-        """Look until cancelled."""
+        """Check until cancelled."""
         pause_s = PERIOD_S
         while True:
             if self.in_use:
