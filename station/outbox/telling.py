@@ -1,4 +1,4 @@
-"""Keeps telling: reads what is next, tells each destination, and comes back when one was away."""
+"""Outbox publisher: reads the next events, publishes them to each destination, and reconnects after a failure."""
 
 import asyncio
 import contextlib
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 0.5
 LOOK_S = 0.5
-"""How often it is looked whether there is something new."""
+"""Period of the search for new entries."""
 _STATUS_S = 2.0
 
 
@@ -31,20 +31,20 @@ class Session(Protocol):
     """An open connection to a destination."""
 
     async def position(self, lineage: Batch) -> int:
-        """The last entry that the destination has."""
+        """Return the last entry that the destination has."""
         ...
 
     async def tell(self, batch: Batch) -> None:
-        """Tell it; when this returns, the position is behind the batch, durably."""
+        """Publish a batch; it and its position are durable when this returns."""
         ...
 
     async def idle(self, pause_s: float) -> None:
-        """Let time pass while there is nothing new; raises where the connection is seen to be lost."""
+        """Wait while there is nothing new; raises if the connection is lost."""
         ...
 
 
 class Destination(Protocol):
-    """Somebody who is told."""
+    """A system that gets the events."""
 
     name: str
     refused: int
@@ -55,13 +55,10 @@ class Destination(Protocol):
 
 
 class Teller:
-    """Tells one destination.
+    """Publisher for one destination.
 
     Args:
-        folder: the records' folder.
-        station: this station's name.
-        destination: who is told.
-        longest_pause_s: between two tries to reach it.
+        longest_pause_s: between two attempts to reach it.
     """
 
     def __init__(self, folder: Path, station: str, destination: Destination, longest_pause_s: float) -> None:
@@ -75,7 +72,7 @@ class Teller:
         self._away_since_utc_ms: int | None = time.time_ns() // 1_000_000
 
     async def run(self) -> None:
-        """Tell until cancelled."""
+        """Publish until cancelled."""
         tries = 0
         while True:
             try:
@@ -93,7 +90,7 @@ class Teller:
             await asyncio.sleep(pause_s * random.uniform(0.5, 1.0))  # noqa: S311 (no secret)
 
     def status(self) -> DestinationStatus:
-        """How it does."""
+        """Return the destination's status."""
         return DestinationStatus(
             connected=self._connected,
             told=self._told,
@@ -105,13 +102,13 @@ class Teller:
         )
 
     async def _look(self) -> None:
-        """See how much waits while the destination is away."""
+        """Count what waits while the destination is away."""
         if self._position is not None:
             with contextlib.suppress(RecordsError):
                 self._note(await self._read(self._position, 1), self._position)
 
     async def _batches(self, session: Session) -> AsyncIterator[Batch]:
-        """Tell batch after batch, as long as the connection holds."""
+        """Publish batch after batch until the connection is lost."""
         origin, position = "", 0
         while True:
             batch = await self._read(position, LARGEST_BATCH)
@@ -137,7 +134,7 @@ class Teller:
         self._oldest_utc_ms = batch.oldest_utc_ms
 
     def _now(self, *, connected: bool, error: str = "") -> None:
-        """Log what has changed, once."""
+        """Log a changed state, once."""
         if connected and not self._connected:
             log.info("%s: connected", self.destination.name)
         if error and error != self._error:
@@ -150,12 +147,7 @@ class Teller:
 
 
 def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:
-    """Those that are enabled.
-
-    Args:
-        settings: the site's.
-        home: the station's home folder.
-    """
+    """Return the enabled destinations."""
     chosen: list[Destination] = []
     if settings.postgresql.enabled:
         chosen.append(Postgresql(settings.postgresql, settings.station))
@@ -165,12 +157,10 @@ def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:
 
 
 async def keep_telling(settings: OutboxSettings, home: Path, progress: Callable[[], None] = lambda: None) -> None:
-    """Tell every destination until cancelled, and say how it goes.
+    """Publish to every destination until cancelled, and write the status.
 
     Args:
-        settings: the site's.
-        home: the station's home folder.
-        progress: called while all goes on.
+        progress: called while everything runs.
     """
     folder = records_folder(home)
     chosen = destinations(settings, home)

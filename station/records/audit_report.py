@@ -1,4 +1,4 @@
-"""Rows of the audit trail, chosen, and as text for a terminal."""
+"""Audit report: selected rows of the trail, as text for a terminal."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -15,13 +15,12 @@ _LONGEST_VALUE = 300
 
 
 def read_audit(connection: Connection, number: int, action: str = "", subject: str = "") -> list[AuditRow]:
-    """The last rows, oldest first.
+    """Read the last rows, oldest first.
 
     Args:
-        connection: any.
         number: at most so many.
-        action: rows of this action, or of all that begin so; all where empty.
-        subject: rows with this text in their subject; all where empty.
+        action: rows of this action, or of all that start with it; all if empty.
+        subject: rows with this text in their subject; all if empty.
     """
     query = select(audit).order_by(audit.c.seq.desc()).limit(number)
     if action:
@@ -32,11 +31,7 @@ def read_audit(connection: Connection, number: int, action: str = "", subject: s
 
 
 def told(rows: Sequence[AuditRow]) -> str:
-    """Rows for a person, some lines each.
-
-    Args:
-        rows: in the order of the lines.
-    """
+    """Format rows for a person, some lines each."""
     return printable("\n".join(line for row in rows for line in _lines(row)))
 
 

@@ -1,4 +1,4 @@
-"""Changes from another process than the station's: short, between two of its writes."""
+"""Transactions of another process than the station's, between two of the station's writes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,10 +15,7 @@ from station.records.failures import in_words
 
 @contextmanager
 def changing(folder: Path) -> Iterator[Connection]:
-    """One transaction, durable when the block ends; undone where it raises. The station waits meanwhile: be short.
-
-    Args:
-        folder: the records' folder.
+    """Run one transaction: durable when the block ends, rolled back if it raises. The station waits: be short.
 
     Raises:
         RecordsError: there are no records, or they cannot be changed.

@@ -1,4 +1,4 @@
-"""All of the records looked at: the database's form, and each image against its name."""
+"""Integrity check of the records: the database's form, and each image against its name."""
 
 import hashlib
 from pathlib import Path
@@ -14,21 +14,18 @@ from station.records.schema import inspections
 
 
 class Found(NamedTuple):
-    """What was looked at, and what is wrong."""
+    """Result of the integrity check."""
 
     inspections: int
     images: int
     faults: tuple[str, ...]
-    """Data that is damaged or missing."""
+    """Damaged or missing data."""
     notes: tuple[str, ...]
-    """What the next start puts right."""
+    """Faults that the next start repairs."""
 
 
 def check_records(folder: Path) -> Found:
-    """Look at everything, also while the station writes; changes nothing.
-
-    Args:
-        folder: the records' folder.
+    """Check everything, also while the station writes; changes nothing.
 
     Raises:
         RecordsError: there are no records, or they cannot be read at all.

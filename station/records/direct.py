@@ -1,6 +1,6 @@
-"""Writing to the records from another process than the station's: short transactions of a person's commands.
+"""Direct writes from another process than the station's: short transactions of a person's commands.
 
-SQLite keeps two writers apart; each waits for the other's transaction, the station some milliseconds at most.
+SQLite separates two writers; each waits for the other's transaction, the station some milliseconds at most.
 """
 
 import os
@@ -22,12 +22,9 @@ from station.records.opening import lock_folder
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Connection]:
-    """A transaction: durable when the block has ended, undone where it raised.
+    """Run a transaction: durable when the block has ended, rolled back if it raised.
 
-    Where no station has the folder, a missing database is begun, and one of an older form is brought up to date.
-
-    Args:
-        folder: the records' folder.
+    If no station has the folder open, a missing database is made, and one of an older schema is migrated.
 
     Raises:
         RecordsError: they cannot be written; nothing was changed.
@@ -49,7 +46,7 @@ def writing(folder: Path) -> Iterator[Connection]:
 
 
 def _make_ready(folder: Path) -> None:
-    """Bring the database to this program's form, unless a station has it open, which has done so."""
+    """Migrate the database, unless a station has it open and has done so."""
     try:
         lock = lock_folder(folder)
     except LockedError:

@@ -1,4 +1,4 @@
-"""What SQLite and the operating system say, in the records' own errors."""
+"""Error mapping: errors of SQLite and the operating system to the records' own."""
 
 import errno
 import sqlite3
@@ -51,10 +51,10 @@ _SYSTEM: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
 
 
 def in_words(error: Exception, place: str) -> RecordsError:
-    """Translate what a write or read raised.
+    """Convert what a write or read raised to a `RecordsError`.
 
     Args:
-        error: SQLAlchemy's, sqlite3's or the operating system's.
+        error: from SQLAlchemy, sqlite3 or the operating system.
         place: the file.
     """
     if isinstance(error, RecordsError):

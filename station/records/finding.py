@@ -1,4 +1,4 @@
-"""What the writer notes so that an inspection is found quickly: its reasons and its hour."""
+"""Search index, kept by the writer: reasons and hours of inspections."""
 
 from sqlalchemy import Connection, delete, insert, select
 
@@ -9,12 +9,12 @@ HOUR_MS = 3_600_000
 
 
 def note_reasons(connection: Connection, before: Outcome | None, now: Outcome) -> None:
-    """Let an inspection be found by the reasons of what stands.
+    """Update an inspection's reasons in the index.
 
     Args:
-        connection: the writer's, in the transaction that makes it stand.
-        before: what stood, if anything did.
-        now: what stands.
+        connection: the writer's, in the transaction that sets the outcome.
+        before: the outcome in force before, if any.
+        now: the outcome in force now.
     """
     if before is not None and before.reasons:
         table = reasons.c
@@ -32,14 +32,12 @@ def note_reasons(connection: Connection, before: Outcome | None, now: Outcome) -
 
 
 def note_hour(connection: Connection, sequence: int, began_utc_ms: int) -> None:
-    """Let an inspection be found by its time; mostly nothing is written, as the hour is the one before's.
+    """Add an inspection's hour to the index; mostly nothing is written, because the hour is that of the one before.
 
-    An inspection may lie before others that are noted already: theirs stay as they are.
+    An inspection may be older than others in the index: their entries do not change.
 
     Args:
         connection: the writer's, in the transaction that inserts it.
-        sequence: the inspection's.
-        began_utc_ms: when it began.
     """
     hour = began_utc_ms // HOUR_MS
     before = connection.scalar(

@@ -1,4 +1,4 @@
-"""Holds: images that stay, whatever the quota says, until somebody releases them."""
+"""Holds: images that the quota does not remove until a person releases them."""
 
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ from station.records.writing import utc_ms
 
 
 class Hold(NamedTuple):
-    """One that stands."""
+    """An active hold."""
 
     sequence: int | None
     lot: str | None
@@ -21,21 +21,18 @@ class Hold(NamedTuple):
 
     @property
     def what(self) -> str:
-        """In words."""
+        """Describe the held thing."""
         return f"lot {self.lot}" if self.sequence is None else f"inspection {self.sequence}"
 
 
 def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Keep the images of an inspection or a lot. Idempotent: the first reason stands.
+    """Hold the images of an inspection or a lot. Idempotent: the first reason remains.
 
     Args:
-        connection: the writer's.
         thing: the inspection's sequence, or the lot's name.
-        reason: why.
-        by: who.
 
     Raises:
-        RecordsError: there is no such inspection or lot, or no reason.
+        RecordsError: there is no such inspection or lot, or no reason is given.
     """
     _given(reason)
     standing = _standing(connection, thing)
@@ -53,16 +50,13 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
 
 
 def release(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Let the images go where the quota wants it; the hold itself is kept as history.
+    """Release images for the quota; the hold itself remains in the history.
 
     Args:
-        connection: the writer's.
         thing: as held.
-        reason: why.
-        by: who.
 
     Raises:
-        RecordsError: it is not held, or no reason.
+        RecordsError: it is not held, or no reason is given.
     """
     _given(reason)
     standing = _standing(connection, thing)
@@ -77,13 +71,13 @@ def release(connection: Connection, thing: int | str, reason: str, by: str) -> H
 
 
 def read_holds(connection: Connection) -> list[Hold]:
-    """Those that stand, oldest first."""
+    """Read the active holds, oldest first."""
     rows = connection.execute(select(*_COLUMNS).where(holds.c.released_utc_ms.is_(None)).order_by(holds.c.id))
     return [Hold(*row) for row in rows]
 
 
 def is_held() -> ColumnElement[bool]:
-    """Whether the inspection of the query around it is on hold."""
+    """Return the condition that the inspection of the surrounding query is on hold."""
     return exists().where(
         holds.c.released_utc_ms.is_(None),
         or_(holds.c.sequence == inspections.c.sequence, holds.c.lot == inspections.c.lot),

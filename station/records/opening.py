@@ -1,4 +1,4 @@
-"""How the records of a folder are opened, whatever state they were left in."""
+"""Opening of a records folder, whatever its state after a crash or damage."""
 
 import fcntl
 import logging
@@ -25,25 +25,25 @@ MARK_NAME = "sequence"
 LOCK_NAME = "lock"
 
 BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
-"""What is moved aside together. The database goes last: while it is there the next start goes on moving, and a new one
-never meets an old one's write-ahead log or takes its images for orphans."""
+"""Files that are moved aside together. The database goes last: while it exists the next start continues the move, and a
+new one never meets an old one's write-ahead log or takes its images for orphans."""
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something that opening the records found and a person has to know: the caller raises an alarm of it."""
+    """A finding at the opening of the records that needs a person: the caller raises an alarm."""
 
     code: str
-    """The code of the `RecordsError` that it would have been, as `damaged`."""
+    """The code of the corresponding `RecordsError`, as `damaged`."""
     cause: str
     remedy: str
 
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """Records that are open."""
+    """Open records."""
 
     writer: Writer
     images: ImageStore
@@ -54,13 +54,10 @@ class Opened:
 
 
 def lock_folder(folder: Path) -> int:
-    """Make the folder where it is missing, and keep other stations out of it.
-
-    Args:
-        folder: the records' folder.
+    """Make the folder if it is missing, and lock it against other stations.
 
     Returns:
-        A descriptor; closing it lets others in.
+        A descriptor; closing it releases the lock.
 
     Raises:
         LockedError: another station has it.
@@ -91,9 +88,8 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
     """Open the records; the folder is locked by the caller. Blocks.
 
     Args:
-        folder: the records' folder.
         settings: for the images.
-        boot: this start of the station.
+        boot: name of this start of the station.
 
     Raises:
         RecordsError: they cannot be opened.
@@ -118,7 +114,7 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
 
 
 def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
-    """Move a damaged database aside, and what a missing one left, if the numbers can go on without it."""
+    """Move a damaged database aside, and what a missing one left, if the numbers can continue without it."""
     path = folder / FILE_NAME
     if not path.exists() or not path.stat().st_size:
         if mark.value:
@@ -148,7 +144,7 @@ def _lost_mark(mark: SequenceMark) -> SequenceError:
 
 
 def _migrate(folder: Path) -> None:
-    """Bring the schema up to date."""
+    """Migrate the schema."""
     engine = open_engine(folder / FILE_NAME, "rwc")
     try:
         migrate(engine, folder)
@@ -163,7 +159,7 @@ def _migrate(folder: Path) -> None:
 def _connector(
     path: Path, mark: SequenceMark
 ) -> tuple[Callable[[], Connection], Callable[[Connection], None], Callable[[], None]]:
-    """How the writer connects, and what it does before and after each commit."""
+    """Return how the writer connects, and what it does before and after each commit."""
     engine = open_engine(path, "rw")
     found = path.stat()
     saved = mark.value if mark.known else 0
@@ -171,7 +167,7 @@ def _connector(
     ahead: Head | None = None
 
     def confirm() -> None:
-        """A file that was taken away could be written for ever, and nobody would find it again."""
+        """Check that the file still exists: one that was removed could be written for ever, and would be lost."""
         now = path.stat() if path.exists() else None
         if now is None or (now.st_dev, now.st_ino) != (found.st_dev, found.st_ino):
             raise DamagedError(f"{path}: was removed or replaced while the station ran", DAMAGED_REMEDY)
@@ -200,7 +196,7 @@ def _connector(
 def _begin_again(
     connection: Connection, mark: SequenceMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
 ) -> tuple[int, ...]:
-    """The first transaction of a start."""
+    """Run the first transaction of a start."""
     mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
     lost = end_what_was_left(connection)
     add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
@@ -211,14 +207,13 @@ def _begin_again(
 
 
 def set_mark(folder: Path, number: int) -> None:
-    """Continue after this number, while no station has the folder.
+    """Set the high-water mark of sequence numbers, while no station has the folder.
 
     Args:
-        folder: the records' folder.
         number: the highest that was ever given.
 
     Raises:
-        SequenceError: a higher one is known to have been given.
+        SequenceError: a higher one was given.
         RecordsError: the folder is in use or cannot be written.
     """
     lock = lock_folder(folder)

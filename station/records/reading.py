@@ -1,4 +1,4 @@
-"""What is asked of the records; each a function of a connection that need not be the writer's."""
+"""Read queries of the records; each a function of a connection that need not be the writer's."""
 
 import json
 from collections import defaultdict
@@ -34,7 +34,7 @@ class Summary(NamedTuple):
     began_utc_ms: int
     lot: str
     grower: str
-    """Empty where nobody told it."""
+    """Empty if it was not registered."""
     fruit: str
     outcome: str | None
     """None while it runs."""
@@ -44,7 +44,7 @@ class Summary(NamedTuple):
 
 
 def read_open(connection: Connection) -> OpenInspections:
-    """What was begun and not acknowledged."""
+    """Read the inspections that began and were not acknowledged."""
     table = inspections.c
     rows = connection.execute(
         select(table.sequence, table.trigger_id, table.standing)
@@ -58,16 +58,15 @@ def read_open(connection: Connection) -> OpenInspections:
 
 
 def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
-    """The alarms that were saved last, by their ids."""
+    """Read the alarms that were saved last, by their ids."""
     rows = connection.execute(select(alarms).order_by(alarms.c.id))
     return tuple(AlarmRow(**row) for row in rows.mappings())
 
 
 def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
-    """What alarms did, newest first.
+    """Read the log of alarms, newest first.
 
     Args:
-        connection: any.
         limit: at most so many.
     """
     columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
@@ -76,11 +75,9 @@ def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]
 
 
 def read_inspection(connection: Connection, sequence: int, folder: Path) -> FullRecord:
-    """All that is known of one inspection.
+    """Read all stored data of one inspection.
 
     Args:
-        connection: any.
-        sequence: which one.
         folder: the records' folder, for the images' paths.
 
     Raises:
@@ -138,11 +135,10 @@ SELECT sequence, area_mm2 FROM curve_points WHERE sequence IN (SELECT value FROM
 
 
 def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Summary]:
-    """Some inspections for a list, highest number first.
+    """Read some inspections for a list, highest number first.
 
     Args:
-        connection: any.
-        sequences: which; those that are not there are left out.
+        sequences: missing ones are left out.
     """
     database = plain(connection)  # through SQLAlchemy a page takes several times as long
     wanted = (json.dumps(list(sequences)),)
@@ -154,10 +150,9 @@ def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Sum
 
 
 def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[str, str, str], int]:
-    """How many outcomes the PLC was given, by fruit, outcome and first reason, as the metrics count them.
+    """Count the outcomes that the PLC was given, by fruit, outcome and first reason, as the metrics count them.
 
     Args:
-        connection: any.
         boot: count the inspections that this start of the station began; all by default.
     """
     table = inspections.c

@@ -1,4 +1,4 @@
-"""Inspections as text for a terminal: why was fruit 4,711 rejected?"""
+"""Inspection report for a terminal: curve, judgement and explanation as text."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,20 +14,12 @@ from station.records.wording import printable, sentence, size_sentence, sparklin
 
 
 def described(record: FullRecord) -> str:
-    """All that is known of one inspection.
-
-    Args:
-        record: as the records give it.
-    """
+    """Describe one inspection in full."""
     return printable("\n".join(_described(record)))
 
 
 def listed(summaries: Sequence[Summary]) -> str:
-    """A line for each inspection.
-
-    Args:
-        summaries: in the order of the lines.
-    """
+    """Return a line for each inspection."""
     rows = [("number", "begun (UTC)", "trigger", "lot", "grower", "fruit", "outcome", "s", "reasons", "curve")]
     rows += [
         (

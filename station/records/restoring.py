@@ -1,4 +1,4 @@
-"""A backup put in the place of the records; what is there is moved aside, never removed."""
+"""Restore of a backup; the present records are moved aside, never removed."""
 
 import os
 import shutil
@@ -27,27 +27,27 @@ _OTHER = "take another backup: this one is not whole"
 
 
 class Restored(NamedTuple):
-    """What was put back."""
+    """Result of a restore."""
 
     inspections: int
     images: int
     aside: Path | None
-    """Where the records lie that were there."""
+    """Folder of the previous records."""
 
 
 def restore_backup(folder: Path, directory: Path, by: str) -> Restored:
-    """Put a backup back, all of it or nothing. Numbers given since it was made are not given again.
+    """Restore a backup, all of it or nothing. Numbers given since it was made are not given again.
 
-    All is copied and verified first, beside the records; then what is there is moved aside and the copy takes its
-    place, the database last. Ended in between, it is done again by another call.
+    All is copied and verified first, beside the records; then the present records are moved aside and the copy replaces
+    them, the database last. After an interruption call it again.
 
     Args:
-        folder: the records' folder; no station has it.
+        folder: the records' folder; no station has it open.
         directory: as `make_backup` made it.
-        by: who does it, for the audit trail.
+        by: name of the person, for the audit trail.
 
     Raises:
-        RecordsError: a station runs, the backup is not whole, or the disk failed; the records are as they were.
+        RecordsError: a station runs, the backup is not complete, or the disk failed; the records are unchanged.
     """
     manifest = read_manifest(directory)
     lock = lock_folder(folder)
@@ -74,7 +74,7 @@ def restore_backup(folder: Path, directory: Path, by: str) -> Restored:
 
 
 def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
-    """Database and images, each what the backup says it is."""
+    """Copy database and images, each verified against the manifest."""
     source, path = directory / FILE_NAME, new / FILE_NAME
     if not source.exists() or hash_of(source) != manifest.database_sha256:
         raise DamagedError(f"{source} is missing, or not the one that was verified", _OTHER)
@@ -99,7 +99,7 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
 
 
 def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
-    """Let what is numbered go on: the outbox under a new name, the audit trail with a row that tells of it."""
+    """Continue what is numbered: the outbox under a new origin, the audit trail with a row of the restore."""
     engine = open_engine(new / FILE_NAME, "rw")
     try:
         migrate(engine, new)

@@ -1,4 +1,4 @@
-"""The highest sequence number ever given, kept outside the database so that it outlives it.
+"""High-water mark of sequence numbers, stored outside the database so that it outlives it.
 
 Two lines of fixed length, each a number with its CRC-32, written in turn in place: a torn write spoils at most the
 line that was being written, and a full disk stops nothing.
@@ -15,7 +15,7 @@ _LINE_BYTES = 20
 
 
 class SequenceMark:
-    """The file of one folder. Not for use by two threads."""
+    """Mark file of one folder. Not safe for use by two threads."""
 
     def __init__(self, path: Path) -> None:
         """Read the file.
@@ -24,7 +24,7 @@ class SequenceMark:
             path: made by the first `save`.
 
         Raises:
-            OSError: it is there and cannot be read.
+            OSError: it exists and cannot be read.
         """
         self.path = path
         self.value = 0
@@ -43,7 +43,7 @@ class SequenceMark:
             self._older = lines.index(min(whole)) if len(whole) == 2 else lines.index(None)
 
     def next(self) -> int:
-        """Take the next number; `save` before anybody sees it.
+        """Take the next number; `save` before it is used anywhere.
 
         Raises:
             SequenceError: all numbers were given.
@@ -77,9 +77,6 @@ class SequenceMark:
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder durable.
 
-    Args:
-        folder: the folder.
-
     Raises:
         OSError: they may not be durable.
     """
@@ -91,7 +88,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _parsed(line: bytes) -> int | None:
-    """The number of a whole line."""
+    """Return the number of a valid line."""
     number, _, checksum = line.rstrip(b"\n").partition(b" ")
     if len(line) != _LINE_BYTES or not number.isdigit() or checksum != b"%08x" % zlib.crc32(number):
         return None

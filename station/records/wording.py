@@ -1,4 +1,4 @@
-"""What the records say to a person."""
+"""Texts of the records for people: curve, reason and fruit size as text."""
 
 from collections.abc import Sequence
 
@@ -44,20 +44,12 @@ def sparkline(values: Sequence[float | None]) -> str:
 
 
 def sentence(reason: str) -> str:
-    """A reason as a sentence, or itself where it is not one of the contract's.
-
-    Args:
-        reason: its name.
-    """
+    """Return a reason as a sentence, or unchanged if it is not one of the contract's."""
     return SENTENCES[Reason(reason)] if reason in set(Reason) else reason
 
 
 def size_sentence(size: FruitSize) -> str:
-    """The fruit's size as the PLC gave it, or that it gave none.
-
-    Args:
-        size: as the trigger has it.
-    """
+    """Describe the fruit's size as the PLC gave it, or that it gave none."""
     length = [] if size.length_mm is None else [f"fruit length {size.length_mm:.1f} mm"]
     named = [] if size.size_class is None else [f"class {size.size_class}"]
     given = ", ".join([*length, *named])
@@ -65,11 +57,7 @@ def size_sentence(size: FruitSize) -> str:
 
 
 def printable(text: str) -> str:
-    """Without what would command a terminal: a lot's name comes from outside.
-
-    Args:
-        text: lines of anything.
-    """
+    """Replace characters that would control a terminal: a lot's name comes from outside."""
     return "".join(letter if letter.isprintable() or letter == "\n" else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 

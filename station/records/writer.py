@@ -1,4 +1,4 @@
-"""The one thread that writes: it takes all requests that wait, and makes them durable with one commit."""
+"""Writer thread: takes all waiting requests, and makes them durable with one commit."""
 
 import contextlib
 import queue
@@ -24,11 +24,11 @@ from station.records.failures import in_words
 
 T = TypeVar("T")
 Work = Callable[[Connection], T]
-"""What a request does within the transaction, in the writer's thread. It may raise a `RecordsError`."""
+"""Part of the transaction, run in the writer's thread. It may raise a `RecordsError`."""
 
 LARGEST_BATCH = 128
 CONCERNING_ALL = (DamagedError, DiskError, DiskFullError, LockedError, ReadOnlyError)
-"""Faults of the disk or the file, after which a whole transaction is undone."""
+"""Faults of the disk or the file, which roll back the whole transaction."""
 
 
 class Writer:
@@ -45,8 +45,8 @@ class Writer:
 
         Args:
             connect: called in the thread, again after each failure.
-            before_commit: called in each transaction after its requests; what it raises fails them all.
-            after_commit: called after each commit, before the answers; it raises nothing.
+            before_commit: called in each transaction after its requests; if it raises, all of them fail.
+            after_commit: called after each commit, before the answers; never raises.
             place: the database's path, for messages.
 
         Raises:
@@ -70,13 +70,13 @@ class Writer:
 
     @property
     def waiting(self) -> int:
-        """Requests that wait."""
+        """Return the number of waiting requests."""
         return self._queue.qsize()
 
     def submit(self, work: Work[T]) -> Future[T]:
-        """Ask for a piece of work; cancelling the future withdraws it while it is not begun.
+        """Queue a request; cancelling the future withdraws it if it has not started.
 
-        What the answer to one piece asks for in turn, in the thread, is still done after `close`.
+        A request that an answer submits, in the thread, is still carried out after `close`.
 
         Args:
             work: runs in the thread.
@@ -93,7 +93,7 @@ class Writer:
         return future
 
     def close(self) -> None:
-        """Finish what waits and end the thread. Idempotent; blocks."""
+        """Finish the queue and end the thread. Idempotent; blocks."""
         with self._gate:
             if not self._closed:
                 self._closed = True
@@ -119,7 +119,7 @@ class Writer:
         self._disconnect()
 
     def _carry_out(self, batch: list[tuple[Work[Any], Future[Any]]]) -> None:
-        """One transaction, and then the answers."""
+        """Run one transaction, and then answer its requests."""
         answers: list[Any] = []
         try:
             if self._connection is None:
@@ -145,7 +145,7 @@ class Writer:
                 future.set_result(answer)
 
     def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
-        """The work's result, or why it alone failed and was undone; what concerns all is raised."""
+        """Return the request's result, or the error for which it alone was rolled back; raise errors of the whole."""
         savepoint = connection.begin_nested()
         try:
             result = work(connection)

@@ -1,4 +1,4 @@
-"""The requests that change the records, each a function of the writer's connection."""
+"""Write requests of the records, each a function of the writer's connection."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ LOST = "lost: the station ended before they were written"
 
 
 def utc_ms() -> int:
-    """Now, by the machine's clock."""
+    """Return the machine's clock, ms since 1970."""
     return time.time_ns() // 1_000_000
 
 
@@ -39,7 +39,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     """Begin an inspection.
 
     Raises:
-        BadRecordError: no outcome could ever be told of such a trigger.
+        BadRecordError: no outcome could ever be published for such a trigger.
     """
     recipe = trigger.recipe
     if recipe is not None:
@@ -71,7 +71,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
 
 
 def withdraw(connection: Connection, sequence: int) -> None:
-    """Take back an inspection whose caller had gone when it was durable; its number is not given again."""
+    """Withdraw an inspection whose caller was gone when it was durable; its number is not given again."""
     connection.execute(delete(inspections).where(inspections.c.sequence == sequence, inspections.c.outcome.is_(None)))
     add_event(connection, "begin_withdrawn", sequence, {})
 
@@ -79,16 +79,14 @@ def withdraw(connection: Connection, sequence: int) -> None:
 def conclude(
     connection: Connection, sequence: int, record: InspectionRecord, images_states: Mapping[str, str]
 ) -> tuple[Outcome, str | None]:
-    """Record how an inspection ended, unless that is recorded already.
+    """Store how an inspection ended, unless it is stored already.
 
     Args:
-        connection: the writer's.
-        sequence: which one.
-        record: how it ended.
-        images_states: what to say of its images, by the outcome that decides: `PASS` or `other`.
+        record: its result.
+        images_states: state of its images, by the outcome that decides: `PASS` or `other`.
 
     Returns:
-        The outcome that stands, and what is said of the images; None where this record was not taken.
+        The outcome in force, and the images' state; None if this record was not taken.
     """
     row = _row(connection, sequence)
     standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
@@ -133,7 +131,7 @@ def conclude(
 
 
 def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:
-    """Note what the PLC was told, unless that is noted already; True the first time."""
+    """Store that the PLC was given an outcome, unless it is stored already; True the first time."""
     table = inspections.c
     found = connection.execute(
         select(table.published_utc_ms, table.standing).where(table.sequence == outcome.sequence)
@@ -156,18 +154,18 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
 
 
 def tell(connection: Connection, kind: OutboxKind, row: int) -> None:
-    """Have other systems told of a row: an inspection when it is published, and again when it changes after that.
+    """Queue a row for other systems: an inspection when it is published, and again when it changes after that.
 
     Args:
-        connection: the writer's, in the transaction that makes it so.
-        kind: of what.
+        connection: the writer's, in the transaction of the change.
+        kind: of the row.
         row: its sequence, id or number.
     """
     connection.execute(insert(outbox).values(kind=kind, row=row))
 
 
 def acknowledge(connection: Connection, sequence: int) -> int:
-    """Note that the PLC has taken what was published up to this sequence; how many that were."""
+    """Store that the PLC has taken the published outcomes up to this sequence; returns their number."""
     table = inspections.c
     return connection.execute(
         update(inspections)
@@ -177,7 +175,7 @@ def acknowledge(connection: Connection, sequence: int) -> int:
 
 
 def end_what_was_left(connection: Connection) -> list[int]:
-    """After a start: what was not surely delivered becomes NO_RESULT with `station_lost`.
+    """End, after a start, what was not surely delivered: NO_RESULT with `station_lost`.
 
     Returns:
         The sequences.
@@ -202,7 +200,7 @@ def end_what_was_left(connection: Connection) -> list[int]:
 
 
 def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequence[AlarmEntry]) -> None:
-    """Remember these alarms and no others, and append to the log."""
+    """Store these alarms and no others, and append to the log."""
     connection.execute(delete(alarms))
     if active:
         connection.execute(insert(alarms), [asdict(row) for row in active])
@@ -211,7 +209,7 @@ def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequ
 
 
 def add_counts(connection: Connection, by: Mapping[str, int]) -> dict[str, int]:
-    """Add to counters and give all."""
+    """Add to counters and return all."""
     for name, number in by.items():
         row = upsert(counters).values(name=name, value=number)
         connection.execute(row.on_conflict_do_update(["name"], set_={"value": counters.c.value + number}))
@@ -225,7 +223,7 @@ def add_event(connection: Connection, name: str, sequence: int | None, details: 
 
 
 def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: str) -> None:
-    """Reference images whose files are durable, and say how many were kept."""
+    """Add rows for images whose files are durable, and the number of stored images."""
     if rows:
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
     table = inspections.c
@@ -242,7 +240,7 @@ def _row(connection: Connection, sequence: int) -> Any:
 
 
 def _lost(begun: Mapping[str, Any]) -> Outcome:
-    """What the PLC is to be told of an inspection that was not surely delivered."""
+    """Return the outcome for the PLC of an inspection that was not surely delivered."""
     return _outcome(
         begun,
         outcome="NO_RESULT",
@@ -259,7 +257,7 @@ def _lost(begun: Mapping[str, Any]) -> Outcome:
 
 
 def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
-    """What the PLC is to be told of a record."""
+    """Return the outcome for the PLC of a record."""
     if bool(record.reasons) == (record.outcome == "PASS"):
         raise BadRecordError(f"inspection {begun['sequence']}: {record.outcome} with {record.reasons}", "see the log")
     return _outcome(
@@ -297,7 +295,7 @@ def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
 
 
 def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
-    """An inspection that only its outcome is known of: it was begun in a database that was moved aside."""
+    """Insert an inspection of which only the outcome is known: it began in a database that was moved aside."""
     connection.execute(
         insert(inspections).values(
             sequence=outcome.sequence,

@@ -1,4 +1,4 @@
-"""The audit trail, to which rows can only be appended, and the recipes' revisions."""
+"""Schema: the audit trail, to which rows can only be appended, and the recipes' revisions."""
 
 import sqlalchemy as sa
 from alembic import op
