@@ -1,4 +1,4 @@
-"""What the processes log: JSON lines for machines, or lines for a person at a terminal."""
+"""Logging of the processes: JSON lines for machines, or text lines for a person at a terminal."""
 
 import logging
 import re

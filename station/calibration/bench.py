@@ -1,4 +1,4 @@
-"""What a ball is pressed with, and who lays it in: asked for by a procedure, given by whoever runs it."""
+"""Calibration rig: the interface through which a procedure presses a ball."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from station.vision.contact import Image
 
 
 class Place(NamedTuple):
-    """Where the ball lies on the gel, from its first place."""
+    """Place of the ball on the gel, relative to its first place."""
 
     x_mm: float
     y_mm: float
@@ -16,7 +16,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """The sensor that is looked at."""
+    """Identity of the sensor."""
 
     serial: str
     name: str
@@ -25,48 +25,40 @@ class Unit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pressed:
-    """The fingers at a width."""
+    """Frames at one width."""
 
     width_mm: float
     """Measured."""
     frames: Sequence[Image]
-    """Sound ones, all captured after the fingers had come to rest."""
+    """Frames without faults, all captured after the fingers had come to rest."""
 
 
 class Bench(Protocol):
     """Gripper and camera with a ball between them."""
 
     async def untouched(self, number: int) -> Sequence[Image]:
-        """Open the jaws and take frames of the untouched gel.
-
-        Args:
-            number: how many.
-        """
+        """Open the jaws and take frames of the untouched gel."""
         ...
 
     async def press_to(self, width_mm: float) -> Pressed:
-        """Go to a width, let the gel come to rest, take a step's frames.
-
-        Args:
-            width_mm: the width to ask for.
-        """
+        """Move to a width, let the gel settle, take a step's frames."""
         ...
 
     async def lay(self, place: Place) -> None:
-        """With the jaws open, have the ball laid at another place; returns once it lies there.
+        """Have the ball laid at another place, with the jaws open; returns once it is there.
 
         Args:
-            place: where, from the first one.
+            place: relative to the first place.
         """
         ...
 
     async def release(self) -> None:
-        """Open the jaws, whatever happened; raises what keeps them closed."""
+        """Open the jaws in any case; raises the reason if they remain closed."""
         ...
 
 
 class Progress(NamedTuple):
-    """What a procedure is doing."""
+    """Progress of a procedure."""
 
     number: int
     """Of this stage, from 1."""
@@ -76,4 +68,4 @@ class Progress(NamedTuple):
 
 
 Tell = Callable[[Progress], None]
-"""Gets every progress."""
+"""Called with every progress."""

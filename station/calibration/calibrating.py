@@ -1,7 +1,7 @@
-"""The calibration of one unit, step by step: the paper's ball, 46 to 33 mm, then at further places.
+"""Calibration procedure of one unit: the paper's ball, 46 to 33 mm, then at further places.
 
-What a ball can tell and what not (decision 0022): the area over closing depends on how gel, ball and sponge share the
-closing, so it gives no scale. A scale needs a known length on the gel: the way from one place of the ball to another.
+Limits of the method (decision 0022): the area over closing depends on how gel, ball and sponge share the closing, so
+it gives no scale. A scale needs a known length on the gel: the distance from one place of the ball to another.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 NOISE_FRAMES = 30
 _PLACES_CLOSING_MM = 2.0
-"""Deep enough for a good centre, shallow enough to stay inside the field beside the middle."""
+"""Deep enough for a good centre, shallow enough to stay inside the field also away from the middle."""
 _LEAST_WAY_MM = 2.0
 
 TEXTS = {
@@ -53,7 +53,7 @@ class Draft:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What was seen of a calibration, however far it came."""
+    """Measurements of a calibration, complete or not."""
 
     reference: Image | None
     steps: tuple[Step, ...]
@@ -62,11 +62,11 @@ class Evidence:
 
 
 class _Measured(NamedTuple):
-    """What the result is judged by."""
+    """Values that the result is judged by."""
 
     reference: Image
     frames: Sequence[Image]
-    """With nothing touching."""
+    """With nothing touching the gel."""
     steps: Sequence[Step]
     onset_mm: float
     noise: Noise
@@ -74,17 +74,14 @@ class _Measured(NamedTuple):
 
 
 class Calibrating:
-    """One run. Nothing is stored; what is called off leaves the jaws open.
+    """One run. It stores nothing; when it is cancelled the jaws open.
 
     Args:
-        bench: gripper, camera, ball.
-        unit: the sensor.
         recipe: the ball's width steps.
         settings: ball and limits.
-        places: where the ball is laid after its first place.
-        operator: who does it.
+        places: further places of the ball.
         program: this program's version.
-        tell: gets the progress.
+        tell: called with the progress.
     """
 
     def __init__(
@@ -109,15 +106,15 @@ class Calibrating:
 
     @property
     def evidence(self) -> Evidence:
-        """What was seen until now."""
+        """Return the measurements until now."""
         return Evidence(self._press.reference, tuple(self._pressed), self._checks)
 
     async def run(self) -> Draft:
-        """Calibrate once. The gripper closes on the ball again and again, and lets it go before the result is judged.
+        """Calibrate once. The gripper presses the ball repeatedly, and releases it before the result is judged.
 
         Raises:
-            RefusedError: what was measured is no calibration, with every reason.
-            StationError: a device's fault; by then the jaws were told to open.
+            RefusedError: the result is no valid calibration, with every reason.
+            StationError: a device's fault; by then the jaws were commanded to open.
         """
         try:
             measured = await self._measure()

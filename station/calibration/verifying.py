@@ -1,4 +1,4 @@
-"""The check at the shift's start: the same ball against the stored calibration, and the gel's health from it."""
+"""Verification procedure at the shift's start: the same ball against the stored calibration, and the gel's health."""
 
 import asyncio
 import logging
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 _NOISE_FRAMES = 9
 _EVERY = 2
-"""Of the calibration's widths, this often one is pressed."""
+"""Every so many of the calibration's widths one is pressed."""
 _SOUND = {
     Ill.TEAR: "no tear is seen",
     Ill.DIRT: "no dirt is seen",
@@ -39,21 +39,16 @@ class Verified:
     verification: Verification
     reference: Image
     pictures: dict[str, Image]
-    """By their file names."""
+    """By file name."""
 
 
 class Verifying:
     """One run; the jaws are open afterwards.
 
     Args:
-        bench: gripper, camera, ball.
-        recipe: the ball's.
-        settings: the tolerances.
-        calibration: the unit's.
         golden: the calibration's picture of the untouched gel.
         presses: the calibration's pictures of the ball, in the order of its curve.
-        operator: who does it.
-        tell: gets the progress.
+        tell: called with the progress.
     """
 
     def __init__(
@@ -76,7 +71,7 @@ class Verifying:
         """Verify once. The gripper closes on the ball.
 
         Raises:
-            StationError: a device's fault; by then the jaws were told to open. A bad gel or ball raises nothing.
+            StationError: a device's fault; by then the jaws were commanded to open. A bad gel or ball raises nothing.
         """
         try:
             verified = await self._run()
@@ -119,7 +114,7 @@ class Verifying:
         return Verified(verification, reference, pictures)
 
     async def _press_ball(self) -> tuple[list[Step], float | None]:
-        """The first image, without contact, then every second width that showed a whole contact, and the onset."""
+        """Measure without contact, at every second width that showed a whole contact, and the onset."""
         reach_mm = self._recipe.steps.result_closings_mm[-1]
         whole = figures.judged(self._calibration.curve, self._calibration.onset_mm, reach_mm)
         widths = [self._calibration.curve[0].width_mm, *(point.width_mm for point in whole[::_EVERY])]
@@ -161,9 +156,5 @@ class Verifying:
 
 
 def outlined(step: Step) -> Image:
-    """A step's picture with its contact's outline.
-
-    Args:
-        step: as measured.
-    """
+    """Draw a contact's outline into its step's picture."""
     return gel.outlined(step.image, step.contact.mask)

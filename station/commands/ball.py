@@ -33,12 +33,11 @@ async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncI
     """Open the devices that the site names, for this program alone.
 
     Args:
-        site: the configuration.
         bench: leave the arm out, as the site's own setting does.
-        yes: the operator is not asked.
+        yes: do not wait for the operator.
 
     Raises:
-        CalibrationError: the station runs and has the devices.
+        CalibrationError: the station runs and has the devices open.
         BadInputError: the camera has no serial number.
         StationError: a device's fault.
     """
@@ -77,7 +76,7 @@ async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncI
 
 
 async def _answered(request: str) -> None:
-    """Wait for a person's Enter; Ctrl-C ends the wait, and an input that has ended calls everything off."""
+    """Wait for a person's Enter; Ctrl-C ends the wait, and the end of the input cancels the run."""
     click.echo(request)
     loop, line = asyncio.get_running_loop(), asyncio.Event()
     try:
@@ -93,7 +92,7 @@ async def _answered(request: str) -> None:
 
 
 def _lock(site: Configuration) -> int:
-    """Keep the station out, which has this lock for as long as it runs."""
+    """Take the lock that a station has while it runs."""
     try:
         return lock_folder(records_folder(site.home))
     except LockedError as error:
@@ -103,7 +102,7 @@ def _lock(site: Configuration) -> int:
 
 
 def cancelled_by_signals() -> None:
-    """Let Ctrl-C, and what ends a service, cancel the task that calls this."""
+    """Let Ctrl-C, and the signal that ends a service, cancel the calling task."""
     task = asyncio.current_task()
     assert task is not None  # noqa: S101 (called from a coroutine)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -111,10 +110,6 @@ def cancelled_by_signals() -> None:
 
 
 def show(progress: Progress) -> None:
-    """Tell a person what is done.
-
-    Args:
-        progress: of a procedure.
-    """
+    """Print a procedure's progress."""
     count = f"{progress.number:2}/{progress.of}" if progress.of > 1 else ""
     click.echo(f"{progress.title:28}{count:8}{progress.detail}".rstrip())

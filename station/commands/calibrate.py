@@ -1,4 +1,4 @@
-"""`station calibrate`: what this sensor on this gripper makes of a ball of known size."""
+"""`station calibrate`: calibrate the sensor on its gripper with a ball of known size."""
 
 import asyncio
 import getpass
@@ -25,18 +25,12 @@ _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FIL
 
 
 class _PlaceType(click.ParamType):
-    """A place of the ball, `x,y` in mm."""
+    """Place of the ball, `x,y` in mm."""
 
     name = "x,y"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Place:
-        """Read a place.
-
-        Args:
-            value: as typed.
-            param: click's.
-            ctx: click's.
-        """
+        """Read a place."""
         if isinstance(value, Place):
             return value
         try:
@@ -72,8 +66,8 @@ def calibrate(
 ) -> None:
     """Calibrate the sensor with the rubber ball, and store the result. The gripper closes on the ball.
 
-    The station must not run meanwhile. A result that is no good is no calibration: the reasons are told, and where its
-    pictures lie. Called off with Ctrl-C, nothing is stored.
+    The station must not run meanwhile. A result that fails a check is not stored as a calibration: the reasons are
+    printed, and the folder of its pictures. Cancelled with Ctrl-C, nothing is stored.
     """
     if context.invoked_subcommand is not None:
         return
@@ -86,7 +80,7 @@ def calibrate(
 
 
 def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:
-    """Keep the pictures by which a person sees why."""
+    """Store the pictures that show a person the reasons."""
     refusal = Refusal(
         id=stamp(datetime.now(UTC)),
         serial=unit.serial,
@@ -137,9 +131,9 @@ def _tell(checks: tuple[Check, ...]) -> None:
 @calibrate.command("simulated")
 @_CONFIG
 def simulated_command(config: Path | None) -> None:
-    """Calibrate the twin's sensor where it never was, in a few seconds: on a drawn ball at three places.
+    """Calibrate the twin's sensor if it never was, in a few seconds: on a drawn ball at three places.
 
-    No device is asked, so that the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
+    No device is used, so the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
     """
     site = load_configuration(config)
     if site.camera.driver != "twin":
@@ -172,7 +166,7 @@ def list_command(config: Path | None) -> None:
 @click.argument("name", metavar="ID")
 @_CONFIG
 def show_command(name: str, config: Path | None) -> None:
-    """Show one calibration: its numbers, its checks, and where its page lies."""
+    """Show one calibration: its numbers, its checks, and the path of its page."""
     store = CalibrationStore(load_configuration(config).home)
     calibration = store.find(name)
     click.echo(f"{calibration.serial}, {calibration.unit}, by {calibration.operator}")

@@ -1,4 +1,4 @@
-"""A calibration stored and audited in one step, for the commands."""
+"""Calibration storage for the commands: the calibration and its audit entry in one step."""
 
 from pathlib import Path
 
@@ -13,12 +13,7 @@ from station.settings.configuration import Configuration
 
 
 def store_calibration(site: Configuration, operator: str, draft: Draft) -> Path:
-    """Store a calibration and tell the audit trail, or neither where one of them cannot be written.
-
-    Args:
-        site: whose home it goes to.
-        operator: who calibrated.
-        draft: what was found.
+    """Store a calibration and its audit entry, or neither if one of them cannot be written.
 
     Raises:
         StationError: nothing was stored.

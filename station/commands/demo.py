@@ -1,4 +1,4 @@
-"""`station demo`: the whole station against the simulated world, fruit after fruit, on the real protocols."""
+"""`station demo`: the whole station with the simulated world and line, on the real protocols."""
 
 import asyncio
 import os
@@ -61,11 +61,11 @@ def demo(
     graded: bool,  # noqa: FBT001 (click passes arguments by name)
     faults: bool,  # noqa: FBT001
 ) -> None:
-    """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
+    """Run the station against the twin, with a line that feeds fruit, triggers, and reads the outcomes.
 
-    Arm, gripper, sensor and PLC are simulated, what is between them is real: RTDE, the gripper's socket, camera frames
-    and Modbus TCP. The first time, the simulated sensor is calibrated by a drawn ball, in a few seconds. Logs and
-    records lie in the home folder's `demo`.
+    Arm, gripper, sensor and PLC are simulated, the protocols between them are real: RTDE, the gripper's socket, camera
+    frames and Modbus TCP. The first time, the simulated sensor is calibrated by a drawn ball, in a few seconds. Logs
+    and records are in the home folder's `demo`.
     """
     asked = load_configuration()
     os.environ["STATION_HOME"] = str(asked.home.resolve() / "demo")
@@ -86,7 +86,7 @@ def demo(
 
 
 def _refuse_real_devices(site: Configuration) -> None:
-    """A demonstration must not move a real arm because a site's configuration happens to be in force."""
+    """Refuse a configuration of real devices: a demonstration must not move a real arm."""
     hosts = {
         "arm.host": site.arm.host,
         "gripper.urcap.host": site.gripper.urcap.host,
@@ -155,7 +155,7 @@ async def _inspect(
 
 
 def _sketch(site: Configuration, sequence: int) -> str:
-    """A result's area over closing, from the station's records."""
+    """Draw a result's area over closing, from the station's records."""
     folder = records_folder(site.home)
     try:
         with reading(folder) as connection:

@@ -1,4 +1,4 @@
-"""`station records`: ask what happened."""
+"""`station records`: query the records."""
 
 from pathlib import Path
 
@@ -17,14 +17,14 @@ from station.records.search import LARGEST_PAGE, Query, find_page
 
 @click.group()
 def records() -> None:
-    """Ask what was inspected, and why it ended as it did; hand it on, and keep it safe."""
+    """Query inspections and their explanations; export them, and back them up."""
 
 
 @records.command()
 @click.argument("sequence", type=click.IntRange(1, 2**32 - 1))
 @config_option
 def show(sequence: int, config: Path | None) -> None:
-    """Show all that is known of the inspection with the number SEQUENCE: why it ended so, its curve, its images."""
+    """Show everything stored of the inspection with the number SEQUENCE: explanation, curve, images."""
     folder = folder_of(config)
     with reading(folder) as connection:
         click.echo(described(read_inspection(connection, sequence, folder)))
@@ -36,7 +36,7 @@ def show(sequence: int, config: Path | None) -> None:
 @query_options
 @config_option
 def list_last(last: int, below: int | None, query: Query, config: Path | None) -> None:
-    """List the last inspections, newest first; all conditions given have to hold."""
+    """List the last inspections, newest first; all conditions given have to be met."""
     found: list[Summary] = []
     with reading(folder_of(config)) as connection:
         while len(found) < last:
@@ -54,7 +54,7 @@ def list_last(last: int, below: int | None, query: Query, config: Path | None) -
 @click.argument("number", type=click.IntRange(0, 2**32 - 2))
 @config_option
 def continue_after(number: int, config: Path | None) -> None:
-    """Number the next inspection NUMBER + 1, where the station lost count; never lower than it knows itself."""
+    """Number the next inspection NUMBER + 1, if the station lost count; never lower than its own records."""
     set_mark(folder_of(config), number)
     click.echo(f"the next inspection is number {number + 1}")
 

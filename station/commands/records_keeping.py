@@ -1,4 +1,4 @@
-"""`station records`: lots, holds, copies and checks."""
+"""`station records`: lots, holds, backups and checks."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,7 +26,7 @@ _as_lot = click.option("--lot", "is_lot", is_flag=True, help="THING is a lot's n
 
 @click.group()
 def lot() -> None:
-    """Tell of lots: which grower's, and when they begin and end. The PLC gives only their names."""
+    """Register lots: grower, start and end. The PLC gives only their names."""
 
 
 @lot.command("start")
@@ -36,7 +36,7 @@ def lot() -> None:
 @by_option
 @config_option
 def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:
-    """Tell that the lot NAME begins. Doing so again changes nothing."""
+    """Register that the lot NAME starts. Repeating it changes nothing."""
     with changing(folder_of(config)) as connection:
         known = {row.name: row for row in read_lots(connection, 1, name=name)}.get(name)
         started = start_lot(connection, name, grower, correct=correct)
@@ -52,7 +52,7 @@ def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | 
 @by_option
 @config_option
 def lot_end(name: str, by: str, config: Path | None) -> None:
-    """Tell that the lot NAME has ended. Doing so again changes nothing."""
+    """Register that the lot NAME has ended. Repeating it changes nothing."""
     with changing(folder_of(config)) as connection:
         running = any(row.ended_utc_ms is None for row in read_lots(connection, 1, name=name))
         ended = end_lot(connection, name)
@@ -66,7 +66,7 @@ def lot_end(name: str, by: str, config: Path | None) -> None:
 @click.option("--last", metavar="N", default=20, show_default=True, type=click.IntRange(1, 100_000), help="How many.")
 @config_option
 def lot_list(grower: str | None, last: int, config: Path | None) -> None:
-    """List the lots told of, newest first."""
+    """List the registered lots, newest first."""
     with reading(folder_of(config)) as connection:
         for row in read_lots(connection, last, grower):
             click.echo(_lot_line(row))
@@ -79,7 +79,7 @@ def lot_list(grower: str | None, last: int, config: Path | None) -> None:
 @by_option
 @config_option
 def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
-    """Keep the images of an inspection, or of all of a lot, whatever the quota says."""
+    """Hold the images of an inspection, or all images of a lot: the quota does not remove them."""
     with changing(folder_of(config)) as connection:
         before = read_holds(connection)
         held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
@@ -95,7 +95,7 @@ def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None)
 @by_option
 @config_option
 def release(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
-    """Let the images that were held go where the quota wants their space."""
+    """Release held images: the quota may remove them."""
     with changing(folder_of(config)) as connection:
         released = release_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
         entry = AuditEntry(by, _ROLE, "images.released", released.what, reason, {"held for": released.reason})
@@ -118,7 +118,7 @@ def holds(config: Path | None) -> None:
 def backup(directory: Path, config: Path | None) -> None:
     """Copy the database and all images to the new folder DIR, also while the station runs, and verify the copy.
 
-    DIR appears when it is complete and on the disk; it must not be there before.
+    DIR appears when it is complete and on the disk; it must not exist before.
     """
     made = make_backup(folder_of(config), directory)
     click.echo(f"{directory}: {made.inspections} inspections, {made.images} images, {made.size_bytes} bytes, verified")
@@ -133,7 +133,7 @@ def backup(directory: Path, config: Path | None) -> None:
 @by_option
 @config_option
 def restore(directory: Path, by: str, config: Path | None) -> None:
-    """Put the backup in DIR in the place of the records, while no station runs. What is there is moved aside."""
+    """Replace the records by the backup in DIR, while no station runs. The present records are moved aside."""
     restored = restore_backup(folder_of(config), directory, by)
     click.echo(f"restored {restored.inspections} inspections and {restored.images} images from {directory}")
     if restored.aside is not None:
@@ -143,9 +143,9 @@ def restore(directory: Path, by: str, config: Path | None) -> None:
 @click.command()
 @config_option
 def check(config: Path | None) -> None:
-    """Check all of the database, and every image against its name, also while the station runs; exit code 1 for faults.
+    """Check the whole database, and every image against its name, also while the station runs; exit code 1 for faults.
 
-    It changes nothing. Files without a row and rows without a file are put right at the station's next start.
+    It changes nothing. The station's next start repairs files without a row and rows without a file.
     """
     found = check_records(folder_of(config))
     for fault in found.faults:

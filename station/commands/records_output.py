@@ -1,4 +1,4 @@
-"""`station records`: what is handed on to other programs and people."""
+"""`station records`: exports and reports for other programs and people."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from station.records.search import Query
 @query_options
 @config_option
 def export(file: Path, query: Query, config: Path | None) -> None:
-    """Write inspections to FILE, one row each: .csv or .parquet by its ending; all, or those that a condition finds."""
+    """Write inspections to FILE, one row each: .csv or .parquet by its suffix; all, or those of the conditions."""
     if file.suffix not in SUFFIXES:
         raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(SUFFIXES)}")
     click.echo(f"{file}: {write_export(folder_of(config), query, file)} inspections")
@@ -29,7 +29,7 @@ def export(file: Path, query: Query, config: Path | None) -> None:
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @config_option
 def report(lot: str, file: Path, config: Path | None) -> None:
-    """Write a report of the lot LOT to FILE: .html or .pdf by its ending, one file that needs no other."""
+    """Write a report of the lot LOT to FILE: .html or .pdf by its suffix, one file that needs no other."""
     if file.suffix not in WAYS:
         raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(WAYS)}")
     summary = summarise(folder_of(config), lot)

@@ -1,4 +1,4 @@
-"""`station verify`: the check at the shift's start, with the ball against the stored calibration."""
+"""`station verify`: verification of the sensor at the shift's start, with the ball."""
 
 import asyncio
 import getpass

@@ -1,4 +1,4 @@
-"""`station whatif`: what would a draft of a recipe have done with the fruit that were inspected?"""
+"""`station whatif`: stored inspections judged again by a draft of a recipe."""
 
 import os
 import sys
@@ -42,8 +42,8 @@ def whatif(
     """Judge stored inspections again by DRAFT, and show which fruit would have changed sides.
 
     Fruit that people have marked good or bad are counted by the errors. Writes DIR/whatif.html, changes.csv and
-    summary.json. A run that was ended goes on where it was. What cannot be
-    known, as where a curve was stopped early, is counted apart and never guessed.
+    summary.json. An interrupted run continues when it is repeated. What cannot
+    be known, as after an early stop, is counted apart and never guessed.
     """
     site = load_configuration(config)
     draft, folder = find_recipe(recipe_name, site.recipes_folder), records_folder(site.home)
