@@ -1,4 +1,4 @@
-"""One image file in, one colour image out: checked before a pixel is believed."""
+"""Image decoding: one checked image file in, one colour image out."""
 
 import os
 import warnings
@@ -23,23 +23,19 @@ _MODES = {"P": "palette", "PA": "palette", "CMYK": "CMYK", "LAB": "CIELAB"}
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A colour image and what had to be converted to get it."""
+    """Colour image, with the conversions that it needed."""
 
     image: Image
     conversions: tuple[str, ...]
 
 
 def shown(name: Path | str) -> str:
-    """A name as it can be written: bytes of it that are no UTF-8 are escaped.
-
-    Args:
-        name: a path or a part of one.
-    """
+    """Return a printable name: bytes that are no UTF-8 are escaped."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def decode_file(path: Path) -> Decoded:
-    """Read an image file as stored, without turning it by its EXIF data.
+    """Read an image file as stored, without rotation by its EXIF data.
 
     Args:
         path: a JPEG, PNG, BMP, TIFF, WebP or PPM file.
@@ -67,9 +63,9 @@ def decode_file(path: Path) -> Decoded:
 
 
 def _checked(path: Path, data: bytes) -> list[str]:
-    """Refuse what is no image, absurd in size or cut short; say what OpenCV will convert without a word.
+    """Refuse a file that is no image, of absurd size or truncated; report conversions that OpenCV does silently.
 
-    OpenCV alone fills the missing part of a truncated JPEG with grey and says nothing.
+    OpenCV alone fills the missing part of a truncated JPEG with grey, without an error.
     """
     if not data:
         raise BadInputError(f"{shown(path)}: the file is empty; copy it again")
@@ -94,7 +90,7 @@ def _checked(path: Path, data: bytes) -> list[str]:
 
 
 def to_colour(path: Path, raw: np.ndarray) -> Decoded:
-    """Make BGR with 8 bits of whatever was stored, and say what was done.
+    """Convert any stored format to 8-bit BGR, and return the conversions.
 
     Args:
         path: for the message.

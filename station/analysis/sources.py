@@ -1,4 +1,4 @@
-"""What the user names on the command line, as an ordered list of images that are decoded when needed."""
+"""Image sources: the user's files, folders and videos as an ordered list of images, decoded when needed."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,37 +19,37 @@ _LONGEST_STEM_BYTES = 200
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One image that can be asked for."""
+    """One image, decoded on demand."""
 
     name: str
     """The file's name, or the video's name with the frame's number."""
     stem: str
-    """The name that its mask and stages get."""
+    """Name of its mask and stages."""
     load: Callable[[], Decoded]
     """Decodes it; raises BadInputError."""
     refused: bool = False
-    """It is known already that it cannot be loaded."""
+    """Known not to be loadable."""
     place: int = -1
-    """The number of its folder or video among those named; -1 for a file that was named by itself."""
+    """Index of its folder or video among those named; -1 for a file that was named by itself."""
     from_video: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """The sources found, and the other files that were passed over in folders."""
+    """The sources found, and the other files of the folders, which are skipped."""
 
     sources: tuple[Source, ...]
     passed_over: tuple[Path, ...]
 
 
 def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listing:
-    """Find the images under the places: files in the order given, a folder's files in natural order.
+    """Find the images of the places: files in the given order, a folder's files in natural order.
 
-    A folder's files that are no images by their suffix, and the reference itself, are passed over.
+    A folder's files without an image's suffix, and the reference itself, are skipped.
 
     Args:
         places: image files, folders or videos.
-        reference: a file that is not to be measured, where it lies in one of the folders.
+        reference: a file that is not measured, also inside one of the folders.
 
     Returns:
         A place that has no images, or cannot be listed, is a source that fails when it is loaded.
@@ -77,10 +77,10 @@ def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listi
 
 
 def load_references(place: Path) -> list[Decoded]:
-    """Load the untouched gel: one image, or the images of a folder or video of it.
+    """Load the untouched gel: one image, or the images of a folder or video.
 
     Args:
-        place: an image file, a folder or a video; of many frames the first 32 are used.
+        place: an image file, a folder or a video; only the first 32 frames are used.
 
     Raises:
         BadInputError: one of them cannot be read, or they differ in size.
@@ -132,7 +132,7 @@ def _refused_source(place: Path, error: BadInputError) -> Source:
 
 
 def _video_sources(path: Path) -> Iterator[Source]:
-    """List a video's frames; each is decoded in turn, since seeking in a compressed video is not exact."""
+    """List a video's frames; they are decoded in order, because seeking in a compressed video is not exact."""
     if not path.is_file():
         raise BadInputError(f"{shown(path)}: there is no such file")
     frames = _Video(path)
@@ -145,7 +145,7 @@ def _video_sources(path: Path) -> Iterator[Source]:
 
 
 class _Video:
-    """A video read forwards, one frame at a time."""
+    """Video read forwards, one frame at a time."""
 
     def __init__(self, path: Path) -> None:
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what FFmpeg says of a bad file names no remedy
@@ -157,7 +157,7 @@ class _Video:
         self._next = 0
 
     def _count(self) -> int:
-        """Count by decoding."""
+        """Count the frames by decoding."""
         capture = cv2.VideoCapture(str(self._path))
         count = 0
         while capture.grab():
@@ -181,7 +181,7 @@ class _Video:
 
 
 def _refuse_equal_stems(sources: Iterable[Source]) -> None:
-    """Two images of one stem would write one mask."""
+    """Refuse two images of one stem: they would write one mask."""
     seen: dict[str, str] = {}
     for source in sources:
         if source.stem in seen:

@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 _NOISE_FRAMES = 9
 _EVERY = 2
-"""Every so many of the calibration's widths one is pressed."""
+"""One of so many widths of the calibration is pressed."""
 _SOUND = {
     Ill.TEAR: "no tear is seen",
     Ill.DIRT: "no dirt is seen",

@@ -1,4 +1,4 @@
-"""What a look at a device found."""
+"""Device check result: one line of `station devices check`."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,7 +10,7 @@ class Finding:
 
     device: str
     found: str
-    """What answered, and where."""
+    """Device and address that answered."""
     verdict: Literal["ok", "warning", "fault"]
     remedy: str
-    """What a person is to do; empty where the verdict is ok."""
+    """Remedy; empty if the verdict is ok."""

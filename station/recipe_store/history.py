@@ -1,4 +1,4 @@
-"""The history in the records' database: each change is one transaction with its row of the audit trail."""
+"""Recipe history in the records' database: each change is one transaction with its audit entry."""
 
 from dataclasses import asdict, replace
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from station.settings.recipe_model import Recipe
 
 
 class Person(NamedTuple):
-    """Who acts, and why."""
+    """Person who changes a recipe, and the reason."""
 
     who: str
     role: str
@@ -23,11 +23,10 @@ class Person(NamedTuple):
 
 
 def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
-    """The revisions by name, oldest first.
+    """Read the revisions by name, oldest first.
 
     Args:
-        connection: any.
-        name: of one recipe; all where empty.
+        name: of one recipe; all if empty.
     """
     query = select(recipe_revisions).order_by(recipe_revisions.c.name, recipe_revisions.c.revision)
     if name:
@@ -36,16 +35,16 @@ def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
 
 
 def submit(connection: Connection, text: str, recipe: Recipe, person: Person) -> Revision:
-    """Record a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
+    """Store a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         text: the file's.
-        recipe: what the text says.
+        recipe: the parsed text.
         person: the author.
 
     Raises:
-        RecipeStoreError: it is what is approved already, or a draft of somebody else's waits.
+        RecipeStoreError: it is approved already, or another person's draft waits.
     """
     known = read_revisions(connection, recipe.name)
     approved, draft = _with(known, Status.APPROVED), _with(known, Status.DRAFT)
@@ -71,12 +70,12 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
 
 
 def approve(connection: Connection, wanted: Revision, file: Recipe | None, person: Person) -> Revision:
-    """Let fruit be inspected by a draft from the next lot on; the revision approved before is retired.
+    """Put a draft in force from the next lot on; the revision approved before is retired.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         wanted: the draft, as the approver has seen it.
-        file: what the recipe's file says now; None where it says nothing good.
+        file: the recipe's file now; None if it is invalid.
         person: the approver.
 
     Raises:
@@ -114,12 +113,12 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
 
 
 def retire(connection: Connection, wanted: Revision, person: Person) -> Revision:
-    """Take a revision out of use: a draft is rejected; of an approved one no lot begins any more.
+    """Take a revision out of use: a draft is rejected; no lot begins with an approved one any more.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         wanted: a draft or an approved one.
-        person: who retires it.
+        person: who retires it, and why.
 
     Raises:
         RecipeStoreError: it is retired already.
@@ -131,12 +130,12 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
 
 
 def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str) -> Revision:
-    """Record a recipe that is approved by where it comes from, in the place of what was approved before.
+    """Store a recipe that is approved by its origin, in place of the revision approved before.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         text: its file's.
-        recipe: what the text says.
+        recipe: the parsed text.
         origin: shipped or adopted.
         who: the distribution, or the station.
         reason: why it counts as approved.

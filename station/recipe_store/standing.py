@@ -1,4 +1,4 @@
-"""Which recipe is in force, and what its file says beside it: the files and the history put together, purely."""
+"""Recipe state: the revision in force and the state of the file, computed from files and history."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from station.settings.recipe_model import Recipe
 
 
 class FileState(StrEnum):
-    """What a recipe's file is beside the approved revision."""
+    """State of a recipe's file, compared with the approved revision."""
 
     APPROVED = "approved"
-    """It says what the approved revision says."""
+    """The same values as the approved revision."""
     DRAFT = "draft"
-    """It says something else: an unapproved draft."""
+    """Other values: an unapproved draft."""
     BROKEN = "broken"
     MISSING = "missing"
 
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A recipe in force: what fruit may be inspected by."""
+    """Recipe in force, for inspections."""
 
     recipe: Recipe
     revision: int
@@ -32,7 +32,7 @@ class Control:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A good file of the folder."""
+    """Valid file of the folder."""
 
     path: Path
     text: str
@@ -41,27 +41,27 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """One recipe."""
+    """State of one recipe."""
 
     name: str
     control: Control | None
-    """None where no revision is approved."""
+    """None if no revision is approved."""
     file_state: FileState
     file: Found | None
-    """None where it is broken or missing."""
+    """None if it is invalid or missing."""
     submitted: Revision | None
-    """The draft that waits for approval, whatever the file says."""
+    """The draft that waits for approval, whatever the file's state."""
     note: str
-    """What a person has to know or do, one sentence; empty where the file is what is approved."""
+    """Information or instruction for a person, one sentence; empty if the file is the approved revision."""
 
 
 def standings(
     found: Sequence[Found], broken: Mapping[str, Sequence[Problem]], history: Sequence[Revision]
 ) -> tuple[Standing, ...]:
-    """Put the files and the history together, in the order of names.
+    """Combine the files and the history, in the order of names.
 
     Args:
-        found: the good files, of different names.
+        found: the valid files, of different names.
         broken: what is wrong with the others, by the files' stems. Any recipe without a good file may be the one of a
             file whose stem is no recipe's name.
         history: all revisions, oldest first.

@@ -1,4 +1,4 @@
-"""The door to a station's recipes: for the command line, the service and the panel alike. Every verb blocks."""
+"""Recipe store of a station, for the command line, the service and the panel. Every method blocks."""
 
 import contextlib
 from collections.abc import Hashable, Mapping
@@ -25,18 +25,17 @@ BEGAN = "recipe.history_began"
 
 
 class RecipeStore:
-    """One station's recipes: the files that people edit, and the history of what was approved.
+    """Recipes of one station: the files that people edit, and the history of approved revisions.
 
     Args:
-        home: the station's home folder.
-        folder: the site's recipe files; None for those shipped, which cannot be edited in place.
+        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
     """
 
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder, self._records = home, folder, records_folder(home)
 
     def read(self) -> tuple[tuple[Standing, ...], tuple[str, ...]]:
-        """How each recipe stands, and what is wrong with the files by themselves or with their folder.
+        """Return the state of each recipe, and the errors of the files and their folder.
 
         Raises:
             RecordsError: the history cannot be read.
@@ -48,7 +47,7 @@ class RecipeStore:
         return standings(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
 
     def signature(self) -> Hashable:
-        """Another value whenever a file or the history has changed; it tells nothing else."""
+        """Return a value that differs whenever a file or the history has changed."""
         folder = self._folder or shipped_folder()
         files = []
         with contextlib.suppress(OSError):
@@ -63,10 +62,10 @@ class RecipeStore:
         return tuple(files), tuple(history)
 
     def history(self, name: str = "") -> list[Revision]:
-        """The revisions, oldest first; none before the history began.
+        """Return the revisions, oldest first; none before the history began.
 
         Args:
-            name: of one recipe; all where empty.
+            name: of one recipe; all if empty.
 
         Raises:
             RecordsError: they cannot be read.
@@ -77,13 +76,13 @@ class RecipeStore:
             return read_revisions(connection, name)
 
     def begin(self, last_good: Mapping[str, Recipe]) -> None:
-        """Take up what needs no person's approval; again and again, as at each start.
+        """Store the revisions that need no person's approval; call it at each start.
 
-        What the distribution ships counts as approved by it. When the history begins, what the station inspected by
-        until then, or else what is there, is adopted: whoever installed it answers for it.
+        Shipped recipes count as approved by the distribution. When the history begins, the recipes that the station
+        inspected by until then, or else the existing files, are adopted: their installer is responsible for them.
 
         Args:
-            last_good: recipes that the station was last seen to inspect by, where it remembers them.
+            last_good: recipes that the station last inspected by, if known.
 
         Raises:
             SettingsError: the folder cannot be read, or holds no recipe at all.
@@ -99,14 +98,13 @@ class RecipeStore:
                 take_up(connection, file.text, file.recipe, Origin.SHIPPED, who, "shipped with the station's software")
 
     def submit(self, name: str, person: Person) -> Revision:
-        """Record the recipe's file as a draft for another person to approve.
+        """Store the recipe's file as a draft for another person to approve.
 
         Args:
-            name: the recipe's.
             person: its author.
 
         Raises:
-            BadInputError: there is no good file of that recipe.
+            BadInputError: there is no valid file of that recipe.
             RecipeStoreError: it is approved already, or another person's draft waits.
         """
         with locked(self._home):
@@ -116,12 +114,11 @@ class RecipeStore:
                 return submit(connection, file.text, file.recipe, person)
 
     def approve(self, name: str, person: Person, revision: int | None = None) -> Revision:
-        """Let fruit be inspected by a draft from the next lot on.
+        """Put a draft in force from the next lot on.
 
         Args:
-            name: the recipe's.
-            person: another one than the author.
-            revision: the draft that the approver has seen; the one that waits where None.
+            person: must not be the author.
+            revision: the draft that the approver has seen; None for the one that waits.
 
         Raises:
             BadInputError: no draft waits.
@@ -140,9 +137,8 @@ class RecipeStore:
         """Take a revision out of use: no lot begins with it any more.
 
         Args:
-            name: the recipe's.
             person: who retires it, and why.
-            revision: which one; the approved one where None.
+            revision: None for the approved one.
 
         Raises:
             BadInputError: there is none.
@@ -162,10 +158,7 @@ class RecipeStore:
                 return retire(connection, wanted, person)
 
     def standing(self, name: str) -> Standing:
-        """How one recipe stands.
-
-        Args:
-            name: the recipe's.
+        """Return the state of one recipe.
 
         Raises:
             BadInputError: there is none of this name.
@@ -178,11 +171,7 @@ class RecipeStore:
         raise BadInputError(f"recipe {shortened(name)}: expected one of {known}")
 
     def revision(self, name: str, revision: int) -> Revision:
-        """One revision.
-
-        Args:
-            name: the recipe's.
-            revision: its number.
+        """Return one revision.
 
         Raises:
             BadInputError: there is none.
@@ -195,13 +184,10 @@ class RecipeStore:
         raise BadInputError(f"recipe {shortened(name)}: revision {revision}: expected one of {known}")
 
     def good_file(self, name: str) -> Found:
-        """A recipe's file.
-
-        Args:
-            name: the recipe's.
+        """Return a recipe's valid file.
 
         Raises:
-            BadInputError: there is none, or it is broken.
+            BadInputError: there is none, or it is invalid.
         """
         standing = self.standing(name)
         if standing.file is None:
@@ -209,7 +195,7 @@ class RecipeStore:
         return standing.file
 
     def _to_ship(self, found: list[Found], history: list[Revision]) -> list[Found]:
-        """The files that are as the distribution ships them, where no person has decided otherwise."""
+        """Return the files that are identical to the shipped ones, if no person has decided otherwise."""
         shipped, wanted = approved_by_distribution(), []
         for file in found:
             if shipped.get(file.recipe.name) != content_sha256(file.recipe):
@@ -229,7 +215,7 @@ class RecipeStore:
             return _has_begun(connection)
 
     def _begun(self) -> None:
-        """Before a person's first change: adopt what was there before, unless this is it."""
+        """Adopt the existing recipes before a person's first change, unless that change is the adoption."""
         if not self._is_begun():
             raise RecipeStoreError(
                 "the recipes' history has not begun: `station recipes adopt`, or the station's first start, takes up "

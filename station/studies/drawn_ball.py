@@ -1,4 +1,4 @@
-"""A ball between the twin's gel and sponge, pressed without a gripper and drawn without a wire: for many repeats."""
+"""Simulated calibration rig: a ball between the twin's gel and sponge, without gripper and wire, for many repeats."""
 
 from collections.abc import Sequence
 
@@ -18,16 +18,16 @@ _OPEN_MM, _CLOSED_COUNT, _FINGERS_MM = 53.0, 230, 32.0
 
 
 class DrawnBall:
-    """A `Bench` whose widths are whole counts of the gripper, and whose light drifts from step to step.
+    """A rig whose widths are whole counts of the gripper, and whose light drifts from step to step.
 
     Args:
         seed: of the sensor's noise and drift.
         unit: of the sensor's light.
         mm_per_px: the sensor's true scale.
-        kind: what lies in the nest.
-        condition: what is wrong with the sensor.
-        holder_mm: what the ball lies in; where it is met moves with it.
-        spill_mm: standard deviation of how exactly the ball is laid at a place.
+        kind: the object in the nest.
+        condition: fault of the sensor.
+        holder_mm: thickness of the ball's holder; it shifts the contact onset.
+        spill_mm: standard deviation of the ball's place.
         frames_per_step: as the recipe's.
     """
 
@@ -55,37 +55,37 @@ class DrawnBall:
         self._contact = FruitOnGel(self._fruit, Pose(), self._gel)
 
     async def untouched(self, number: int) -> Sequence[Image]:
-        """Frames with the jaws open; what is so wide that it is never let go is in them."""
+        """Return frames with the jaws open; an object too wide for the open jaws still touches."""
         self._width_mm = _OPEN_MM
         self._now_s += _STEP_S
         return self._frames(number)
 
     async def press_to(self, width_mm: float) -> Pressed:
-        """A step's frames."""
+        """Return a step's frames."""
         count = round(_CLOSED_COUNT - (width_mm + _FINGERS_MM) / _COUNT_MM)
         self._width_mm = (_CLOSED_COUNT - count) * _COUNT_MM - _FINGERS_MM
         self._now_s += _STEP_S
         return Pressed(self._width_mm, self._frames(self._frames_per_step))
 
     async def lay(self, place: Place) -> None:
-        """Lay the ball there, nearly."""
+        """Lay the ball at a place, with the place's deviation."""
         self.places.append(place)
         x_mm, y_mm = (mm + self._spill_mm * self._spill.standard_normal() for mm in place)
         scale = self._gel.mm_per_px
         self._contact = FruitOnGel(self._fruit, Pose(240 + x_mm / scale, 320 + y_mm / scale), self._gel)
 
     async def release(self) -> None:
-        """Open."""
+        """Open the jaws."""
         self.released += 1
         self._width_mm = _OPEN_MM
 
     @property
     def closing_mm(self) -> float:
-        """How far the fingers have closed since the first contact."""
+        """Return the closing since the contact onset."""
         return self._fruit.width_mm + self._holder_mm - self._width_mm
 
     def true_area_px(self, width_mm: float) -> int:
-        """The area inside the visible edge at a width."""
+        """Return the area inside the visible edge at a width."""
         closing_mm = self._fruit.width_mm + self._holder_mm - width_mm
         return self._contact.pressed(Squeeze(self._fruit, self._gel).at(closing_mm)).true_area_px
 

@@ -1,4 +1,4 @@
-"""A proposed limit in sentences and on a page: good and bad fruit, and both errors over the limit."""
+"""Report of a proposed limit: sentences, histogram of good and bad fruit, both errors over the limit."""
 
 import base64
 import io
@@ -38,10 +38,10 @@ show();
 
 
 def lines_of(told: dict[str, Any]) -> list[str]:
-    """The sentences of a proposal, for the terminal and the page.
+    """Describe a proposal in sentences, for the terminal and the page.
 
     Args:
-        told: all its figures, by name.
+        told: its figures, by name.
     """
     best = told["proposed"]
     costs = f"costs {told['false_accept_cost']:g} sound ones diverted and {100 * told['damaged_share']:g} % are damaged"
@@ -94,12 +94,12 @@ def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
 
 
 def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
-    """The page with its two pictures and a slider on the limit, in one file.
+    """Make the page with its two pictures and a slider on the limit, in one file.
 
     Args:
         title: the recipe's.
-        best: what is proposed.
-        told: all its figures, by name.
+        best: the proposal.
+        told: its figures, by name.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     curve = told["proposed"]["curve"]
@@ -111,7 +111,7 @@ def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
 
 
 def _histogram(best: Proposal) -> str:
-    """Good and bad beside each other, with the limit; a data URI."""
+    """Draw good and bad beside each other, with the limit; returns a data URI."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     groups = [values[np.isfinite(values)] for values in (best.good, best.bad)]
@@ -124,7 +124,7 @@ def _histogram(best: Proposal) -> str:
 
 
 def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
-    """Both errors over the limit, with their intervals; a data URI."""
+    """Draw both errors over the limit, with their intervals; returns a data URI."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     limits = [point["limit_mm2"] for point in curve]

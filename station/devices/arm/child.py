@@ -1,4 +1,4 @@
-"""The driver's handle on the process that ur-rtde lives in."""
+"""Process handle of the ur-rtde process, for the driver."""
 
 import asyncio
 import contextlib
@@ -23,7 +23,7 @@ _OWNED = re.compile(rf"{FOLDER}(\d{{1,9}})-.+")
 
 
 def sweep() -> None:
-    """Remove the folders of stations that are gone: one that was killed could not clear up, nor could its process."""
+    """Remove the folders of dead stations: a killed one could not remove its own, nor could its process."""
     for folder in Path(tempfile.gettempdir()).glob(f"{FOLDER}*"):
         owned = _OWNED.fullmatch(folder.name)
         if owned is not None and not _alive(int(owned[1])):
@@ -41,7 +41,7 @@ def _alive(pid: int) -> bool:
 
 
 class ArmProcess:
-    """One start of the process; whatever goes wrong with it ends it, and a new one is made."""
+    """One start of the process; any failure of it ends it, and a new one is made."""
 
     def __init__(
         self, process: asyncio.subprocess.Process, channel: ChannelClient, folder: tempfile.TemporaryDirectory[str]
@@ -56,7 +56,7 @@ class ArmProcess:
 
         Args:
             host: the controller's address.
-            frequency_hz: how often the controller shall send its state.
+            frequency_hz: rate of the controller's state.
 
         Raises:
             ArmFault: no process can be started.
@@ -92,7 +92,7 @@ class ArmProcess:
 
     @property
     def pid(self) -> int:
-        """The process's id."""
+        """Return the process's id."""
         return self._process.pid
 
     @property
@@ -101,7 +101,7 @@ class ArmProcess:
         return self._process.returncode is not None
 
     async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
-        """Ask the process; it also ends the wait when the process dies.
+        """Send a request to the process; the wait ends also when the process dies.
 
         Raises:
             ArmFault: no answer in time, the process has ended, or it refused.
@@ -122,11 +122,11 @@ class ArmProcess:
 
     @property
     def last_words(self) -> str:
-        """What ur-rtde said last, to be put at a message's end."""
+        """Return ur-rtde's last output, for the end of a message."""
         return f" ({' / '.join(self._words)})" if self._words else ""
 
     async def end(self) -> None:
-        """Kill the process and clear up after it; ending it twice does nothing."""
+        """Kill the process and remove its folder. Idempotent."""
         with contextlib.suppress(ProcessLookupError):
             if not self.ended:
                 self._process.kill()

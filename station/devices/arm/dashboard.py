@@ -1,4 +1,4 @@
-"""A client of the controller's dashboard server: one short connection for each conversation.
+"""Dashboard client of the controller: one short connection for each conversation.
 
 Source of commands and answers: Universal Robots, "Dashboard Server e-Series".
 """
@@ -18,7 +18,7 @@ LONGEST_LINE = 4096
 
 @dataclass(frozen=True, slots=True)
 class DashboardFacts:
-    """What the controller says of itself."""
+    """Facts that the controller reports about itself."""
 
     version: str
     serial_number: str
@@ -29,13 +29,13 @@ class DashboardFacts:
 
 
 class DashboardConversation:
-    """Lines and answers on one connection."""
+    """Requests and replies on one connection."""
 
     def __init__(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._host, self._reader, self._writer = host, reader, writer
 
     async def hear(self) -> str:
-        """The next line.
+        """Read the next line.
 
         Raises:
             ArmFault: none came in time, or it is no text.
@@ -50,7 +50,7 @@ class DashboardConversation:
         return line.decode("ascii").strip()
 
     async def say(self, command: str) -> str:
-        """Send a line and give the answer.
+        """Send a line and return the reply.
 
         Raises:
             ArmFault: none came in time.
@@ -63,7 +63,7 @@ class DashboardConversation:
         return await self.hear()
 
     async def facts(self) -> DashboardFacts:
-        """Everything that the driver and the device check want to know.
+        """Read all facts for the driver and the device check.
 
         Raises:
             ArmFault: an answer did not come in time.
@@ -80,13 +80,10 @@ class DashboardConversation:
 
 @contextlib.asynccontextmanager
 async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
-    """Connect and hear the greeting.
-
-    Args:
-        host: the controller's address.
+    """Connect and read the greeting.
 
     Raises:
-        ArmFault: nobody answers, or not in the protocol.
+        ArmFault: no answer, or none in the protocol.
     """
     try:
         async with asyncio.timeout(LINE_DEADLINE_S):

@@ -1,7 +1,7 @@
-"""The link to the controller: the process that ur-rtde lives in, brought up, watched, and put back when it is gone.
+"""Arm link: starts, monitors and restarts the ur-rtde process of one controller.
 
-The link comes back by itself after a drop. What a person has to look at stays as a fault until that person's verb:
-a stop of any kind, a program that no longer plays, a budget of restarts that is used up.
+The link reconnects by itself after a drop. A fault that a person has to check remains until that person's command: a
+stop of any kind, a program that no longer plays, an exhausted restart budget.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class ArmLink:
-    """One controller's link, kept up by a task of its own. Everything that touches the process goes one at a time."""
+    """Link to one controller, maintained by a task of its own. All access to the process is serialised."""
 
     def __init__(self, settings: ArmSettings) -> None:
         self._settings = settings
@@ -52,17 +52,17 @@ class ArmLink:
 
     @property
     def fault(self) -> ArmFault | None:
-        """Why nothing can be moved: a lost link, else what waits for a person; None where the program plays."""
+        """Return why nothing can be moved: a lost link, or a fault that waits for a person; None if ready."""
         return self._lost or self._latched
 
     @property
     def lost(self) -> ArmFault | None:
-        """Why nothing is known of the arm; None where the link is up, whatever else waits for a person."""
+        """Return why the arm's state is unknown; None if the link is up, whatever else waits for a person."""
         return self._lost
 
     @property
     def pid(self) -> int | None:
-        """The id of the process at the moment."""
+        """Return the id of the present process."""
         return self._process.pid if self._process is not None else None
 
     @property
@@ -71,18 +71,18 @@ class ArmLink:
         return time.monotonic() < self._healthy_until_s
 
     def renew_health(self, lease_s: float) -> None:
-        """The station is healthy for so many seconds from now."""
+        """Renew the health lease, in seconds from now."""
         self._healthy_until_s = time.monotonic() + lease_s
 
     async def open(self) -> None:
-        """Begin to keep the link up."""
+        """Start to maintain the link."""
         if self._keeping is None:
             self.renew_health(FIRST_LEASE_S)
             self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet"), None
             self._keeping = asyncio.create_task(self._keep(), name="the arm's link")
 
     async def close(self) -> None:
-        """End the process; closing twice does nothing."""
+        """End the process. Idempotent."""
         if self._keeping is not None:
             self._keeping.cancel()
             await asyncio.gather(self._keeping, return_exceptions=True)
@@ -95,7 +95,7 @@ class ArmLink:
         """Wait until the arm is ready or waits for a person.
 
         Raises:
-            ArmFault: why it is not ready.
+            ArmFault: it is not ready.
         """
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(deadline_s):
@@ -106,7 +106,7 @@ class ArmLink:
             raise self.fault
 
     async def snapshot(self) -> Snapshot:
-        """The controller's state, asked for now; the time of asking is added to its age.
+        """Read the controller's state now; the request's duration is added to its age.
 
         Raises:
             ArmFault: there is none.
@@ -126,10 +126,10 @@ class ArmLink:
         return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
 
     async def order(self, request: Beside | Move | Reachable | Halt) -> Outcome:
-        """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
+        """Send a command to the process; if it does not answer it is ended, and the watchdog stops the arm.
 
         Raises:
-            ArmFault: there is no process, it gave no answer, or the controller's state grew too old meanwhile.
+            ArmFault: there is no process, it gave no answer, or the controller's state became too old meanwhile.
         """
         limit_s = self._settings.call_deadline_s
         try:
@@ -173,7 +173,7 @@ class ArmLink:
         return snapshot
 
     async def upload(self) -> None:
-        """Bring the program to play, over the standing link or a new one; a playing one is left alone.
+        """Start the program, over the present link or a new one; a playing one does not change.
 
         Raises:
             ArmFault: it does not play.
@@ -315,10 +315,10 @@ class ArmLink:
         return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, words: str) -> ArmFault:
-        """The cause why a command was not done, which is then the link's fault.
+        """Return the cause why a command was not done; it becomes the link's fault.
 
         Args:
-            words: what ur-rtde said.
+            words: ur-rtde's output.
         """
         async with self._lock:
             try:
@@ -330,7 +330,7 @@ class ArmLink:
             return fault
 
     def _face(self, fault: ArmFault) -> None:
-        """Keep what waits for a person; raise what a new process may mend."""
+        """Store a fault that waits for a person; raise one that a new process may clear."""
         if fault.cause in SELF_HEALING:
             raise fault
         self._set(fault)

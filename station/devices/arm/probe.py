@@ -1,4 +1,4 @@
-"""A look at the arm's controller that changes nothing: what `station devices check` shows of it."""
+"""Arm check of `station devices check`: reads the controller and changes nothing."""
 
 import asyncio
 import struct
@@ -12,11 +12,11 @@ RTDE_PORT = 30004
 SCRIPT_PORT = 30003
 PORT_DEADLINE_S = 2.5
 FRESH_S = 0.3
-"""In that time from its start on a stream must have shown its clock advance: it is neither frozen nor late."""
+"""Time from a stream's start within which its clock has to advance: then it is neither frozen nor late."""
 STREAM_HZ = 125.0
 HEADER = struct.Struct(">HB")
 CLAIM = b"input_int_register_23,input_double_register_23"
-"""A fieldbus holds registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: to claim one of those, however
+"""A fieldbus may own registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: claiming one of those, even
 shortly, would refuse a station that connects at that moment."""
 LONGEST_WORD = 120
 NOBODY_THERE = "Check arm.host in station.yaml, and that the controller is on and its network cable is in."
@@ -27,11 +27,7 @@ FROZEN = (
 
 
 async def probe_arm(settings: ArmSettings) -> list[Finding]:
-    """Ask the controller's dashboard, RTDE and script servers. It moves nothing, starts nothing and never raises.
-
-    Args:
-        settings: where the controller is.
-    """
+    """Check the controller's dashboard, RTDE and script servers. It moves nothing, starts nothing and never raises."""
     try:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
@@ -68,13 +64,13 @@ def _cause(facts: DashboardFacts) -> ArmCause | None:
 
 
 def _short(words: str) -> str:
-    """What a peer said, cut to what fits a line, without what a terminal would obey."""
+    """Cut a peer's text to one line, without control characters."""
     legible = "".join(letter if letter.isprintable() else "?" for letter in words)
     return legible if len(legible) <= LONGEST_WORD else f"{legible[: LONGEST_WORD - 1]}…"
 
 
 async def _rtde(host: str) -> Finding:
-    """Ask for protocol version 2, for what a fieldbus holds and for the clock; the claim ends with the connection."""
+    """Request protocol version 2, the registers of a fieldbus, and the clock; the claim ends with the connection."""
     place, connected = f"{host}:{RTDE_PORT}", False
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
@@ -105,7 +101,7 @@ async def _rtde(host: str) -> Finding:
 
 
 async def _advances(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
-    """Start the stream and see two different timestamps of it in time."""
+    """Start the stream and check that it gives two different timestamps in time."""
     try:
         async with asyncio.timeout(FRESH_S):
             await _exchange(reader, writer, b"S", b"")
@@ -124,7 +120,7 @@ async def _exchange(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, 
 
 
 async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
-    """The payload of the next package of a kind."""
+    """Return the payload of the next package of a kind."""
     while True:
         size, answered = HEADER.unpack(await reader.readexactly(HEADER.size))
         answer = await reader.readexactly(max(0, size - HEADER.size))

@@ -1,8 +1,8 @@
-"""The process that ur-rtde lives in: `python -m station.devices.arm.process ENDPOINT HOST FREQUENCY PARENT`.
+"""ur-rtde process: `python -m station.devices.arm.process ENDPOINT HOST FREQUENCY PARENT`.
 
 ur-rtde's constructors hold the interpreter's lock, hang on a silent peer, and a dropped link ends the process with a
-segmentation fault. So there is one such process for each connection; whoever started it kills it when it does not
-answer, and the kernel kills it when that one dies, which works even while ur-rtde holds the lock.
+segmentation fault. So there is one such process for each connection; its parent kills it when it does not answer, and
+the kernel kills it when the parent dies, which works even while ur-rtde holds the lock.
 """
 
 import asyncio
@@ -39,11 +39,11 @@ KICKS_PER_LIMIT = 4
 PR_SET_PDEATHSIG, PR_SET_TIMERSLACK = 1, 29
 """Numbers: prctl(2)."""
 TIMER_SLACK_NS = 1_000_000
-"""Half of the controller's fastest cycle: so much later may a state be seen than it came."""
+"""Half of the controller's fastest cycle: the longest delay between a state's arrival and its use."""
 
 
 class UrRtdeProcess:
-    """The handlers of the channel. Whatever commands the arm runs in one thread, one after the other."""
+    """Handlers of the channel. All that commands the arm runs in one thread, one after the other."""
 
     def __init__(self, host: str, frequency_hz: float) -> None:
         self._host, self._frequency_hz = host, frequency_hz
@@ -57,7 +57,7 @@ class UrRtdeProcess:
         self._kicks_late = self._played = False
 
     async def watch(self, _request: Watch) -> Outcome:
-        """Make the receiving connection; this holds the interpreter's lock until it stands."""
+        """Open the receiving connection; this holds the interpreter's lock until it is open."""
         try:
             self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
         except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
@@ -65,7 +65,7 @@ class UrRtdeProcess:
         return Outcome(done=True)
 
     async def command(self, request: Command) -> Outcome:
-        """Make the commanding connection; this holds the interpreter's lock until it stands."""
+        """Open the commanding connection; this holds the interpreter's lock until it is open."""
         try:
             control = RTDEControlInterface(self._host, self._frequency_hz)
         except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
@@ -77,11 +77,11 @@ class UrRtdeProcess:
         return await self._on_arm(self._prepare)
 
     async def upload(self, _request: Upload) -> Outcome:
-        """Send the program again; ur-rtde's own answer says nothing, only a playing program counts."""
+        """Send the program again; ur-rtde's own result is not reliable, only a playing program counts."""
         return await self._on_arm(lambda: self._commanding().reuploadScript() and self._plays() and self._prepare())
 
     async def beat(self, request: Beat) -> Snapshot:
-        """Tell the state."""
+        """Return the state."""
         receive = self._receive
         if receive is None:
             raise StationError("the state is not received yet")
@@ -102,7 +102,7 @@ class UrRtdeProcess:
         )
 
     async def move(self, request: Move) -> Outcome:
-        """Begin a motion."""
+        """Start a motion."""
         joints = list(request.joints_rad)
 
         def begin() -> bool:
@@ -114,7 +114,7 @@ class UrRtdeProcess:
         return await self._on_arm(begin)
 
     async def beside(self, request: Beside) -> Outcome:
-        """Ask the controller how the tool gets beside a place; not done where it cannot."""
+        """Compute the joint positions for an offset by the controller; not done if there are none."""
         joints = list(request.joints_rad)
         found: list[float] = []
 
@@ -131,7 +131,7 @@ class UrRtdeProcess:
         return outcome.model_copy(update={"joints_rad": tuple(found)}) if outcome.done else outcome
 
     async def reachable(self, request: Reachable) -> Outcome:
-        """Ask the controller about joint positions, and about the tool's pose that they make."""
+        """Check joint positions, and the tool's pose at them, by the controller."""
         joints = list(request.joints_rad)
 
         def ask() -> bool:
@@ -153,7 +153,7 @@ class UrRtdeProcess:
         return await self._on_arm(brake)
 
     async def _kick(self, period_s: float) -> None:
-        """Keep the controller's watchdog quiet as long as the station says that it is healthy."""
+        """Kick the controller's watchdog as long as the health lease runs."""
         while True:
             await asyncio.sleep(period_s)
             control, playing = self._control, self._playing()
@@ -215,9 +215,9 @@ def die_with(parent: int) -> None:
 
 
 def sleep_loosely() -> None:
-    """Let the kernel wake this thread, and all that it starts from now on, a little later than they ask for.
+    """Let the kernel wake this thread, and all that it starts from now on, a little later than requested.
 
-    ur-rtde's threads look at their sockets every 0.1 ms, which costs more than all that they find there.
+    ur-rtde's threads poll their sockets every 0.1 ms, which costs more than all data that they read.
     """
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_TIMERSLACK, TIMER_SLACK_NS)
 

@@ -1,4 +1,4 @@
-"""What `station devices check` says of the camera."""
+"""Camera check of `station devices check`."""
 
 import math
 import time
@@ -12,7 +12,7 @@ _FRAMES = 15
 _FRAME_DEADLINE_S = 1.0
 _SLOW_SHARE = 0.8
 _SHORTEST_S = 1e-3
-"""For the rate of a recording that is played as fast as asked."""
+"""Rate of a recording that is played as fast as requested."""
 
 REMEDIES = {
     FrameFault.STALE: "the computer or the link is too slow: close other programs, use a USB port of its own",
@@ -26,11 +26,7 @@ REMEDIES = {
 
 
 async def probe_camera(settings: CameraSettings) -> list[Finding]:
-    """Open the camera, look at half a second of frames, and close it again. Never raises for a bad camera.
-
-    Args:
-        settings: the camera's settings.
-    """
+    """Open the camera, check half a second of frames, and close it again. Never raises for a bad camera."""
     camera = camera_from(settings)
     try:
         await camera.open()
@@ -42,7 +38,7 @@ async def probe_camera(settings: CameraSettings) -> list[Finding]:
 
 
 async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
-    """So many frames, or as many as a recording has."""
+    """Read so many frames, or as many as a recording has."""
     frames: list[Frame] = []
     newest_s = -math.inf if recorded else time.monotonic()
     try:

@@ -1,4 +1,4 @@
-"""A look at the gripper for `station devices check`: nothing is moved."""
+"""Gripper check of `station devices check`: nothing is moved."""
 
 from station.devices.finding import Finding
 from station.devices.gripper.errors import GripperError, GripperFaultError
@@ -7,15 +7,11 @@ from station.devices.gripper.robotiq import make_gripper
 from station.settings.gripper import GripperCalibration, GripperSettings
 
 _CALIBRATION_COUNTS = 3
-"""How far outside its calibrated ends a gripper may read."""
+"""Allowed reading beyond the calibrated ends."""
 
 
 async def probe_gripper(settings: GripperSettings) -> list[Finding]:
-    """Say what answers at the gripper's address and whether it can be used.
-
-    Args:
-        settings: as of `station.yaml`.
-    """
+    """Report what answers at the gripper's address and whether it can be used."""
     gripper = make_gripper(settings)
     place = gripper.link.place
     try:
