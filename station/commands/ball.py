@@ -19,8 +19,8 @@ from station.errors import BadInputError
 from station.records.database import records_folder
 from station.records.errors import LockedError
 from station.records.opening import lock_folder
-from station.service.ball_bench import BallBench
-from station.service.bare_grip import kept_healthy
+from station.service.ball_bench import StationRig
+from station.service.bare_grip import renewed_lease
 from station.service.grip import Cell
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
@@ -29,7 +29,9 @@ _ARM_DEADLINE_S = 15.0
 
 
 @contextlib.asynccontextmanager
-async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncIterator[tuple[BallBench, Unit, Recipe]]:
+async def at_the_bench(
+    site: Configuration, *, bench: bool, yes: bool
+) -> AsyncIterator[tuple[StationRig, Unit, Recipe]]:
     """Open the devices that the site names, for this program alone.
 
     Args:
@@ -65,14 +67,14 @@ async def at_the_bench(site: Configuration, *, bench: bool, yes: bool) -> AsyncI
         if not (bench or site.service.bench):
             arm = await stack.enter_async_context(UrArm(site.arm))
             await arm.ready(_ARM_DEADLINE_S * site.service.patience)
-            await stack.enter_async_context(kept_healthy(arm))
+            await stack.enter_async_context(renewed_lease(arm))
         if not yes:
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
             await _answered(
                 f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
             )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
-        yield BallBench(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
+        yield StationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
 
 
 async def _answered(request: str) -> None:

@@ -8,7 +8,7 @@ from station.calibration.store import CalibrationStore
 from station.records.audit import append_audit
 from station.records.database import records_folder
 from station.records.direct import writing
-from station.service.trail import calibration_stored
+from station.service.trail import calibration_entry
 from station.settings.configuration import Configuration
 
 
@@ -22,5 +22,5 @@ def store_calibration(site: Configuration, operator: str, draft: Draft) -> Path:
     before = calibrations.current(new.serial)
     with writing(records_folder(site.home)) as connection:
         old = None if before is None else before.id
-        append_audit(connection, calibration_stored(operator, "", f"sensor {new.serial}", old, new.id))
+        append_audit(connection, calibration_entry(operator, "", f"sensor {new.serial}", old, new.id))
         return calibrations.add_calibration(new, calibration_files(draft))

@@ -17,7 +17,7 @@ from station.errors import StationError
 from station.records.audit import append_audit
 from station.records.database import records_folder
 from station.records.direct import writing
-from station.service.trail import calibration_verified
+from station.service.trail import verification_entry
 from station.settings.configuration import Configuration, load_configuration
 
 
@@ -50,7 +50,7 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
     verification = verified.verification
     with writing(records_folder(site.home)) as connection:
         subject, passed = f"sensor {calibration.serial}", verification.passed
-        entry = calibration_verified(operator, subject, calibration.id, verification.id, passed=passed)
+        entry = verification_entry(operator, subject, calibration.id, verification.id, passed=passed)
         append_audit(connection, entry)
         folder = store.add_verification(verification, verification_files(verified, calibration))
     for check in verification.checks:

@@ -80,7 +80,7 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
     return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_LOST}[device]
 
 
-class AlarmDesk:
+class AlarmManager:
     """Alarm states of the station. Every method is immediate; `keep` makes the changes durable afterwards.
 
     Args:
@@ -117,7 +117,7 @@ class AlarmDesk:
             self._present.discard(alarm)
             self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared", "")
 
-    def show(self, alarm: AlarmId, detail: str) -> None:
+    def update(self, alarm: AlarmId, detail: str) -> None:
         """Raise the alarm if `detail` is given, else clear it.
 
         Args:
@@ -128,7 +128,7 @@ class AlarmDesk:
         else:
             self.clear(alarm)
 
-    def device(self, device: str, fault: StationError | None) -> None:
+    def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of a device's fault, or clear the alarms of a healthy device.
 
         Args:
@@ -189,9 +189,9 @@ class AlarmDesk:
         later = self._alarms.tick(time.time())
         if later != self._alarms:
             self._alarms = later
-            self._show()
+            self._publish_active()
 
-    async def recall(self, records: Records) -> None:
+    async def restore(self, records: Records) -> None:
         """Restore the alarms of the previous start; their causes count as present until a check clears them."""
         self._alarms = Alarms.from_data(
             [
@@ -208,9 +208,9 @@ class AlarmDesk:
             ]
         )
         self._present = {alarm.id for alarm in self._alarms.known.values() if alarm.state in CAUSED}
-        self._show()
+        self._publish_active()
 
-    async def keep(self, records: Records) -> None:
+    async def store_changes(self, records: Records) -> None:
         """Store every change until cancelled; a change that could not be stored is tried again with the next one."""
         while True:
             await self._changed.wait()
@@ -242,7 +242,7 @@ class AlarmDesk:
         self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, detail)][-_MOST_UNSAVED:]
         level = logging.WARNING if change == "raised" else logging.INFO
         log.log(level, "alarm %s %s%s", alarm, change, f": {detail}" if detail else "")
-        self._show()
+        self._publish_active()
         return True
 
     def _set_all(self, alarms: Alarms, change: str) -> None:
@@ -250,8 +250,8 @@ class AlarmDesk:
             if alarms.get(alarm) != before:
                 self._unsaved.append(AlarmEntry(utc_ms(), alarm, change))
         self._alarms = alarms
-        self._show()
+        self._publish_active()
 
-    def _show(self) -> None:
+    def _publish_active(self) -> None:
         self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self._alarms.active)
         self._changed.set()

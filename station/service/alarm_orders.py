@@ -17,30 +17,30 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import ALARMS, AlarmId, anchor
 from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
 from station.records.audit import AuditEntry, check_entry
-from station.service.alarm_desk import AlarmDesk
-from station.service.trail import Trail, alarm_changed
+from station.service.alarm_desk import AlarmManager
+from station.service.trail import AuditLogger, alarm_entry
 
 
-class AlarmOrders:
+class AlarmCommands:
     """Handlers of alarm requests."""
 
-    def __init__(self, desk: AlarmDesk, trail: Trail) -> None:
-        self._desk, self._trail = desk, trail
+    def __init__(self, alarms: AlarmManager, trail: AuditLogger) -> None:
+        self._alarms, self._trail = alarms, trail
         self.handlers: Handlers = {
-            ListAlarms: self.listed,
+            ListAlarms: self.list_alarms,
             AcknowledgeAlarm: self.acknowledge,
             ShelveAlarm: self.shelve,
             UnshelveAlarm: self.unshelve,
         }
         """For a channel's server."""
 
-    async def listed(self, _request: ListAlarms) -> AlarmList:
+    async def list_alarms(self, _request: ListAlarms) -> AlarmList:
         """List the alarms that are not in their normal state."""
-        return AlarmList(alarms=self.standing(), longest_shelved_s=LONGEST_SHELVED_S)
+        return AlarmList(alarms=self.active(), longest_shelved_s=LONGEST_SHELVED_S)
 
-    def standing(self) -> tuple[ListedAlarm, ...]:
+    def active(self) -> tuple[ListedAlarm, ...]:
         """List the same alarms, most urgent first."""
-        return tuple(_listed(alarm) for alarm in self._desk.alarms.standing)
+        return tuple(_listed(alarm) for alarm in self._alarms.alarms.standing)
 
     async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:
         """Acknowledge an alarm.
@@ -49,10 +49,10 @@ class AlarmOrders:
             BadInputError: there is no such alarm.
             BadRecordError: the audit log cannot store the name or the role.
         """
-        alarm, entry = self._taken(request, "acknowledged")
-        if self._desk.alarms.get(alarm).state is AlarmState.NORMAL:
+        alarm, entry = self._checked(request, "acknowledged")
+        if self._alarms.alarms.get(alarm).state is AlarmState.NORMAL:
             return _refused(f"alarm {alarm} does not stand")
-        return self._done(self._desk.acknowledge(alarm), entry)
+        return self._done(self._alarms.acknowledge(alarm), entry)
 
     async def shelve(self, request: ShelveAlarm) -> CommandDone:
         """Shelve an alarm for a time.
@@ -61,8 +61,8 @@ class AlarmOrders:
             BadInputError: there is no such alarm.
             BadRecordError: the audit log cannot store the name, the role or the reason.
         """
-        alarm, entry = self._taken(request, "shelved", request.reason)
-        known = self._desk.alarms.get(alarm)
+        alarm, entry = self._checked(request, "shelved", request.reason)
+        known = self._alarms.alarms.get(alarm)
         if not request.reason.strip():
             return _refused("a reason is needed: whoever looks at the alarms next has to know why it is hidden")
         if request.for_s > LONGEST_SHELVED_S:
@@ -72,7 +72,7 @@ class AlarmOrders:
         if known.shelved_until_s is not None:
             until = datetime.fromtimestamp(known.shelved_until_s, UTC).strftime("%H:%M UTC")
             return _refused(f"alarm {alarm} is shelved until {until} by {known.shelved_by or 'nobody known'} already")
-        return self._done(self._desk.shelve(alarm, request.for_s, request.who, request.reason), entry)
+        return self._done(self._alarms.shelve(alarm, request.for_s, request.who, request.reason), entry)
 
     async def unshelve(self, request: UnshelveAlarm) -> CommandDone:
         """Unshelve an alarm.
@@ -81,20 +81,20 @@ class AlarmOrders:
             BadInputError: there is no such alarm.
             BadRecordError: the audit log cannot store the name or the role.
         """
-        alarm, entry = self._taken(request, "unshelved")
-        return self._done(self._desk.unshelve(alarm), entry)
+        alarm, entry = self._checked(request, "unshelved")
+        return self._done(self._alarms.unshelve(alarm), entry)
 
-    def _taken(self, request: OfAlarm, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
+    def _checked(self, request: OfAlarm, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
         """Return the alarm and its audit entry, which is validated before anything changes."""
         if request.alarm not in set(AlarmId):
             raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")
-        entry = alarm_changed(request.who, request.role, change, request.alarm, reason)
+        entry = alarm_entry(request.who, request.role, change, request.alarm, reason)
         check_entry(entry)
         return AlarmId(request.alarm), entry
 
     def _done(self, changed: bool, entry: AuditEntry) -> CommandDone:  # noqa: FBT001 (an answer handed on)
         if changed:
-            self._trail.note(entry)
+            self._trail.log(entry)
         return CommandDone(done=True, why="")
 
 

@@ -11,7 +11,7 @@ from station.settings.recipe import Recipe
 _OPEN_WITHIN_MM = 2.0
 
 
-class BallBench:
+class StationRig:
     """Rig for the procedures of `station.calibration`; the arm moves only between the nest and home.
 
     Args:

@@ -48,7 +48,7 @@ class BareGrip:
                 or the arm did not return.
             StationError: a device's fault; the gripper is open and the arm home by then, if they could move.
         """
-        async with kept_healthy(self._cell.arm):
+        async with renewed_lease(self._cell.arm):
             try:
                 await self._press()
             except (StationError, asyncio.CancelledError) as error:
@@ -84,7 +84,7 @@ class BareGrip:
 
 
 @contextlib.asynccontextmanager
-async def kept_healthy(arm: Arm | None) -> AsyncIterator[None]:
+async def renewed_lease(arm: Arm | None) -> AsyncIterator[None]:
     """Renew the arm's lease while this program's loop runs: if the loop hangs, the controller stops the arm.
 
     Args:

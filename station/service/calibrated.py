@@ -13,7 +13,7 @@ from station.vision.scale import TYPICAL_STANDARD_UNCERTAINTY
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
 
 
-class InUse(NamedTuple):
+class CalibrationInUse(NamedTuple):
     """Scale that a fruit is measured by."""
 
     mm_per_px: float
@@ -23,7 +23,7 @@ class InUse(NamedTuple):
     """Relative standard uncertainty of `mm_per_px`."""
 
 
-class Figures(NamedTuple):
+class CalibrationFigures(NamedTuple):
     """Calibration figures for the metrics; None where there is no value."""
 
     age_s: float | None
@@ -31,7 +31,7 @@ class Figures(NamedTuple):
     drift: float | None
 
 
-class Calibrated:
+class ActiveCalibration:
     """Newest calibration of the sensor in use; read again when another one is stored.
 
     Args:
@@ -53,21 +53,23 @@ class Calibrated:
     @property
     def calibration(self) -> Calibration | None:
         """Return the calibration in force; None if the sensor has none."""
-        self._look()
+        self._refresh()
         return self._calibration
 
     @property
-    def in_force(self) -> InUse:
+    def in_force(self) -> CalibrationInUse:
         """Return the scale that areas are reported in, and its source."""
         calibration = self.calibration
         if calibration is None:
             allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
             words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration{allowed}"
-            return InUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
+            return CalibrationInUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
         measured = calibration.scale_measured
         scale = calibration.mm_per_px if measured else self._usual_mm_per_px
         words = f"{calibration.in_words()}, in use {scale:g} mm/px"
-        return InUse(scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY)
+        return CalibrationInUse(
+            scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY
+        )
 
     @property
     def gate_factor(self) -> float:
@@ -79,10 +81,10 @@ class Calibrated:
         return None if self.calibration is None else self._store.folder(self.calibration) / REFERENCE
 
     @property
-    def figures(self) -> Figures:
+    def figures(self) -> CalibrationFigures:
         """Return ages and drift now."""
         calibration, verified = self.calibration, self._verification
-        return Figures(
+        return CalibrationFigures(
             None if calibration is None else self._clock() - calibration.made_at.timestamp(),
             None if verified is None else self._clock() - verified.made_at.timestamp(),
             None if verified is None else verified.drift,
@@ -109,7 +111,7 @@ class Calibrated:
             return f"The last verification is {old}: verify with the ball; {how}"
         return ""
 
-    def trouble(self) -> str:
+    def alarm_detail(self) -> str:
         """Return the detail of the alarm calibration_old; empty for no alarm."""
         calibration, verified = self.calibration, self._verification
         if calibration is None:
@@ -122,7 +124,7 @@ class Calibrated:
             return f"the last verification, {verified.id}, failed: {failed}"
         return ""
 
-    def _look(self) -> None:
+    def _refresh(self) -> None:
         serial = self._serial()
         seen = (serial, *(_changed(self._home / kind / serial) for kind in (CALIBRATIONS, VERIFICATIONS)))
         if not serial or seen == self._seen:

@@ -20,14 +20,14 @@ from station.devices.gripper.errors import (
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import StationError
 from station.service.grip import FRAME_DEADLINE_S, Cell, FramesError
-from station.service.watching import DeviceWatch
+from station.service.watching import DeviceMonitor
 from station.settings.configuration import Configuration
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
-STANDING_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
+SAFETY_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """Stops by the arm's safety controller that a person has to check at the cell."""
 _BAD_FRAMES = 3
-_STALE_LOOKS = 3
+_STALE_CHECKS = 3
 """Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
 _ARM_PAUSE_S = 0.5
 """The driver reconnects to the arm by itself; only its state is read."""
@@ -35,7 +35,7 @@ _OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
 
-class Crew:
+class DeviceManager:
     """Camera, gripper and arm of one station with their monitors.
 
     Args:
@@ -61,11 +61,11 @@ class Crew:
         """A person has said that nothing is between the jaws; used up by the next activation."""
         self._bad_frames, self._stale_looks = 0, 0
         self._not_activated: StationError | None = None
-        looks = {CAMERA: self._look_at_camera, GRIPPER: self._look_at_gripper}
+        looks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
         if arm is not None:
-            looks[ARM] = self._look_at_arm
-        self.watches = {
-            name: DeviceWatch(
+            looks[ARM] = self._check_arm
+        self.monitors = {
+            name: DeviceMonitor(
                 name,
                 look,
                 _ARM_PAUSE_S if name == ARM else configuration.service.retry_longest_s,
@@ -81,7 +81,7 @@ class Crew:
         if self._arm is not None:
             await self._arm.open()
         self._tasks = [
-            asyncio.create_task(watch.run(), name=f"watch of the {name}") for name, watch in self.watches.items()
+            asyncio.create_task(watch.run(), name=f"watch of the {name}") for name, watch in self.monitors.items()
         ]
 
     async def close(self) -> None:
@@ -105,15 +105,15 @@ class Crew:
     @property
     def faults(self) -> dict[str, StationError]:
         """Return the faults by device; empty if all are healthy."""
-        return {name: watch.fault for name, watch in self.watches.items() if watch.fault is not None}
+        return {name: watch.fault for name, watch in self.monitors.items() if watch.fault is not None}
 
-    def well_since(self, since_s: float) -> bool:
+    def healthy_since(self, since_s: float) -> bool:
         """Check that every device was found healthy after a time, and none has a fault.
 
         Args:
             since_s: monotonic time.
         """
-        watches = self.watches.values()
+        watches = self.monitors.values()
         return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
 
     def use(self, *, by_inspection: bool) -> None:
@@ -123,22 +123,22 @@ class Crew:
             by_inspection: whether an inspection is under way.
         """
         for name in (CAMERA, GRIPPER):
-            self.watches[name].in_use = by_inspection
+            self.monitors[name].in_use = by_inspection
 
-    def failed(self, fault: StationError) -> None:
+    def report_fault(self, fault: StationError) -> None:
         """Report a fault that a caller met while it worked with a device."""
         match fault:
             case ArmFault():
-                self.watches[ARM].failed(fault)
+                self.monitors[ARM].report_fault(fault)
             case GripperError():
-                self.watches[GRIPPER].failed(fault)
+                self.monitors[GRIPPER].report_fault(fault)
             case CameraError() | FramesError():
-                self.watches[CAMERA].failed(fault)
+                self.monitors[CAMERA].report_fault(fault)
             case _:
                 pass
 
     @property
-    def standing_stop(self) -> StationError | None:
+    def active_stop(self) -> StationError | None:
         """Return the active safety stop that only a person may end."""
         return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
 
@@ -182,9 +182,9 @@ class Crew:
                 await self._arm.power_on_and_release_brakes()
             case "program":
                 await self._arm.upload_again()
-        self.watches[ARM].look_again()
+        self.monitors[ARM].check_now()
 
-    async def play_again(self) -> None:
+    async def restart_program(self) -> None:
         """Restart the arm's program after a stop whose cause is gone; a playing one does not change.
 
         Raises:
@@ -192,15 +192,15 @@ class Crew:
         """
         if self._arm is not None:
             await self._arm.upload_again()
-            self.watches[ARM].look_again()
+            self.monitors[ARM].check_now()
 
     @property
-    def program_to_play_again(self) -> bool:
+    def needs_program_restart(self) -> bool:
         """Check whether the arm stopped only because this station was too slow for the controller's watchdog.
 
         Such a stop is the station's own, as after a lost link: once the station is healthy no person is needed.
         """
-        fault = self.watches[ARM].fault if ARM in self.watches else None
+        fault = self.monitors[ARM].fault if ARM in self.monitors else None
         return isinstance(fault, ArmFault) and fault.cause is ArmCause.WATCHDOG
 
     async def activate_if_safe(self) -> None:
@@ -240,12 +240,12 @@ class Crew:
         elif state.at not in {"home", "above_nest"}:
             raise refusal
 
-    async def _look_at_camera(self) -> None:
+    async def _check_camera(self) -> None:
         await self.cell.camera.open()
         newer_than_s = time.monotonic()
         frame = await self.cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
         self._bad_frames = self._bad_frames + 1 if frame.faults else 0
-        known_ill = isinstance(self.watches[CAMERA].fault, FramesError)  # which only a good frame ends
+        known_ill = isinstance(self.monitors[CAMERA].fault, FramesError)  # which only a good frame ends
         if self._bad_frames >= _BAD_FRAMES or (frame.faults and known_ill):
             raise FramesError(
                 f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
@@ -253,7 +253,7 @@ class Crew:
                 frame.faults,
             )
 
-    async def _look_at_gripper(self) -> None:
+    async def _check_gripper(self) -> None:
         reading = await self.cell.gripper.read()
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
             raise self._not_activated or GripperFaultError(reading.fault_code)
@@ -262,16 +262,16 @@ class Crew:
                 "it is not activated", "wait: the station activates it where that is safe"
             )
 
-    async def _look_at_arm(self) -> None:
+    async def _check_arm(self) -> None:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
         fault = (await self._arm.state()).fault
         stale = fault is not None and fault.cause is ArmCause.STALE
         self._stale_looks = self._stale_looks + 1 if stale else 0
-        if fault is not None and not 0 < self._stale_looks < _STALE_LOOKS:
+        if fault is not None and not 0 < self._stale_looks < _STALE_CHECKS:
             raise fault
 
 
 def _is_stop(fault: StationError) -> bool:
     """Check whether a fault is a safety stop, as the arm or the gripper on it reports it."""
-    stopped_arm = isinstance(fault, ArmFault) and fault.cause in STANDING_STOPS
+    stopped_arm = isinstance(fault, ArmFault) and fault.cause in SAFETY_STOPS
     return stopped_arm or isinstance(fault, GripperEmergencyStopError)

@@ -12,7 +12,7 @@ import cv2
 
 from station.devices.camera.interface import Frame, Image
 from station.service.grip import GripStep
-from station.service.reference import Golden, Looks, examine
+from station.service.reference import GoldenReference, ReferenceProperties, check_reference
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Contact, Method
@@ -28,7 +28,7 @@ moving gripper some twenty times in a step; Python's own 5 ms made that step up 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class MeasuredStep:
     """One width step as it was measured."""
 
     step: GripStep
@@ -37,7 +37,7 @@ class Seen:
     contact: Contact
 
 
-class Eye:
+class VisionWorker:
     """Measurement against one reference at a time.
 
     The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
@@ -49,7 +49,7 @@ class Eye:
         settings: limits for a good reference.
     """
 
-    def __init__(self, golden: Golden, settings: ReferenceSettings) -> None:
+    def __init__(self, golden: GoldenReference, settings: ReferenceSettings) -> None:
         sys.setswitchinterval(_SWITCH_S)
         cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
         self._golden, self._settings = golden, settings
@@ -64,7 +64,9 @@ class Eye:
         """Finish the work under way and end the thread."""
         self._worker.shutdown()
 
-    async def take_reference(self, frames: Sequence[Frame], segmentation: Segmentation) -> tuple[Image, Looks]:
+    async def take_reference(
+        self, frames: Sequence[Frame], segmentation: Segmentation
+    ) -> tuple[Image, ReferenceProperties]:
         """Check frames of the untouched gel, and measure against them from now on.
 
         The first reference of a sensor becomes the golden one.
@@ -80,12 +82,12 @@ class Eye:
             BadReferenceError: the frames give no good reference; there is none then.
         """
 
-        def take() -> tuple[Image, Looks]:
+        def take() -> tuple[Image, ReferenceProperties]:
             self._method = self._tracker = None
             self._follows = False
             image = median_image([frame.image for frame in frames])
-            looks = examine(image, self._golden.prepared(segmentation), self._settings)
-            self._golden.keep_first(image)
+            looks = check_reference(image, self._golden.prepared(segmentation), self._settings)
+            self._golden.store_first(image)
             self._method, self._least_confidence = (
                 make_method([image], segmentation),
                 segmentation.robust.least_confidence,
@@ -114,7 +116,7 @@ class Eye:
 
         await self._do(follow)
 
-    def look_ahead(self, frame: Frame) -> None:
+    def measure_ahead(self, frame: Frame) -> None:
         """Start measuring one frame of the next step while more are captured; `measure` then has less to do.
 
         Args:
@@ -129,19 +131,19 @@ class Eye:
         if self._method is not None:
             self._worker.submit(measure)
 
-    async def measure(self, step: GripStep) -> Seen:
+    async def measure(self, step: GripStep) -> MeasuredStep:
         """Find the contact in a step's frames.
 
         Args:
             step: with frames of the reference's shape.
         """
 
-        def measure() -> Seen:
+        def measure() -> MeasuredStep:
             tracker = self._tracker or self._new_tracker()
             if not self._follows:
                 self._tracker = None
             images = [frame.image for frame in step.frames]
-            return Seen(step, mean_image(images), tracker.measure_step(images))
+            return MeasuredStep(step, mean_image(images), tracker.measure_step(images))
 
         return await self._do(measure)
 

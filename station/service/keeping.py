@@ -9,7 +9,7 @@ from pathlib import Path
 log = logging.getLogger(__name__)
 
 
-class Kept:
+class StateFiles:
     """Folder of state files. A file that cannot be read or written is logged, and never stops the station."""
 
     def __init__(self, folder: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from station.service.keeping import Kept
+from station.service.keeping import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.environment import CONFIG_VARIABLE, variable
 from station.settings.problems import SettingsError
@@ -37,14 +37,14 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
         configuration = load_configuration(file, environ)
     except SettingsError as error:
         for home in _homes(file, environ):
-            data = Kept(home).read(name)
+            data = StateFiles(home).read(name)
             if data is not None:
                 try:
                     return Configuration.model_validate_json(data), str(error)
                 except ValidationError:
                     continue
         raise
-    Kept(configuration.home).write(name, configuration.model_dump_json().encode())
+    StateFiles(configuration.home).write(name, configuration.model_dump_json().encode())
     return configuration, ""
 
 

@@ -10,16 +10,16 @@ from station.inspection.cycle import Event
 from station.logs import inspecting
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.crew import Crew
+from station.service.crew import DeviceManager
 from station.service.fruit_line import fruit_line
 from station.service.inspection import Inspection
-from station.service.triggers import Pending, Triggers
+from station.service.triggers import PendingTrigger, RecentTriggers
 from station.vocabulary import Reason
 
 log = logging.getLogger(__name__)
 
 
-class Ledger:
+class InspectionRegistry:
     """Records of this start's inspections; none is left without an outcome.
 
     Args:
@@ -29,11 +29,13 @@ class Ledger:
         versions: of the programs, for the records.
     """
 
-    def __init__(self, records: Records, triggers: Triggers, crew: Crew, versions: Mapping[str, str]) -> None:
+    def __init__(
+        self, records: Records, triggers: RecentTriggers, crew: DeviceManager, versions: Mapping[str, str]
+    ) -> None:
         self.records = records
         self.fault: RecordsError | None = None
         """Why the records are not to be relied on, until they were opened again."""
-        self.on_told: Callable[[Inspection], None] = lambda _: None
+        self.on_outcome: Callable[[Inspection], None] = lambda _: None
         """Told of every inspection with its durable outcome."""
         self._triggers, self._crew, self._versions = triggers, crew, versions
         self._begun: list[Inspection] = []
@@ -45,7 +47,7 @@ class Ledger:
         """Return the first inspection without a durable outcome, if any."""
         return next((now for now in self._begun if now.standing is None), None)
 
-    async def begin(self, pending: Pending) -> None:
+    async def begin(self, pending: PendingTrigger) -> None:
         """Make a trigger durable.
 
         Args:
@@ -83,7 +85,7 @@ class Ledger:
             raise
         return Event.RECORDED
 
-    def tell(self, now: Inspection) -> None:
+    def deliver(self, now: Inspection) -> None:
         """Pass a durable outcome to the callers that wait for it.
 
         Args:
@@ -91,7 +93,7 @@ class Ledger:
         """
         if now.standing is not None:
             self._triggers.ended(now.standing)
-            self.on_told(now)
+            self.on_outcome(now)
             areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
             with inspecting(now.standing.sequence):
                 log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))
@@ -108,7 +110,7 @@ class Ledger:
                 if not now.interruptions:
                     now.interrupt(Reason.RECORDS_FAULT, "the outcome could not be made durable in time")
                 await self.conclude(now)
-                self.tell(now)
+                self.deliver(now)
         return Event.UNFINISHED_CLOSED
 
     async def outcome(self, sequence: int) -> Outcome:
@@ -119,7 +121,7 @@ class Ledger:
                     return outcome
         return await self._triggers.outcome(sequence)
 
-    async def open(self) -> Open:
+    async def open_inspections(self) -> Open:
         """Return the inspections that began and were not acknowledged."""
         held, now = await self.records.open_inspections(), self.running
         running = None if now is None or now.sequence is None else (now.sequence, now.trigger.trigger_id)

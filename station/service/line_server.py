@@ -17,15 +17,15 @@ from station.channel.line import (
 )
 from station.channel.panel import Recover
 from station.channel.server import ChannelServer
-from station.service.alarm_orders import AlarmOrders
-from station.service.lot import LotKeeper
-from station.service.orders import Orders
-from station.service.readiness import Gate
+from station.service.alarm_orders import AlarmCommands
+from station.service.lot import LotManager
+from station.service.orders import PlcCommands
+from station.service.readiness import Interlock
 from station.service.service import Service
 from station.vocabulary import Refusal
 
 
-class LineServer:
+class PlcInterfaceServer:
     """Server for the PLC interface.
 
     Args:
@@ -38,7 +38,13 @@ class LineServer:
     """
 
     def __init__(
-        self, endpoint: str, service: Service, orders: Orders, gate: Gate, lots: LotKeeper, alarms: AlarmOrders
+        self,
+        endpoint: str,
+        service: Service,
+        orders: PlcCommands,
+        gate: Interlock,
+        lots: LotManager,
+        alarms: AlarmCommands,
     ) -> None:
         self._service, self._orders, self._gate, self._lots = service, orders, gate, lots
         self._server = ChannelServer(
@@ -62,31 +68,31 @@ class LineServer:
 
     async def _begin(self, request: Begin) -> Begun:
         refusal, _ = self._gate.refusal()
-        lot = self._lots.of(request.lot)
+        lot = self._lots.lot_of(request.lot)
         if refusal is None and not await self._lots.begin(lot):
             refusal = Refusal.NOT_READY
         return await self._service.begin(request, refusal, lot)
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:
-        return await self._service.ledger.outcome(request.sequence)
+        return await self._service.registry.outcome(request.sequence)
 
     async def _published(self, request: Published) -> Noted:
         await self._service.published(request.outcome)
         return Noted()
 
     async def _acknowledged(self, request: Acknowledged) -> Noted:
-        await self._service.ledger.records.acknowledged(request.sequence)
+        await self._service.registry.records.acknowledged(request.sequence)
         return Noted()
 
     async def _resume(self, _request: Resume) -> Open:
-        return await self._service.ledger.open()
+        return await self._service.registry.open_inspections()
 
     async def _line(self, request: Line) -> StationState:
-        self._orders.line(request)
+        self._orders.set_line(request)
         return self._gate.state()
 
     async def _recover(self, request: Recover) -> CommandDone:
         return await self._orders.recover(request)
 
     async def _command(self, request: Command) -> CommandDone:
-        return await self._orders.carry_out(request)
+        return await self._orders.execute(request)

@@ -5,14 +5,14 @@ import logging
 
 from station.errors import StationError
 from station.records.audit import STATION, AuditEntry
-from station.service.recipe_book import Active, RecipeBook
+from station.service.recipe_book import ActiveRecipe, ActiveRecipes
 from station.service.service import Service
-from station.service.trail import PLC, Trail
+from station.service.trail import PLC, AuditLogger
 
 log = logging.getLogger(__name__)
 
 
-class LotKeeper:
+class LotManager:
     """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot.
 
     Args:
@@ -20,7 +20,7 @@ class LotKeeper:
         book: the recipes in force.
     """
 
-    def __init__(self, service: Service, book: RecipeBook, trail: Trail) -> None:
+    def __init__(self, service: Service, book: ActiveRecipes, trail: AuditLogger) -> None:
         self._service, self._book, self._trail = service, book, trail
         self._turn = asyncio.Lock()
         self.lot: str | None = None
@@ -32,13 +32,13 @@ class LotKeeper:
         self.mismatch = ""
         """Why the last lot could not begin: PLC number, name and content of the recipe do not belong together."""
 
-    def recall(self) -> None:
+    def restore(self) -> None:
         """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
-        remembered = self._book.remembered()
+        remembered = self._book.restored()
         if remembered is not None:
             self._service.active, self.lot = remembered
 
-    def chosen(self, active: Active) -> bool:
+    def choose(self, active: ActiveRecipe) -> bool:
         """Set the recipe of the next lot; a lot under way continues with its own.
 
         Returns:
@@ -46,18 +46,18 @@ class LotKeeper:
         """
         self.mismatch = ""
         self._service.active = active
-        return self._book.remember(active, self.lot)
+        return self._book.store_active(active, self.lot)
 
-    def of(self, told: str) -> str:
+    def lot_of(self, named_by_plc: str) -> str:
         """Return the lot of a fruit.
 
         Args:
             told: the lot as the PLC names it; may be empty.
         """
-        self.plc_names = bool(told)
-        return told or self.named
+        self.plc_names = bool(named_by_plc)
+        return named_by_plc or self.named
 
-    def name(self, lot: str) -> None:
+    def set_lot(self, lot: str) -> None:
         """Start or end a lot for a person; the next fruit freezes the recipe in force again.
 
         Args:
@@ -85,22 +85,24 @@ class LotKeeper:
                 self.mismatch = f"Lot {lot or 'without a name'} cannot begin: {error}."
                 self._service.active, self.lot = None, None
                 log.warning("%s", self.mismatch)
-                self._trail.note(
-                    AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _told(active), {"why": str(error)})
+                self._trail.log(
+                    AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _audited(active), {"why": str(error)})
                 )
                 return False
             before, self.lot, self.mismatch = self.lot, lot, ""
             self._service.active = now
             if now.snapshot != active.snapshot:
                 log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)
-            self._trail.note(
-                AuditEntry(PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_told(active)}, _told(now))
+            self._trail.log(
+                AuditEntry(
+                    PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_audited(active)}, _audited(now)
+                )
             )
-            await asyncio.to_thread(self._book.remember, now, lot)
+            await asyncio.to_thread(self._book.store_active, now, lot)
             return True
 
 
-def _told(active: Active) -> dict[str, str | int]:
+def _audited(active: ActiveRecipe) -> dict[str, str | int]:
     snapshot = active.snapshot
     return {
         "recipe": snapshot.name,

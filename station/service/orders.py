@@ -12,13 +12,13 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
-from station.service.crew import Crew
-from station.service.keeping import Kept
-from station.service.lot import LotKeeper
+from station.service.crew import DeviceManager
+from station.service.keeping import StateFiles
+from station.service.lot import LotManager
 from station.service.metrics import Metrics
-from station.service.recipe_book import RecipeBook
+from station.service.recipe_book import ActiveRecipes
 from station.service.service import Service
-from station.service.trail import PANEL, PLC, Trail, alarm_changed, order_told
+from station.service.trail import PANEL, PLC, AuditLogger, alarm_entry, command_entry
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
@@ -31,7 +31,7 @@ _STOPPED = "stopped_by_a_person"
 _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
-class Orders:
+class PlcCommands:
     """Executes the PLC's commands, one after the other.
 
     Args:
@@ -44,12 +44,12 @@ class Orders:
     def __init__(
         self,
         service: Service,
-        crew: Crew,
-        book: RecipeBook,
-        lots: LotKeeper,
-        trail: Trail,
+        crew: DeviceManager,
+        book: ActiveRecipes,
+        lots: LotManager,
+        trail: AuditLogger,
         metrics: Metrics,
-        kept: Kept,
+        kept: StateFiles,
     ) -> None:
         self._service, self._crew, self._book, self._metrics = service, crew, book, metrics
         self._lots, self._trail, self._kept = lots, trail, kept
@@ -71,15 +71,15 @@ class Orders:
         return None if self._line_at_s is None else time.monotonic() - self._line_at_s
 
     @property
-    def told(self) -> Line | None:
+    def last_report(self) -> Line | None:
         """Return the PLC interface's last message; None if there was none."""
         return self._line
 
-    def recall(self) -> None:
+    def restore_stop(self) -> None:
         """Restore a person's stop after a restart; it lasts until a reset."""
         self._service.stop_wanted = self._kept.read(_STOPPED) == b"yes"
 
-    def line(self, line: Line) -> None:
+    def set_line(self, line: Line) -> None:
         """Store the PLC interface's beat."""
         self._line, self._line_at_s = line, time.monotonic()
         if line.registers:
@@ -94,7 +94,7 @@ class Orders:
         """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
         return self._registers
 
-    def line_trouble(self) -> str:
+    def line_fault(self) -> str:
         """Return the line's fault, as far as known; empty for none."""
         age_s = self.line_age_s
         if self._line is None or age_s is None:
@@ -103,44 +103,44 @@ class Orders:
             return f"the PLC interface has not been heard for {age_s:.0f} s"
         return "" if self._line.plc_alive or not self._line.enabled else "the PLC's heartbeat stands still"
 
-    def show_line(self) -> None:
+    def update_line_alarms(self) -> None:
         """Raise and clear the alarms of the line's state."""
         age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
         if line is None or age_s is None:
             return
         silent = age_s > LINE_SILENT_S
-        alarms.show(AlarmId.PLC_INTERFACE_LOST, self.line_trouble() if silent else "")
-        alarms.show(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_trouble())
+        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else "")
+        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_fault())
         can = [fault for fault in line.faults if fault.startswith("CAN:")]
         shots = [fault for fault in can if fault.startswith(("CAN: shot ", "CAN: the gate reports"))]
-        alarms.show(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
-        alarms.show(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
+        alarms.update(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
+        alarms.update(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
 
-    async def carry_out(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
+    async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command.
 
         Args:
             by: name and role of who gave it.
         """
         log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
-        before, alarms = self._before(command.command), self._service.alarms.alarms
+        before, alarms = self._value_before(command.command), self._service.alarms.alarms
         async with self._turn:
             try:
                 async with asyncio.timeout(DEADLINE_S):
-                    why = await self._carry_out(command)
+                    why = await self._execute(command)
             except TimeoutError:
                 why = f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._sentence()}"
         if why:
             log.warning("%s was not done: %s", command.command, why)
         done = CommandDone(done=not why, why=why)
-        self._trail.note(order_told(command, done, before, by))
+        self._trail.log(command_entry(command, done, before, by))
         if command.command in _ON_ALARMS:
             now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
             changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
-            self._trail.note(*(alarm_changed(*by, change, alarm) for alarm in changed))
+            self._trail.log(*(alarm_entry(*by, change, alarm) for alarm in changed))
         return done
 
-    def _before(self, command: CommandName) -> dict[str, Any]:
+    def _value_before(self, command: CommandName) -> dict[str, Any]:
         """Return the value that a command is about to change, for the audit log."""
         active = self._service.active
         match command:
@@ -152,7 +152,7 @@ class Orders:
             case _:
                 return {"state": str(self._service.state)}
 
-    async def _carry_out(self, command: Command) -> str:
+    async def _execute(self, command: Command) -> str:
         match command.command:
             case CommandName.CHANGE_RECIPE:
                 return await self._change_recipe(command.argument)
@@ -190,7 +190,7 @@ class Orders:
         self.recipe_changing = True
         try:
             await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
-            kept = self._lots.chosen(found)
+            kept = self._lots.choose(found)
             log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
         finally:
             self.recipe_changing = False
@@ -228,7 +228,7 @@ class Orders:
             why = ""
         except ArmFault as fault:
             why = str(fault)
-        self._trail.command(by[0], "recover", request.what, why, by[1])
+        self._trail.log_command(by[0], "recover", request.what, why, by[1])
         return CommandDone(done=not why, why=why)
 
     async def _call_off(self) -> str:
@@ -240,11 +240,11 @@ class Orders:
         await service.conductor.until(lambda state: state not in UNJUDGED)
         return ""
 
-    def no_reset(self) -> str:
+    def reset_refusal(self) -> str:
         """Return why a reset would do nothing now; empty if it would work."""
-        if self._service.stop_asked:
+        if self._service.stop_requested:
             return "the station is told to end"
-        if stop := self._crew.standing_stop:
+        if stop := self._crew.active_stop:
             why = str(stop).removesuffix(".")
             return f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
         busy = STATES[self._service.state].refusal is Refusal.BUSY
@@ -252,7 +252,7 @@ class Orders:
 
     async def _reset(self) -> str:
         service, state = self._service, self._service.state
-        if why_not := self.no_reset():
+        if why_not := self.reset_refusal():
             return why_not
         service.stop_wanted = False
         await asyncio.to_thread(self._kept.write, _STOPPED, b"no")
@@ -266,7 +266,7 @@ class Orders:
             service.conductor.post(Event.RESET)
         else:
             try:
-                await self._crew.play_again()
+                await self._crew.restart_program()
             except ArmFault as fault:
                 return str(fault)
             if state is State.CARRIED:

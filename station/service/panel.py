@@ -31,19 +31,19 @@ from station.inspection.states import STATES
 from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.alarm_orders import AlarmOrders
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
+from station.service.alarm_orders import AlarmCommands
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import DeviceManager
 from station.service.inspection import utc_ms
-from station.service.lot import LotKeeper
-from station.service.orders import Orders
-from station.service.panel_memory import PanelMemory
-from station.service.panel_orders import PanelOrders
-from station.service.panel_recall import recalled
-from station.service.readiness import Gate
-from station.service.recipe_book import Active, RecipeBook
+from station.service.lot import LotManager
+from station.service.orders import PlcCommands
+from station.service.panel_memory import RecentInspections
+from station.service.panel_orders import OperatorCommands
+from station.service.panel_recall import read_recent
+from station.service.readiness import Interlock
+from station.service.recipe_book import ActiveRecipe, ActiveRecipes
 from station.service.service import Service
-from station.service.trail import Trail
+from station.service.trail import AuditLogger
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
@@ -52,7 +52,7 @@ SILENT_S = 3.0
 """Time for a killed HMI process to restart, on a machine that is otherwise idle."""
 
 
-class Panel:
+class PanelServer:
     """Channel server for the HMI.
 
     Args:
@@ -66,24 +66,24 @@ class Panel:
 
     def __init__(
         self,
-        gate: Gate,
+        gate: Interlock,
         service: Service,
-        crew: Crew,
-        lots: LotKeeper,
-        book: RecipeBook,
-        line: Orders,
+        crew: DeviceManager,
+        lots: LotManager,
+        book: ActiveRecipes,
+        line: PlcCommands,
         records: Records,
-        alarms: AlarmOrders,
-        trail: Trail,
-        calibrated: Calibrated,
+        alarms: AlarmCommands,
+        trail: AuditLogger,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._gate, self._service, self._crew, self._lots = gate, service, crew, lots
         self._book, self._line, self._records, self._alarms, self._trail = book, line, records, alarms, trail
         self._calibrated = calibrated
-        self._orders = PanelOrders(line, service, crew, lots, records, trail)
-        self._memory = PanelMemory()
+        self._orders = OperatorCommands(line, service, crew, lots, records, trail)
+        self._memory = RecentInspections()
         self._heard_s: float | None = None
-        service.ledger.on_told, service.on_published = self._memory.ended, self._memory.stands
+        service.registry.on_outcome, service.on_published = self._memory.add, self._memory.set_outcome
         self.handlers: Handlers = {
             AskPanel: self._state,
             AskRecent: self._recent,
@@ -97,23 +97,23 @@ class Panel:
         }
         """For a channel's server."""
 
-    async def recall(self) -> None:
+    async def restore(self) -> None:
         """Restore the last fruit of the previous start, and the counts of their lots."""
         pacing = self._service.pacing
         try:
             found = await asyncio.to_thread(
-                recalled, self._records.folder, lambda recipe: pacing.limits(recipe).inspection_s
+                read_recent, self._records.folder, lambda recipe: pacing.limits(recipe).inspection_s
             )
         except RecordsError as error:
             log.warning("the last fruit are not shown: %s", error)
             return
-        self._memory.recall(*found)
+        self._memory.restore(*found)
 
     async def close(self) -> None:
         """Cancel the commands under way."""
         await self._orders.close()
 
-    def trouble(self) -> str:
+    def hmi_fault(self) -> str:
         """Return the fault of the HMI's process; empty for none, and before its first message."""
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
         return f"the pages' process has not asked for {age_s:.0f} s" if age_s > SILENT_S else ""
@@ -122,7 +122,7 @@ class Panel:
         self._heard_s = time.monotonic()
         service, line = self._service, self._gate.state()
         facts, active = STATES[service.state], service.active
-        told = self._line.told
+        told = self._line.last_report
         return PanelState(
             boot=line.boot,
             utc_ms=utc_ms(),
@@ -136,20 +136,20 @@ class Panel:
             needs_person=facts.needs_person,
             stopping=service.stop_wanted,
             simulated=line.simulated,
-            recipe=None if active is None else _named(active),
+            recipe=None if active is None else _recipe_name(active),
             lot=self._lots.lot,
             named_lot=self._lots.named,
             plc_names_lots=self._lots.plc_names,
             plc_connected=told is not None and told.plc_connected,
             plc_alive=told is not None and told.plc_alive,
-            line_trouble=self._line.line_trouble(),
+            line_trouble=self._line.line_fault(),
             check_due=self._calibrated.refusal(),
-            alarms=self._alarms.standing(),
+            alarms=self._alarms.active(),
             devices=tuple(
                 DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
-                for name, watch in self._crew.watches.items()
+                for name, watch in self._crew.monitors.items()
             ),
-            orders=self._orders.shown,
+            orders=self._orders.recent,
             may=self._orders.possible,
             recoveries=self._orders.recoveries,
             last_sequence=self._memory.last_sequence,
@@ -170,8 +170,8 @@ class Panel:
         found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
         active = self._service.active
         return Recipes(
-            recipes=tuple(_shown(each) for each in found),
-            active=None if active is None else _shown(active),
+            recipes=tuple(_recipe_view(each) for each in found),
+            active=None if active is None else _recipe_view(active),
             problems=self._book.problems,
         )
 
@@ -184,20 +184,20 @@ class Panel:
         )
 
     async def _order(self, request: PanelOrder) -> OrderShown:
-        return await self._orders.order(request)
+        return await self._orders.start(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
         entry = AuditEntry(request.person.who, request.person.role, f"panel.{request.what}", request.subject)
-        self._trail.note(entry)
+        self._trail.log(entry)
         return Noted()
 
 
-def _named(active: Active) -> RecipeNamed:
+def _recipe_name(active: ActiveRecipe) -> RecipeNamed:
     recipe = active.recipe
     return RecipeNamed(
         number=recipe.plc_number, name=recipe.name, title=recipe.title, revision=active.snapshot.revision
     )
 
 
-def _shown(active: Active) -> RecipeShown:
-    return RecipeShown(**_named(active).model_dump(), values=active.snapshot.text)
+def _recipe_view(active: ActiveRecipe) -> RecipeShown:
+    return RecipeShown(**_recipe_name(active).model_dump(), values=active.snapshot.text)

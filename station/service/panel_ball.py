@@ -32,12 +32,12 @@ from station.channel.server import Handler
 from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
-from station.service.ball_bench import BallBench
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
-from station.service.orders import Orders
+from station.service.ball_bench import StationRig
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import DeviceManager
+from station.service.orders import PlcCommands
 from station.service.panel_worker import PanelWorker
-from station.service.trail import Trail, calibration_stored, calibration_verified
+from station.service.trail import AuditLogger, calibration_entry, verification_entry
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
 
@@ -65,7 +65,7 @@ class _Run:
         return self.state in {"running", "waiting"}
 
 
-class PanelBall:
+class PanelCalibration:
     """Requests about the calibration, and runs of the procedures of `station.calibration`.
 
     Args:
@@ -80,11 +80,11 @@ class PanelBall:
     def __init__(
         self,
         configuration: Configuration,
-        crew: Crew,
-        orders: Orders,
-        calibrated: Calibrated,
+        crew: DeviceManager,
+        orders: PlcCommands,
+        calibrated: ActiveCalibration,
         records: Records,
-        trail: Trail,
+        trail: AuditLogger,
         worker: PanelWorker,
         refusal: Callable[[], str],
     ) -> None:
@@ -122,15 +122,15 @@ class PanelBall:
         return CalibrationState(
             serial=serial,
             in_use=self._calibrated.in_force.words,
-            calibration=None if calibration is None else self._calibration_told(calibration),
-            verification=None if verification is None else self._verification_told(verification),
+            calibration=None if calibration is None else self._calibration_view(calibration),
+            verification=None if verification is None else self._verification_view(verification),
             age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
             oldest_days=settings.oldest_days,
             verify_every_h=settings.verify_every_h,
-            trouble=self._calibrated.refusal() or self._calibrated.trouble(),
+            trouble=self._calibrated.refusal() or self._calibrated.alarm_detail(),
             ball_mm=settings.ball_mm,
-            run=None if self._run is None else _told(self._run),
+            run=None if self._run is None else _run_view(self._run),
             run_refused=self._why_not(serial),
         )
 
@@ -159,8 +159,8 @@ class PanelBall:
         self._note(request.actor, "begun")
         self._orders.kept_manual = _NAMES[request.kind]
         self._crew.use(by_inspection=True)
-        run.task = asyncio.create_task(self._carry_out(run, request), name=f"{request.kind} at the panel")
-        return _told(run)
+        run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
+        return _run_view(run)
 
     async def go_on(self, _request: GoOnBallRun) -> BallRunTold:
         """Continue after the ball was laid."""
@@ -169,7 +169,7 @@ class PanelBall:
             raise BadInputError("nothing waits for the ball at this moment; look at the run again")
         run.state, run.request = "running", ""
         run.laid.set()
-        return _told(run)
+        return _run_view(run)
 
     async def end(self, request: EndBallRun) -> BallRunTold:
         """Cancel the run."""
@@ -179,7 +179,7 @@ class PanelBall:
         if run.open:
             self._note(request.actor, "called_off")
             await self.close()
-        return _told(run)
+        return _run_view(run)
 
     def _why_not(self, serial: str) -> str:
         if self._run is not None and self._run.open:
@@ -188,7 +188,7 @@ class PanelBall:
             return "This camera is no sensor that could be calibrated."
         return self._refusal()
 
-    async def _carry_out(self, run: _Run, request: BeginBallRun) -> None:
+    async def _run_procedure(self, run: _Run, request: BeginBallRun) -> None:
         try:
             words = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
         except asyncio.CancelledError:
@@ -197,7 +197,7 @@ class PanelBall:
         except (StationError, ValueError) as error:
             run.state, run.told = "failed", str(error)
             if isinstance(error, StationError):
-                self._crew.failed(error)
+                self._crew.report_fault(error)
         else:
             run.state, run.told = ("failed", words) if words else ("passed", "")
         finally:
@@ -207,7 +207,7 @@ class PanelBall:
 
     async def _calibrate(self, run: _Run, request: BeginBallRun) -> str:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
-        bench = BallBench(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         draft = await Calibrating(
             bench,
             self._unit(),
@@ -220,7 +220,7 @@ class PanelBall:
         ).run()
         before, new = self._store.current(draft.calibration.serial), draft.calibration
         files = await asyncio.to_thread(_calibration_files, draft)
-        entry = calibration_stored(
+        entry = calibration_entry(
             run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
         )
         await self._records.change(
@@ -236,7 +236,7 @@ class PanelBall:
         golden, presses = await self._worker.do(
             lambda: (self._store.golden(calibration), self._store.presses(calibration))
         )
-        bench = BallBench(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         verified = await Verifying(
             bench,
             recipe,
@@ -249,7 +249,7 @@ class PanelBall:
         ).run()
         files = await asyncio.to_thread(_verification_files, verified, calibration)
         made = verified.verification
-        entry = calibration_verified(
+        entry = verification_entry(
             run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
         )
         await self._records.change(
@@ -277,9 +277,9 @@ class PanelBall:
 
     def _note(self, actor: Actor, what: str) -> None:
         kind = self._run.kind if self._run is not None else "run"
-        self._trail.note(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
+        self._trail.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
 
-    def _calibration_told(self, made: Calibration) -> CalibrationTold:
+    def _calibration_view(self, made: Calibration) -> CalibrationTold:
         return CalibrationTold(
             serial=made.serial,
             id=made.id,
@@ -287,11 +287,11 @@ class PanelBall:
             operator=made.operator,
             words=made.in_words(),
             passed=True,
-            checks=_checks(made),
-            pictures=_there(self._store.folder(made)),
+            checks=_check_views(made),
+            pictures=_files_in(self._store.folder(made)),
         )
 
-    def _verification_told(self, made: Verification) -> CalibrationTold:
+    def _verification_view(self, made: Verification) -> CalibrationTold:
         ratio = "" if made.area_ratio is None else f"the ball's area is {made.area_ratio:.1%} of the calibration's"
         return CalibrationTold(
             serial=made.serial,
@@ -300,8 +300,8 @@ class PanelBall:
             operator=made.operator,
             words=ratio,
             passed=made.passed,
-            checks=_checks(made),
-            pictures=_there(self._store.folder(made)),
+            checks=_check_views(made),
+            pictures=_files_in(self._store.folder(made)),
         )
 
 
@@ -311,20 +311,20 @@ def _note_step(run: _Run, progress: Progress) -> None:
     )
 
 
-def _told(run: _Run) -> BallRunTold:
+def _run_view(run: _Run) -> BallRunTold:
     return BallRunTold(
         kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), told=run.told
     )
 
 
-def _checks(made: Calibration | Verification) -> tuple[CheckTold, ...]:
+def _check_views(made: Calibration | Verification) -> tuple[CheckTold, ...]:
     return tuple(
         CheckTold(name=check.name, passed=check.passed, found=check.found, expected=check.expected, remedy=check.remedy)
         for check in made.checks
     )
 
 
-def _there(folder: Path) -> tuple[str, ...]:
+def _files_in(folder: Path) -> tuple[str, ...]:
     with contextlib.suppress(OSError):
         return tuple(name for name in _PICTURES if (folder / name).is_file())
     return ()

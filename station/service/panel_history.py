@@ -85,7 +85,7 @@ class PanelHistory:
 
         def read() -> InspectionTold:
             with reading(self._folder) as connection:
-                return _told(read_inspection(connection, request.sequence, self._folder))
+                return _inspection_view(read_inspection(connection, request.sequence, self._folder))
 
         return await self._worker.do(read)
 
@@ -150,7 +150,7 @@ class PanelHistory:
 
     async def job(self, request: AskJob) -> JobTold:
         """Return a job's state."""
-        return self._jobs.told(request.job)
+        return self._jobs.state(request.job)
 
     async def end_job(self, request: EndJob) -> JobTold:
         """Cancel a job."""
@@ -188,7 +188,7 @@ def _lot(lot: Lot) -> LotTold:
     return LotTold(**lot._asdict())
 
 
-def _told(record: FullRecord) -> InspectionTold:
+def _inspection_view(record: FullRecord) -> InspectionTold:
     trigger, judged, standing, recipe = record.trigger, record.judged, record.standing, record.trigger.recipe
     reasons = standing.reasons if standing is not None else ()
     return InspectionTold(

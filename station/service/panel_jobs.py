@@ -55,7 +55,7 @@ class Job:
     arguments: Sequence[str]
     of: int = 0
     state: Literal["waiting", "running", "done", "failed", "ended"] = "waiting"
-    told: str = ""
+    message: str = ""
     task: asyncio.Task[None] | None = field(default=None, repr=False)
 
     @property
@@ -109,9 +109,9 @@ class PanelJobs:
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job), name=f"job {kind}")
         self._forget()
-        return self.told(job.id)
+        return self.state(job.id)
 
-    def told(self, job_id: str) -> JobTold:
+    def state(self, job_id: str) -> JobTold:
         """Return a job's state.
 
         Raises:
@@ -124,7 +124,13 @@ class PanelJobs:
             if path.suffix in _MEDIA
         )
         return JobTold(
-            job=job.id, kind=job.kind, state=job.state, done=self._done(job), of=job.of, told=job.told, files=files
+            job=job.id,
+            kind=job.kind,
+            state=job.state,
+            done=self._progress(job),
+            of=job.of,
+            told=job.message,
+            files=files,
         )
 
     def read(self, job_id: str, name: str, offset: int) -> Chunk:
@@ -137,7 +143,7 @@ class PanelJobs:
         Raises:
             JobError: there is no such file.
         """
-        told = self.told(job_id)
+        told = self.state(job_id)
         if name not in {file.name for file in told.files}:
             raise JobError(f"there is no file {name} of this job; begin it again")
         try:
@@ -156,7 +162,7 @@ class PanelJobs:
             await asyncio.gather(job.task, return_exceptions=True)
             if job.open:  # cancelled before it ran at all
                 job.state = "ended"
-        return self.told(job_id)
+        return self.state(job_id)
 
     async def close(self) -> None:
         """End the running job. Idempotent."""
@@ -168,13 +174,13 @@ class PanelJobs:
             async with self._turn:
                 job.state = "running"
                 async with asyncio.timeout(LONGEST_S):
-                    code, words = await self._carry_out(job)
+                    code, words = await self._run_command(job)
             job.state = "failed" if code else "done"
-            job.told = words
+            job.message = words
         except TimeoutError:
-            job.state, job.told = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
+            job.state, job.message = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
         except OSError as error:
-            job.state, job.told = "failed", f"it could not be started: {error.strerror}"
+            job.state, job.message = "failed", f"it could not be started: {error.strerror}"
         except asyncio.CancelledError:
             job.state = "ended"
             raise
@@ -182,7 +188,7 @@ class PanelJobs:
             if job.state != "done":
                 shutil.rmtree(job.folder, ignore_errors=True)
 
-    async def _carry_out(self, job: Job) -> tuple[int, str]:
+    async def _run_command(self, job: Job) -> tuple[int, str]:
         """Return the exit code and the last output."""
         environment = {
             **{name: value for name, value in os.environ.items() if not name.startswith("STATION_")},
@@ -208,7 +214,7 @@ class PanelJobs:
         words = stderr.decode("utf-8", "replace").strip().splitlines()
         return process.returncode or 0, words[-1][:1000] if process.returncode and words else ""
 
-    def _done(self, job: Job) -> int:
+    def _progress(self, job: Job) -> int:
         """Return a what-if's progress from the file that it appends to; the first line is a heading."""
         if job.state == "done":
             return job.of

@@ -32,16 +32,16 @@ from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
 from station.records.audit import AuditEntry
-from station.service.calibrated import Calibrated
-from station.service.crew import GRIPPER, Crew
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import GRIPPER, DeviceManager
 from station.service.health import Liveness
-from station.service.orders import Orders
+from station.service.orders import PlcCommands
 from station.service.panel_log import LogRing
 from station.service.panel_worker import PanelWorker
-from station.service.readiness import Gate
+from station.service.readiness import Interlock
 from station.service.reference import GOLDEN, sharpness
 from station.service.service import Service
-from station.service.trail import Trail
+from station.service.trail import AuditLogger
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
 from station.vision.methods import make_method
@@ -81,12 +81,12 @@ class PanelMaintenance:
     def __init__(
         self,
         service: Service,
-        crew: Crew,
-        orders: Orders,
-        gate: Gate,
+        crew: DeviceManager,
+        orders: PlcCommands,
+        gate: Interlock,
         liveness: Liveness,
-        calibrated: Calibrated,
-        trail: Trail,
+        calibrated: ActiveCalibration,
+        trail: AuditLogger,
         home: Path,
         worker: PanelWorker,
         log: LogRing,
@@ -112,7 +112,7 @@ class PanelMaintenance:
     def refusal(self) -> str:
         """Return why nothing may be moved by hand now, with the remedy; empty if it may."""
         service, facts, mode = self._service, STATES[self._service.state], self._orders.mode
-        if service.stop_asked:
+        if service.stop_requested:
             return "The station is told to end."
         if facts.refusal is Refusal.BUSY:
             return "An inspection is under way: wait for its end."
@@ -126,7 +126,7 @@ class PanelMaintenance:
 
     async def health(self, _request: GetHealth) -> Health:
         """Return the health of all dependencies."""
-        readiness, records, figures = self._gate.readiness(), self._service.ledger.records, self._calibrated.figures
+        readiness, records, figures = self._gate.readiness(), self._service.registry.records, self._calibrated.figures
         status = await self._worker.do(records.status)
         return Health(
             ready=readiness.ready,
@@ -180,7 +180,7 @@ class PanelMaintenance:
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
                 finally:
                     self._orders.kept_manual = ""
-        self._crew.watches[GRIPPER].heard()
+        self._crew.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
@@ -223,7 +223,7 @@ class PanelMaintenance:
             raise NotNowError(why)
 
     def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
-        self._trail.note(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+        self._trail.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
 
     def _live(self, frame: Frame, segmentation: Segmentation | None, why: str) -> LiveImage:
         image, contact = frame.image, None

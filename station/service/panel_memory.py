@@ -16,7 +16,7 @@ from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
-from station.service.eye import Seen
+from station.service.eye import MeasuredStep
 from station.service.inspection import Inspection
 from station.settings.recipe import Recipe
 from station.vision.contact import Mask
@@ -28,34 +28,34 @@ _CORNER_PX = 1.0
 """Greatest distance of the outline's corners from the contact's edge."""
 
 
-class ForgottenError(StationError):
+class NotRecentError(StationError):
     """The fruit is not among the recent ones any more."""
 
 
-Look = Callable[[], tuple[Image, Mask]]
+ReadStep = Callable[[], tuple[Image, Mask]]
 """Returns a step's image and the contact in it; blocks if they have to be read from the disk."""
 
 
-class Remembered(NamedTuple):
+class RestoredFruit(NamedTuple):
     """A fruit of an earlier start of the station."""
 
     fruit: Fruit
-    look: Look | None
+    look: ReadStep | None
     """None if no image was stored."""
 
 
 @dataclass(slots=True)
-class _Kept:
+class _Recent:
     fruit: Fruit
-    look: Look | None
+    look: ReadStep | None
     picture: Picture | None = None
 
 
-class PanelMemory:
+class RecentInspections:
     """Recent inspections in memory; the records have all of them."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[int, _Kept] = OrderedDict()
+        self._kept: OrderedDict[int, _Recent] = OrderedDict()
         self._short: deque[FruitShort] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
         self._turn = asyncio.Lock()
@@ -65,8 +65,8 @@ class PanelMemory:
         """Return the sequence of the last fruit with an outcome."""
         return self._short[-1].sequence if self._short else None
 
-    def recall(
-        self, short: Iterable[FruitShort], full: Iterable[Remembered], lots: Mapping[str, Mapping[str, int]]
+    def restore(
+        self, short: Iterable[FruitShort], full: Iterable[RestoredFruit], lots: Mapping[str, Mapping[str, int]]
     ) -> None:
         """Restore the recent inspections of the previous start.
 
@@ -76,15 +76,15 @@ class PanelMemory:
             lots: count of each outcome, by lot.
         """
         self._short.extend(short)
-        self._kept.update((each.fruit.short.sequence, _Kept(each.fruit, each.look)) for each in full)
+        self._kept.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
 
-    def ended(self, now: Inspection) -> None:
+    def add(self, now: Inspection) -> None:
         """Add an inspection with its durable outcome."""
         if now.standing is None:
             return
-        fruit, look = _told(now, now.standing)
-        self._kept[fruit.short.sequence] = _Kept(fruit, look)
+        fruit, look = _new_fruit(now, now.standing)
+        self._kept[fruit.short.sequence] = _Recent(fruit, look)
         while len(self._kept) > MOST_IN_FULL:
             self._kept.popitem(last=False)
         self._short.append(fruit.short)
@@ -92,7 +92,7 @@ class PanelMemory:
         while len(self._lots) > MOST_IN_FULL:
             self._lots.popitem(last=False)
 
-    def stands(self, outcome: Outcome) -> None:
+    def set_outcome(self, outcome: Outcome) -> None:
         """Set the outcome that was published to the PLC; it overrides the station's own result."""
         kept = self._kept.get(outcome.sequence)
         if kept is None or kept.fruit.short.outcome == outcome.outcome:
@@ -126,7 +126,7 @@ class PanelMemory:
         """Return one of the recent fruit.
 
         Raises:
-            ForgottenError: it is not among them.
+            NotRecentError: it is not among them.
         """
         return self._find(sequence).fruit
 
@@ -134,24 +134,24 @@ class PanelMemory:
         """Return a fruit's picture, made in a thread at the first request.
 
         Raises:
-            ForgottenError: it is not among them, or has no image.
+            NotRecentError: it is not among them, or has no image.
         """
         kept = self._find(sequence)
         async with self._turn:
             if kept.picture is None and kept.look is not None:
                 kept.picture, kept.look = await asyncio.to_thread(_picture, kept.look), None
         if kept.picture is None:
-            raise ForgottenError(f"no picture was taken of inspection {sequence}")
+            raise NotRecentError(f"no picture was taken of inspection {sequence}")
         return kept.picture
 
-    def _find(self, sequence: int) -> _Kept:
+    def _find(self, sequence: int) -> _Recent:
         kept = self._kept.get(sequence)
         if kept is None:
-            raise ForgottenError(f"inspection {sequence} is not among the last {MOST_IN_FULL}: look into the history")
+            raise NotRecentError(f"inspection {sequence} is not among the last {MOST_IN_FULL}: look into the history")
         return kept
 
 
-def fruit_of(
+def fruit_view(
     standing: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
 ) -> Fruit:
     """Make the page's view of a fruit.
@@ -166,7 +166,7 @@ def fruit_of(
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
     factor = limit_factor(record.measures)
     return Fruit(
-        short=short_of(standing, recipe.name, [point.area_mm2 for point in points]),
+        short=short_view(standing, recipe.name, [point.area_mm2 for point in points]),
         explanation=record.explanation,
         recipe_title=recipe.title,
         revision=revision,
@@ -195,7 +195,7 @@ def fruit_of(
     )
 
 
-def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
+def short_view(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
     """Make the view of a fruit in a list.
 
     Args:
@@ -217,12 +217,12 @@ def short_of(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) 
     )
 
 
-def _told(now: Inspection, standing: Outcome) -> tuple[Fruit, Look | None]:
+def _new_fruit(now: Inspection, standing: Outcome) -> tuple[Fruit, ReadStep | None]:
     """Make the view of a new fruit, with the picture of its deciding step."""
     record, revision = now.record(), now.active.snapshot.revision
     step = deciding_step(record)
-    look = None if step is None else _look(now.seen[step])
-    return fruit_of(standing, record, now.active.recipe, revision, now.limits.inspection_s, step), look
+    look = None if step is None else _step_reader(now.seen[step])
+    return fruit_view(standing, record, now.active.recipe, revision, now.limits.inspection_s, step), look
 
 
 def deciding_step(record: InspectionRecord) -> int | None:
@@ -234,16 +234,16 @@ def deciding_step(record: InspectionRecord) -> int | None:
     return record.curve[-1].step if record.curve else None
 
 
-def _look(seen: Seen) -> Look:
+def _step_reader(seen: MeasuredStep) -> ReadStep:
     image, mask = seen.image, seen.contact.mask
     return lambda: (image, mask)
 
 
-def _picture(look: Look) -> Picture:
+def _picture(look: ReadStep) -> Picture:
     image, mask = look()
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not done:
-        raise ForgottenError("the picture could not be encoded")
+        raise NotRecentError("the picture could not be encoded")
     outlines, _ = cv2.findContours(np.ascontiguousarray(mask), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     outline: tuple[tuple[int, int], ...] = ()
     if outlines:

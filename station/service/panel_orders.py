@@ -15,12 +15,12 @@ from station.inspection.states import State
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
-from station.service.crew import ARM, Crew
+from station.service.crew import ARM, DeviceManager
 from station.service.inspection import utc_ms
-from station.service.lot import LotKeeper
-from station.service.orders import Orders
+from station.service.lot import LotManager
+from station.service.orders import PlcCommands
 from station.service.service import Service
-from station.service.trail import Trail
+from station.service.trail import AuditLogger
 
 AT_ONCE_S = 0.4
 """Longest time for which a command's answer waits for the command's end."""
@@ -44,7 +44,7 @@ _COMMANDS = {
 """Commands that the PLC has too are executed as the PLC's."""
 
 
-class PanelOrders:
+class OperatorCommands:
     """Executes operators' commands.
 
     Args:
@@ -54,7 +54,13 @@ class PanelOrders:
     """
 
     def __init__(
-        self, orders: Orders, service: Service, crew: Crew, lots: LotKeeper, records: Records, trail: Trail
+        self,
+        orders: PlcCommands,
+        service: Service,
+        crew: DeviceManager,
+        lots: LotManager,
+        records: Records,
+        trail: AuditLogger,
     ) -> None:
         self._orders, self._service, self._crew, self._lots = orders, service, crew, lots
         self._records, self._trail = records, trail
@@ -69,14 +75,14 @@ class PanelOrders:
         await asyncio.gather(*self._tasks.values(), return_exceptions=True)
 
     @property
-    def shown(self) -> tuple[OrderShown, ...]:
+    def recent(self) -> tuple[OrderShown, ...]:
         """Return the last commands, newest first."""
         return tuple(reversed(self._shown))
 
     @property
     def recoveries(self) -> tuple[RecoveryName, ...]:
         """Return the stops that a person may recover from after a check of the cell."""
-        fault = self._crew.watches[ARM].fault if ARM in self._crew.watches else None
+        fault = self._crew.monitors[ARM].fault if ARM in self._crew.monitors else None
         found = _RECOVERIES.get(fault.cause) if isinstance(fault, ArmFault) else None
         return () if found is None else (found,)
 
@@ -86,8 +92,8 @@ class PanelOrders:
         service, state = self._service, self._service.state
         conditions = {
             OrderName.CHOOSE_RECIPE: not self._orders.recipe_changing,
-            OrderName.START: not self._orders.no_reset() and (state in WAITING or service.stop_wanted),
-            OrderName.STOP: not service.stop_wanted and not service.stop_asked and state is not State.LATCHED,
+            OrderName.START: not self._orders.reset_refusal() and (state in WAITING or service.stop_wanted),
+            OrderName.STOP: not service.stop_wanted and not service.stop_requested and state is not State.LATCHED,
             OrderName.CALL_OFF: state in UNJUDGED,
             OrderName.RECOVER: bool(self.recoveries),
             OrderName.SET_MODE: True,
@@ -96,9 +102,9 @@ class PanelOrders:
         }
         return tuple(order for order, possible in conditions.items() if possible)
 
-    async def order(self, request: PanelOrder) -> OrderShown:
+    async def start(self, request: PanelOrder) -> OrderShown:
         """Start a command, and wait a moment for its end."""
-        same = next((each for each in self.shown if _under_way(each, request)), None)
+        same = next((each for each in self.recent if _under_way(each, request)), None)
         shown = same or OrderShown(
             ticket=next(self._tickets),
             order=request.order,
@@ -120,19 +126,19 @@ class PanelOrders:
 
     async def _follow(self, shown: OrderShown, request: PanelOrder) -> None:
         try:
-            why = await self._carry_out(request)
+            why = await self._execute(request)
         except StationError as error:
             why = str(error)
         ended = shown.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
         self._shown = deque((ended if each.ticket == shown.ticket else each for each in self._shown), _REMEMBERED)
 
-    async def _carry_out(self, request: PanelOrder) -> str:
+    async def _execute(self, request: PanelOrder) -> str:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
         if order in _COMMANDS:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
                 return f"{order}: {argument!r} is no number"
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
-            return (await self._orders.carry_out(command, by)).why
+            return (await self._orders.execute(command, by)).why
         match order:
             case OrderName.RECOVER:
                 return await self._recover(argument, by)
@@ -142,7 +148,7 @@ class PanelOrders:
                 why = await self._start_lot(argument, request.grower)
             case _:
                 why = await self._end_lot()
-        self._trail.command(by[0], order, argument, why, by[1])
+        self._trail.log_command(by[0], order, argument, why, by[1])
         return why
 
     async def _recover(self, what: str, by: tuple[str, str]) -> str:
@@ -161,7 +167,7 @@ class PanelOrders:
                 await self._records.change(lambda connection: start_lot(connection, name, grower))
             except RecordsError as error:
                 return str(error)
-        self._lots.name(name)
+        self._lots.set_lot(name)
         return ""
 
     async def _end_lot(self) -> str:
@@ -170,7 +176,7 @@ class PanelOrders:
             return "no lot was started at the panel"
         with contextlib.suppress(RecordsError):  # of a lot without a grower the records were never told
             await self._records.change(lambda connection: end_lot(connection, name))
-        self._lots.name("")
+        self._lots.set_lot("")
         return ""
 
 

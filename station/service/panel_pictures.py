@@ -61,8 +61,8 @@ class PanelPictures:
             recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
         except SettingsError as error:
             raise RecordsError("its recipe is of a form that this program does not take", str(error)) from error
-        reference = _picture(_kept(record, "reference", None))
-        image = _picture(_kept(record, "step", request.step))
+        reference = _picture(_stored(record, "reference", None))
+        image = _picture(_stored(record, "step", request.step))
         if reference.shape != image.shape:
             raise RecordsError("its reference and this image differ in size", "look at another step")
         pictures: list[tuple[str, Picture]] = []
@@ -75,7 +75,7 @@ class PanelPictures:
         # A step is measured with the contact of the step before, and that one with its own: all of them again.
         tracker, previous = PressTracker(method, segmentation.robust.least_confidence), None
         for before in range(request.step):
-            previous = tracker.measure_step([_picture(_kept(record, "step", before))])
+            previous = tracker.measure_step([_picture(_stored(record, "step", before))])
         contact = method.measure(image, take, previous)
         return Stages(pictures=tuple(pictures), area_px=contact.area_px)
 
@@ -86,7 +86,7 @@ def _gate_factor(record: FullRecord) -> float:
     return float(factor or 1.0)
 
 
-def _kept(record: FullRecord, kind: str, step: int | None) -> StoredImage:
+def _stored(record: FullRecord, kind: str, step: int | None) -> StoredImage:
     for image in record.images:
         if image.kind == kind and image.step == step:
             return image

@@ -20,11 +20,11 @@ from station.records.reading import read_inspection
 from station.service.panel_memory import (
     MOST_IN_FULL,
     MOST_IN_SHORT,
-    Look,
-    Remembered,
+    ReadStep,
+    RestoredFruit,
     deciding_step,
-    fruit_of,
-    short_of,
+    fruit_view,
+    short_view,
 )
 from station.settings.recipe import Recipe
 from station.settings.recipe_form import parse_recipe
@@ -45,15 +45,15 @@ _COUNTS = (
 )
 
 
-class Recalled(NamedTuple):
-    """Arguments of `PanelMemory.recall`."""
+class RestoredInspections(NamedTuple):
+    """Arguments of `RecentInspections.restore`."""
 
     short: tuple[FruitShort, ...]
-    full: tuple[Remembered, ...]
+    full: tuple[RestoredFruit, ...]
     lots: dict[str, Counter[str]]
 
 
-def recalled(folder: Path, deadline_s: Callable[[Recipe], float]) -> Recalled:
+def read_recent(folder: Path, deadline_s: Callable[[Recipe], float]) -> RestoredInspections:
     """Read the recent inspections, and the counts of their lots. Blocks for some tens of milliseconds.
 
     Args:
@@ -69,16 +69,16 @@ def recalled(folder: Path, deadline_s: Callable[[Recipe], float]) -> Recalled:
         areas: dict[int, list[float | None]] = {row[0]: [] for row in rows}
         for sequence, area_mm2 in database.execute(_AREAS, (json.dumps(list(areas)),)):
             areas[sequence].append(area_mm2)
-        short = tuple(short_of(Outcome.model_validate_json(row[1]), row[2], areas[row[0]]) for row in rows)
+        short = tuple(short_view(Outcome.model_validate_json(row[1]), row[2], areas[row[0]]) for row in rows)
         full = (_full(connection, folder, each.sequence, deadline_s) for each in short[-MOST_IN_FULL:])
         named = list(dict.fromkeys(each.lot for each in reversed(short) if each.lot))[:MOST_IN_FULL]
         lots = {lot: Counter(dict(database.execute(_COUNTS, (lot,)).fetchall())) for lot in reversed(named)}
-        return Recalled(short, tuple(each for each in full if each is not None), lots)
+        return RestoredInspections(short, tuple(each for each in full if each is not None), lots)
 
 
 def _full(
     connection: Connection, folder: Path, sequence: int, deadline_s: Callable[[Recipe], float]
-) -> Remembered | None:
+) -> RestoredFruit | None:
     """Return a fruit in full; None if it is not known in full, as one that a crash ended."""
     record = read_inspection(connection, sequence, folder)
     snapshot, judged = record.trigger.recipe, record.judged
@@ -90,12 +90,12 @@ def _full(
     except StationError:  # of a form that this program does not take, or longer than this cell may take
         return None
     step = deciding_step(judged)
-    look = None if step is None else _look(record, step)
-    fruit = fruit_of(record.standing, judged, recipe, snapshot.revision, limit_s, None if look is None else step)
-    return Remembered(fruit, look)
+    look = None if step is None else _step_reader(record, step)
+    fruit = fruit_view(record.standing, judged, recipe, snapshot.revision, limit_s, None if look is None else step)
+    return RestoredFruit(fruit, look)
 
 
-def _look(record: FullRecord, step: int) -> Look | None:
+def _step_reader(record: FullRecord, step: int) -> ReadStep | None:
     """Return a reader of the image; None if no image was stored."""
     kept = {image.kind: image for image in record.images if image.step == step}
     image, mask = kept.get("step"), kept.get("mask")

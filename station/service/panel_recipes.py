@@ -307,10 +307,12 @@ def _recipe(revision: Revision) -> Recipe:
 
 
 def _changes(old: Recipe, new: Recipe) -> tuple[Change, ...]:
-    return tuple(Change(path=each.path, old=_shown(each.old), new=_shown(each.new)) for each in differences(old, new))
+    return tuple(
+        Change(path=each.path, old=_value_text(each.old), new=_value_text(each.new)) for each in differences(old, new)
+    )
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     return shortened(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False), _LONGEST_VALUE)
 
 

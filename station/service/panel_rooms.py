@@ -7,11 +7,11 @@ from typing import Self
 from station.channel.messages import Message
 from station.channel.server import Handler
 from station.records.records import Records
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import DeviceManager
 from station.service.health import Liveness
-from station.service.orders import Orders
-from station.service.panel_ball import PanelBall
+from station.service.orders import PlcCommands
+from station.service.panel_ball import PanelCalibration
 from station.service.panel_history import PanelHistory
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_log import LogRing
@@ -19,13 +19,13 @@ from station.service.panel_maintenance import PanelMaintenance
 from station.service.panel_pictures import PanelPictures
 from station.service.panel_recipes import PanelRecipes
 from station.service.panel_worker import PanelWorker
-from station.service.readiness import Gate
+from station.service.readiness import Interlock
 from station.service.service import Service
-from station.service.trail import Trail
+from station.service.trail import AuditLogger
 from station.settings.configuration import Configuration
 
 
-class PanelRooms:
+class PanelPages:
     """Handlers of these pages; use them inside `async with`, and close before the devices.
 
     Args:
@@ -41,12 +41,12 @@ class PanelRooms:
         configuration: Configuration,
         records: Records,
         service: Service,
-        crew: Crew,
-        orders: Orders,
-        gate: Gate,
+        crew: DeviceManager,
+        orders: PlcCommands,
+        gate: Interlock,
         liveness: Liveness,
-        calibrated: Calibrated,
-        trail: Trail,
+        calibrated: ActiveCalibration,
+        trail: AuditLogger,
         versions: Mapping[str, str],
     ) -> None:
         self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
@@ -65,7 +65,7 @@ class PanelRooms:
             self._log,
             versions,
         )
-        self._ball = PanelBall(
+        self._ball = PanelCalibration(
             configuration, crew, orders, calibrated, records, trail, self._worker, maintenance.refusal
         )
         self.handlers: dict[type[Message], Handler] = {

@@ -2,12 +2,12 @@
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import DeviceManager
 from station.service.health import Dependency, Liveness, Readiness
-from station.service.lot import LotKeeper
-from station.service.orders import Orders
-from station.service.recipe_book import RecipeBook
+from station.service.lot import LotManager
+from station.service.orders import PlcCommands
+from station.service.recipe_book import ActiveRecipes
 from station.service.service import Service
 from station.vocabulary import PackmlState, Refusal
 
@@ -15,7 +15,7 @@ PRODUCTION = 1
 _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 
-class Gate:
+class Interlock:
     """Interlock: checks everything that a trigger needs.
 
     Args:
@@ -30,12 +30,12 @@ class Gate:
         self,
         boot: str,
         service: Service,
-        crew: Crew,
-        orders: Orders,
-        book: RecipeBook,
-        lots: LotKeeper,
+        crew: DeviceManager,
+        orders: PlcCommands,
+        book: ActiveRecipes,
+        lots: LotManager,
         liveness: Liveness,
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._boot, self._lots, self._calibrated = boot, lots, calibrated
         self._service, self._crew, self._orders = service, crew, orders
@@ -44,7 +44,7 @@ class Gate:
     def refusal(self) -> tuple[Refusal | None, str]:
         """Return why no trigger is accepted, for the PLC and for a person; None and empty if one is."""
         service, facts = self._service, STATES[self._service.state]
-        if service.stop_asked:
+        if service.stop_requested:
             return Refusal.NOT_READY, "The station is told to end; start it again."
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.sentence
@@ -92,7 +92,7 @@ class Gate:
     def _packml(self) -> PackmlState | None:
         """Return the state's own; while an orderly end is under way it is stopping, whatever still runs."""
         facts = STATES[self._service.state]
-        return PackmlState.STOPPING if self._service.stop_asked and not facts.may_exit else facts.packml
+        return PackmlState.STOPPING if self._service.stop_requested and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
         """Return the same for supervisors, with every dependency's age."""
@@ -105,12 +105,12 @@ class Gate:
                 "" if watch.fault is None else str(watch.fault),
                 "" if watch.fault is None else "see the detail, and `station devices check`",
             )
-            for name, watch in self._crew.watches.items()
+            for name, watch in self._crew.monitors.items()
         ]
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
     def _records(self) -> Dependency:
-        fault, status = self._service.ledger.fault, self._service.ledger.records.status()
+        fault, status = self._service.registry.fault, self._service.registry.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
         return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
@@ -121,12 +121,15 @@ class Gate:
             return Dependency(
                 "plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run"
             )
-        if trouble := self._orders.line_trouble():
+        if trouble := self._orders.line_fault():
             return Dependency("plc", "fault", age_s, trouble, "see the detail")
         return Dependency("plc", "ok", age_s)
 
     def _trouble(self) -> str:
         if self._service.state not in _DEVICES_DECIDE:
             return ""
-        faults = [*self._crew.faults.values(), *([self._service.ledger.fault] if self._service.ledger.fault else [])]
+        faults = [
+            *self._crew.faults.values(),
+            *([self._service.registry.fault] if self._service.registry.fault else []),
+        ]
         return str(faults[0]) if faults else ""

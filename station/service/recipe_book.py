@@ -18,7 +18,7 @@ from station.recipe_store.store import RecipeStore
 from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError
 from station.records.model import RecipeSnapshot
-from station.service.keeping import Kept
+from station.service.keeping import StateFiles
 from station.settings.problems import SettingsError
 from station.settings.recipe import Recipe
 from station.settings.recipe_form import content_sha256
@@ -30,14 +30,14 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Active:
+class ActiveRecipe:
     """A frozen recipe with its name for the PLC and the records."""
 
     recipe: Recipe
     snapshot: RecipeSnapshot
 
     @classmethod
-    def of(cls, recipe: Recipe, revision: str = "") -> "Active":
+    def of(cls, recipe: Recipe, revision: str = "") -> "ActiveRecipe":
         """Freeze a recipe.
 
         Args:
@@ -47,15 +47,15 @@ class Active:
         return cls(recipe, RecipeSnapshot.of(recipe.model_dump(mode="json"), revision))
 
 
-class Remembered(NamedTuple):
+class RestoredRecipe(NamedTuple):
     """The recipe of the station's previous start."""
 
-    active: Active
+    active: ActiveRecipe
     lot: str | None
     """The lot under way; None if none had begun with this recipe."""
 
 
-class RecipeBook:
+class ActiveRecipes:
     """Recipes in force on this site.
 
     Each is stored in the home folder too: if the history cannot be read, the stored one stays in force. A recipe whose
@@ -66,7 +66,7 @@ class RecipeBook:
         kept: stores the recipes in force and the active one.
     """
 
-    def __init__(self, folder: Path | None, kept: Kept) -> None:
+    def __init__(self, folder: Path | None, kept: StateFiles) -> None:
         self._store, self._kept = RecipeStore(kept.folder, folder), kept
         self._controls: dict[int, Control] = {}
         self._noticed: set[tuple[str, str]] = set()
@@ -84,7 +84,7 @@ class RecipeBook:
     def read(self) -> None:
         """Read files and history again. Blocks for some milliseconds a file."""
         self._signature = self._store.signature()
-        kept, begun = self._kept_controls(), True
+        kept, begun = self._stored_controls(), True
         try:
             self._store.begin({name: control.recipe for name, control in kept.items()})
         except (RecordsError, RecipeStoreError, SettingsError) as error:
@@ -99,23 +99,23 @@ class RecipeBook:
             self.problems = broken
             self._take(kept.values())
             return
-        self._notice(standings)
+        self._audit_files(standings)
         self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in standings if each.note)]))
         gone = {each.name for each in standings if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
-        self._keep(controls)
+        self._store_controls(controls)
 
     def refresh(self) -> None:
         """Read again if a file, its folder or the history has changed since. Blocks for some milliseconds."""
         if self._store.signature() != self._signature:
             self.read()
 
-    def find(self, number: int) -> Active | None:
+    def find(self, number: int) -> ActiveRecipe | None:
         """Return the recipe in force with a PLC number."""
         control = self._controls.get(number)
-        return None if control is None else Active.of(control.recipe, str(control.revision or ""))
+        return None if control is None else ActiveRecipe.of(control.recipe, str(control.revision or ""))
 
-    def current(self, active: Active) -> Active:
+    def current(self, active: ActiveRecipe) -> ActiveRecipe:
         """Return the recipe in force that replaces a lot's frozen one.
 
         Raises:
@@ -134,7 +134,7 @@ class RecipeBook:
             what = f"recipe {name} with the PLC's number {number} is no longer in force"
         raise RecipeStoreError(f"{what}; choose a recipe again")
 
-    def remembered(self) -> Remembered | None:
+    def restored(self) -> RestoredRecipe | None:
         """Return the recipe of the previous start; None if nothing is in force in its place.
 
         A lot continues with exactly the recipe that it began with, if its revision still has that content.
@@ -142,7 +142,7 @@ class RecipeBook:
         data = self._kept.read(_ACTIVE)
         try:
             told = json.loads(data or b"null")
-            active = Active.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
+            active = ActiveRecipe.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
             lot, sha256 = told["lot"], told["sha256"]
         except (ValueError, TypeError, KeyError, ValidationError):
             return None
@@ -151,9 +151,9 @@ class RecipeBook:
         except RecipeStoreError:
             return None
         whole = active.snapshot.sha256 == sha256 and self._is_revision(active)
-        return Remembered(active, lot) if whole and lot is not None else Remembered(current, None)
+        return RestoredRecipe(active, lot) if whole and lot is not None else RestoredRecipe(current, None)
 
-    def remember(self, active: Active, lot: str | None) -> bool:
+    def store_active(self, active: ActiveRecipe, lot: str | None) -> bool:
         """Store the active recipe for the next start.
 
         Args:
@@ -166,7 +166,7 @@ class RecipeBook:
         told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
         return self._kept.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
 
-    def _is_revision(self, active: Active) -> bool:
+    def _is_revision(self, active: ActiveRecipe) -> bool:
         """Check that the history has exactly this content as this revision."""
         with contextlib.suppress(StationError, ValueError):
             revision = self._store.revision(active.recipe.name, int(active.snapshot.revision))
@@ -176,7 +176,7 @@ class RecipeBook:
     def _take(self, controls: Iterable[Control]) -> None:
         self._controls = {control.recipe.plc_number: control for control in controls}
 
-    def _notice(self, standings: Iterable[Standing]) -> None:
+    def _audit_files(self, standings: Iterable[Standing]) -> None:
         """Audit what was done to files without the commands, once for each content."""
         for standing in standings:
             file, control, submitted = standing.file, standing.control, standing.submitted
@@ -194,17 +194,17 @@ class RecipeBook:
             )
             self.noticed.append(entry)
 
-    def _keep(self, controls: dict[str, Control]) -> None:
+    def _store_controls(self, controls: dict[str, Control]) -> None:
         for name, control in controls.items():
             told = {"revision": control.revision, "values": control.recipe.model_dump(mode="json")}
             self._kept.write(f"{_CONTROLS}/{name}.json", json.dumps(told).encode())
-        for name in set(self._kept_names()) - set(controls):
+        for name in set(self._stored_names()) - set(controls):
             with contextlib.suppress(OSError):
                 (self._kept.folder / _CONTROLS / f"{name}.json").unlink()
 
-    def _kept_controls(self) -> dict[str, Control]:
+    def _stored_controls(self) -> dict[str, Control]:
         found = {}
-        for name in self._kept_names():
+        for name in self._stored_names():
             try:
                 told = json.loads(self._kept.read(f"{_CONTROLS}/{name}.json") or b"null")
                 found[name] = Control(Recipe.model_validate_json(json.dumps(told["values"])), int(told["revision"]))
@@ -212,6 +212,6 @@ class RecipeBook:
                 continue  # of another form of the program
         return found
 
-    def _kept_names(self) -> list[str]:
+    def _stored_names(self) -> list[str]:
         folder = self._kept.folder / _CONTROLS
         return sorted(path.stem for path in folder.glob("*.json")) if folder.is_dir() else []

@@ -10,7 +10,7 @@ import numpy as np
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.service.keeping import Kept
+from station.service.keeping import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Flag, Method
@@ -35,7 +35,7 @@ class BadReferenceError(StationError):
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
+class ReferenceProperties:
     """Properties of a reference."""
 
     sharpness: float
@@ -46,7 +46,7 @@ class Looks:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prepared:
+class PreparedReference:
     """A golden reference, prepared for comparisons."""
 
     shape: tuple[int, ...]
@@ -56,7 +56,7 @@ class Prepared:
     """Instruction to make another one."""
 
 
-class Golden:
+class GoldenReference:
     """Golden reference: the gel when a person last checked that it was clean, stored in the home folder.
 
     For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
@@ -67,11 +67,11 @@ class Golden:
         calibrated: returns the calibration's file; None if there is none.
     """
 
-    def __init__(self, kept: Kept, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+    def __init__(self, kept: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
         self._kept, self._calibrated = kept, calibrated
-        self._prepared: tuple[bytes, Segmentation, Prepared] | None = None
+        self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
 
-    def prepared(self, segmentation: Segmentation) -> Prepared | None:
+    def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
         """Return the golden reference, prepared for comparisons; None if there is none that can be read.
 
         Args:
@@ -88,11 +88,11 @@ class Golden:
             self._prepared = (
                 data,
                 segmentation,
-                Prepared(image.shape, sharpness(image), make_method([image], segmentation), renewal),
+                PreparedReference(image.shape, sharpness(image), make_method([image], segmentation), renewal),
             )
         return self._prepared[2]
 
-    def keep_first(self, image: Image) -> None:
+    def store_first(self, image: Image) -> None:
         """Store a picture as the golden reference if there is none yet.
 
         Args:
@@ -109,7 +109,7 @@ class Golden:
         return self._kept.read(GOLDEN), f"remove {GOLDEN} from the home folder"
 
 
-def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) -> Looks:
+def check_reference(image: Image, golden: PreparedReference | None, settings: ReferenceSettings) -> ReferenceProperties:
     """Check a candidate reference.
 
     Args:
@@ -129,7 +129,7 @@ def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) 
         )
     detail = sharpness(image)
     if golden is None or golden.shape != image.shape:
-        return Looks(detail, saturated, 0.0)
+        return ReferenceProperties(detail, saturated, 0.0)
     contact = golden.method.measure(image)
     drift = contact.drift_levels or 0.0
     share = detail / golden.sharpness
@@ -151,7 +151,7 @@ def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) 
             "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
             f"gel; if the gel was changed, {golden.renewal}",
         )
-    return Looks(detail, saturated, drift)
+    return ReferenceProperties(detail, saturated, drift)
 
 
 def sharpness(image: Image) -> float:

@@ -14,19 +14,19 @@ from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
-from station.service.alarm_desk import AlarmDesk
-from station.service.calibrated import Calibrated
+from station.service.alarm_desk import AlarmManager
+from station.service.calibrated import ActiveCalibration
 from station.service.conductor import Conductor, Happened, Work, event_of
-from station.service.crew import Crew
+from station.service.crew import DeviceManager
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
 from station.service.inspector import Inspector
-from station.service.ledger import Ledger
+from station.service.ledger import InspectionRegistry
 from station.service.metrics import Metrics
-from station.service.outcome_watch import OutcomeWatch
+from station.service.outcome_watch import OutcomeMonitor
 from station.service.pacing import RECORD_NO_RESULT_S, Pacing, late_now
-from station.service.recipe_book import Active
-from station.service.triggers import Pending, Triggers
+from station.service.recipe_book import ActiveRecipe
+from station.service.triggers import PendingTrigger, RecentTriggers
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
 
@@ -50,38 +50,38 @@ class Service:
         self,
         configuration: Configuration,
         records: Records,
-        crew: Crew,
+        crew: DeviceManager,
         inspector: Inspector,
-        alarms: AlarmDesk,
+        alarms: AlarmManager,
         metrics: Metrics,
         liveness: Liveness,
         versions: Mapping[str, str],
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._settings, self._calibrated = configuration.service, calibrated
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._crew, self._inspector = crew, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
         self.conductor = Conductor(self)
-        self.triggers = Triggers()
-        self.ledger = Ledger(records, self.triggers, crew, versions)
+        self.triggers = RecentTriggers()
+        self.registry = InspectionRegistry(records, self.triggers, crew, versions)
         self.pacing = Pacing(configuration, crew.cell)
-        self.active: Active | None = None
+        self.active: ActiveRecipe | None = None
         """The recipe that the next fruit is inspected with."""
         self.reset_wanted = self._settings.automatic_reset
         """Whether a stopped station makes itself ready."""
-        self.stop_asked = False
+        self.stop_requested = False
         """The process is told to end."""
         self.stop_wanted = False
         """A person has stopped the station, until the next reset."""
         self.on_published: Callable[[Outcome], None] = lambda _: None
         """Told of what the PLC was told, once."""
-        self._pending: Pending | None = None
+        self._pending: PendingTrigger | None = None
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
         self._background: set[asyncio.Task[None]] = set()
         self._told_late: State | None = None
-        self._outcomes = OutcomeWatch(alarms)
+        self._outcomes = OutcomeMonitor(alarms)
 
     @property
     def state(self) -> State:
@@ -100,7 +100,7 @@ class Service:
         """
         async with self._beginning:
             if (same := self.triggers.repeated(request)) is not None:
-                return self._begun(same)
+                return self._accepted(same)
             if refusal is not None or self.active is None:
                 return self._refused(refusal or Refusal.NOT_READY)
             trigger = Trigger(
@@ -115,7 +115,7 @@ class Service:
             )
             limits = self.pacing.limits(self.active.recipe)
             now = Inspection(trigger, self.active, limits, *self._calibrated.in_force, self._resolution_mm)
-            self._pending = Pending(request, now)
+            self._pending = PendingTrigger(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()
 
@@ -125,16 +125,16 @@ class Service:
         Args:
             outcome: the final one.
         """
-        first = await self.ledger.records.published(outcome)
+        first = await self.registry.records.published(outcome)
         self.triggers.published(outcome)
         if first:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
             self._metrics.inspection(fruit, outcome, *known)
-            self._outcomes.saw(outcome)
+            self._outcomes.add(outcome)
             self.on_published(outcome)
-        running = self.ledger.running
+        running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
 
@@ -150,7 +150,7 @@ class Service:
             case Action.CHECK_DEVICES:
                 return self._check
             case Action.CLOSE_UNFINISHED:
-                return self.ledger.close_unfinished
+                return self.registry.close_unfinished
             case Action.RECOVER_ARM:
                 return self._recover_arm
             case Action.RECORD_TRIGGER:
@@ -173,9 +173,9 @@ class Service:
                 self._inspector.close_as_no_result(now, because.event, because.why)
                 return None
             case Action.RECORD:
-                return partial(self.ledger.conclude, now)
+                return partial(self.registry.conclude, now)
             case Action.PUBLISH:
-                self.ledger.tell(now)
+                self.registry.deliver(now)
                 return None
             case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
                 return partial(self._inspector.place, now)
@@ -192,7 +192,7 @@ class Service:
 
     def failed(self, fault: StationError) -> None:
         """Report a fault to the device's monitor before the cycle reads the devices' state."""
-        self._crew.failed(fault)
+        self._crew.report_fault(fault)
 
     def refused(self, state: State, event: Event) -> None:
         """Count an event that the table does not list; a trigger among them is answered."""
@@ -212,7 +212,7 @@ class Service:
         if state is State.IDLE:
             self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
-        if state is State.STOPPED and self.reset_wanted and not (self.stop_asked or self.stop_wanted):
+        if state is State.STOPPED and self.reset_wanted and not (self.stop_requested or self.stop_wanted):
             self.conductor.post(Event.RESET)
 
     def tick(self) -> None:
@@ -220,8 +220,8 @@ class Service:
         self._liveness.progress(CYCLE)
         if not self._liveness.stuck():
             self._crew.renew_health(_LEASE_S)
-        self._tell_late()
-        if self.stop_asked and self.state in {State.IDLE, *UNJUDGED} and self._told_late is None:
+        self._report_late()
+        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._told_late is None:
             self._told_late = self.state
             self.conductor.post(Event.STOP, "the station is told to end")
 
@@ -237,15 +237,15 @@ class Service:
     # The actions.
 
     async def _check(self) -> Event:
-        if self.stop_asked or self.stop_wanted:
+        if self.stop_requested or self.stop_wanted:
             return Event.STOP
-        for fault in (*self._crew.faults.values(), self.ledger.fault):
+        for fault in (*self._crew.faults.values(), self.registry.fault):
             if fault is not None:
                 raise fault
         return Event.READY
 
     async def _recover_arm(self) -> Event:
-        await self._crew.play_again()
+        await self._crew.restart_program()
         return Event.RECOVERED
 
     async def _record_trigger(self) -> Event | None:
@@ -253,7 +253,7 @@ class Service:
         if pending is None:
             raise RuntimeError("no trigger is waiting")
         try:
-            await self.ledger.begin(pending)
+            await self.registry.begin(pending)
         except RecordsError:
             pending.answer(self._refused(Refusal.RECORDS_FULL))
             raise
@@ -284,16 +284,16 @@ class Service:
         self._background.add(closing)
         closing.add_done_callback(self._background.discard)
 
-    def _take_on(self, pending: Pending) -> None:
+    def _take_on(self, pending: PendingTrigger) -> None:
         now = pending.inspection
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
-        self.ledger.accepted(now)
-        pending.answer(self._begun(now))
+        self.registry.accepted(now)
+        pending.answer(self._accepted(now))
 
     # Small parts.
 
-    def _begun(self, now: Inspection) -> Begun:
+    def _accepted(self, now: Inspection) -> Begun:
         left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
         if now.accepted_s is not None:
             left_s -= time.monotonic() - now.accepted_s
@@ -303,7 +303,7 @@ class Service:
         self._metrics.refused(refusal)
         return Begun(refusal=refusal)
 
-    def _tell_late(self) -> None:
+    def _report_late(self) -> None:
         if self._now is None or self._told_late is self.state:
             return
         found = late_now(self._now, self.state, self.conductor.in_state_s)
@@ -315,4 +315,4 @@ class Service:
 
     async def _close_refused(self) -> None:
         with contextlib.suppress(RecordsError):  # which the ledger keeps, and the next clearing tries again
-            await self.ledger.close_unfinished()
+            await self.registry.close_unfinished()

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from station.records.audit import STATION, AuditEntry
-from station.service.keeping import Kept
+from station.service.keeping import StateFiles
 from station.settings.configuration import Configuration
 
 _LAST = "audited_configuration.json"
@@ -14,8 +14,8 @@ _HIDDEN = ("password", "secret", "token", "pin")
 """Settings with these words in their name are audited by their hash."""
 
 
-def started(
-    boot: str, configuration: Configuration, kept: Kept, versions: Mapping[str, str], broken: str
+def start_entries(
+    boot: str, configuration: Configuration, kept: StateFiles, versions: Mapping[str, str], broken: str
 ) -> tuple[AuditEntry, ...]:
     """Make the entries of a start, with the settings that changed since the previous start.
 
@@ -40,14 +40,14 @@ def started(
     return start, AuditEntry("configuration", STATION, "settings.changed", "station.yaml or environment", "", old, new)
 
 
-def ended(boot: str, *, asked: bool) -> AuditEntry:
+def end_entry(boot: str, *, requested: bool) -> AuditEntry:
     """Make the entry of an end.
 
     Args:
         boot: name of the start.
         asked: the end was requested, and is not caused by a failure.
     """
-    return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": asked})
+    return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})
 
 
 def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:

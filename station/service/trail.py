@@ -19,7 +19,7 @@ MOST_WAITING = 10_000
 log = logging.getLogger(__name__)
 
 
-class Trail:
+class AuditLogger:
     """Queue of audit entries. `note` never waits; no entry is dropped silently.
 
     Args:
@@ -32,7 +32,7 @@ class Trail:
         self._told = asyncio.Event()
         self._writing = asyncio.Lock()
 
-    def note(self, *entries: AuditEntry) -> None:
+    def log(self, *entries: AuditEntry) -> None:
         """Queue entries to be written.
 
         Args:
@@ -43,7 +43,7 @@ class Trail:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._told.set()
 
-    def command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
+    def log_command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
         """Queue the entry of a command that was carried out or refused.
 
         Args:
@@ -56,9 +56,9 @@ class Trail:
             **old: values before the command, where they matter.
         """
         new = {"done": not why_not} | ({"why": why_not} if why_not else {})
-        self.note(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
+        self.log(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
 
-    async def keep(self) -> None:
+    async def run(self) -> None:
         """Write the queue until cancelled."""
         while True:
             await self._told.wait()
@@ -87,7 +87,7 @@ class Trail:
             return True
 
 
-def order_told(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
+def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
     """Make the entry of a command that the PLC or a person gave.
 
     Args:
@@ -99,7 +99,7 @@ def order_told(command: Command, done: CommandDone, old: Any, by: tuple[str, str
     return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
 
 
-def calibration_stored(who: str, reason: str, subject: str, old: Any, new: Any) -> AuditEntry:
+def calibration_entry(who: str, reason: str, subject: str, old: Any, new: Any) -> AuditEntry:
     """Make the entry of a calibration; for `Records.audit`, or `append_audit` if no station runs.
 
     Args:
@@ -112,7 +112,7 @@ def calibration_stored(who: str, reason: str, subject: str, old: Any, new: Any) 
     return AuditEntry(who, "service", "calibration.stored", subject, reason, old, new)
 
 
-def calibration_verified(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
+def verification_entry(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
     """Make the entry of a verification.
 
     Args:
@@ -126,7 +126,7 @@ def calibration_verified(who: str, subject: str, calibration: str, verification:
     return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
 
 
-def alarm_changed(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
+def alarm_entry(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
     """Make the entry of an alarm that a person or the PLC changed.
 
     Args:

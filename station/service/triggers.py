@@ -10,7 +10,7 @@ from station.service.inspection import Inspection
 _REMEMBERED = 64
 
 
-class Triggers:
+class RecentTriggers:
     """Last inspections by their sequence, with the callers that wait for them."""
 
     def __init__(self) -> None:
@@ -81,7 +81,7 @@ class Triggers:
         return await asyncio.shield(waiting)
 
 
-class Pending:
+class PendingTrigger:
     """One trigger between its request and its answer."""
 
     def __init__(self, request: Begin, inspection: Inspection) -> None:

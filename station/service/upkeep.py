@@ -11,15 +11,15 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.records.errors import RecordsError
-from station.service.calibrated import Calibrated
-from station.service.crew import GRIPPER, Crew
+from station.service.calibrated import ActiveCalibration
+from station.service.crew import GRIPPER, DeviceManager
 from station.service.health import Liveness
 from station.service.metrics import Metrics
-from station.service.orders import Orders
-from station.service.readiness import Gate
-from station.service.recipe_book import RecipeBook
+from station.service.orders import PlcCommands
+from station.service.readiness import Interlock
+from station.service.recipe_book import ActiveRecipes
 from station.service.service import Service
-from station.service.trail import Trail
+from station.service.trail import AuditLogger
 from station.supervision import restarts
 
 UPKEEP = "upkeep"
@@ -32,7 +32,7 @@ _MB = 1_000_000
 _AWAY = {State.UNKNOWN, State.HELD}
 
 
-class Upkeep:
+class Housekeeping:
     """One task beside the cycle.
 
     Args:
@@ -53,14 +53,14 @@ class Upkeep:
     def __init__(
         self,
         service: Service,
-        crew: Crew,
-        gate: Gate,
-        orders: Orders,
-        book: RecipeBook,
-        trail: Trail,
+        crew: DeviceManager,
+        gate: Interlock,
+        orders: PlcCommands,
+        book: ActiveRecipes,
+        trail: AuditLogger,
         metrics: Metrics,
         liveness: Liveness,
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
         pages_trouble: Callable[[], str],
         outbox: Callable[[], str],
         *,
@@ -83,91 +83,91 @@ class Upkeep:
         """Run until cancelled."""
         while True:
             if self._service.state in _AWAY:
-                await self._bring_back()
+                await self._recover()
             else:
                 self._pause_s, self._again_s = PERIOD_S, 0.0
             if time.monotonic() - self._alarms_at_s > _ALARMS_EVERY_S:
                 self._alarms_at_s = time.monotonic()
-                self._show_conditions()
+                self._update_alarms()
             if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
-                await self._look_into_book()
+                await self._refresh_recipes()
             self._metrics.ready(ready=self._gate.refusal()[0] is None)
             self._liveness.progress(UPKEEP)
             await asyncio.sleep(PERIOD_S)
 
-    async def _look_into_book(self) -> None:
+    async def _refresh_recipes(self) -> None:
         """Read what people changed in the recipes. The current lot does not change."""
         await asyncio.to_thread(self._book.refresh)
         self._book_at_s = time.monotonic()
         noticed, self._book.noticed = self._book.noticed, []
-        self._trail.note(*noticed)
+        self._trail.log(*noticed)
 
-    async def _bring_back(self) -> None:
+    async def _recover(self) -> None:
         service = self._service
-        await self._mend()
+        await self._try_recovery()
         entered_s = service.conductor.entered_s
-        if service.ledger.fault is None and self._told_ready_s < entered_s and self._crew.well_since(entered_s):
+        if service.registry.fault is None and self._told_ready_s < entered_s and self._crew.healthy_since(entered_s):
             self._told_ready_s = time.monotonic()
             service.conductor.post(Event.READY)
 
-    async def _mend(self) -> None:
+    async def _try_recovery(self) -> None:
         """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
         activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
-        play = self._crew.program_to_play_again and not self._liveness.stuck()
-        if time.monotonic() < self._again_s or not (activate or play or self._service.ledger.fault is not None):
+        play = self._crew.needs_program_restart and not self._liveness.stuck()
+        if time.monotonic() < self._again_s or not (activate or play or self._service.registry.fault is not None):
             return
         self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
-        await self._open_records_again()
+        await self._reopen_records()
         with contextlib.suppress(StationError):
             if activate:
                 await self._crew.activate_if_safe()
             elif play:
-                await self._crew.play_again()
+                await self._crew.restart_program()
         self._again_s = time.monotonic() + self._pause_s
 
     @property
     def _activation_is_lost(self) -> bool:
-        return isinstance(self._crew.watches[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
+        return isinstance(self._crew.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
 
-    async def _open_records_again(self) -> None:
+    async def _reopen_records(self) -> None:
         service = self._service
-        if service.ledger.fault is None:
+        if service.registry.fault is None:
             return
         try:
-            await service.ledger.records.reopen()
-            free_mb = service.ledger.records.status().free_bytes / _MB
+            await service.registry.records.reopen()
+            free_mb = service.registry.records.status().free_bytes / _MB
             if free_mb >= self._reserve_mb:
-                service.ledger.fault = None
+                service.registry.fault = None
         except RecordsError as error:
-            service.ledger.fault = error
+            service.registry.fault = error
 
-    def _show_conditions(self) -> None:
+    def _update_alarms(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
-        for name, watch in self._crew.watches.items():
-            alarms.device(name, watch.told_fault)
-        fault = service.ledger.fault
-        alarms.show(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
-        free_mb = service.ledger.records.status().free_bytes / _MB
-        alarms.show(
+        for name, watch in self._crew.monitors.items():
+            alarms.set_device_fault(name, watch.reported_fault)
+        fault = service.registry.fault
+        alarms.update(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
+        free_mb = service.registry.records.status().free_bytes / _MB
+        alarms.update(
             AlarmId.DISK_LOW,
             f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
             if free_mb < 2 * self._reserve_mb
             else "",
         )
-        alarms.show(AlarmId.CONFIGURATION_BROKEN, self._broken)
-        alarms.show(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
-        alarms.show(
+        alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
+        alarms.update(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
+        alarms.update(
             AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
         )
-        alarms.show(AlarmId.CALIBRATION_OLD, self._calibrated.trouble())
-        alarms.show(AlarmId.HMI_LOST, self._pages_trouble())
-        alarms.show(AlarmId.OUTBOX_BEHIND, self._outbox())
-        self._orders.show_line()
-        self._show_restarts()
-        self._show_clock()
+        alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
+        alarms.update(AlarmId.HMI_LOST, self._pages_trouble())
+        alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
+        self._orders.update_line_alarms()
+        self._count_restarts()
+        self._check_clock()
 
-    def _show_restarts(self) -> None:
+    def _count_restarts(self) -> None:
         many: list[str] = []
         for name, program in restarts.told().items():
             for _ in range(program.total - self._restarts_counted.get(name, 0)):
@@ -178,9 +178,9 @@ class Upkeep:
                 many.append(f"the process {name} ended again and again and is not started any more")
             elif lately >= _MANY_RESTARTS:
                 many.append(f"the process {name} was started again {lately} times within {_MANY_WITHIN_S:g} s")
-        self._service.alarms.show(AlarmId.PROCESS_RESTARTS, "; ".join(many))
+        self._service.alarms.update(AlarmId.PROCESS_RESTARTS, "; ".join(many))
 
-    def _show_clock(self) -> None:
+    def _check_clock(self) -> None:
         alarms = self._service.alarms
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:

@@ -18,11 +18,11 @@ Look = Callable[[], Awaitable[None]]
 """Checks the device; raises its fault. It returns in time, whatever the device does."""
 
 
-class NotYetHeardError(StationError):
+class NoAnswerYetError(StationError):
     """The device has not answered since the start."""
 
 
-class DeviceWatch:
+class DeviceMonitor:
     """Monitor task of one device. It runs for ever, with growing pauses while the device is away.
 
     Args:
@@ -36,24 +36,24 @@ class DeviceWatch:
     def __init__(
         self,
         name: str,
-        look: Look,
+        check: Look,
         longest_pause_s: float,
         on_change: Callable[[StationError | None], None],
         on_progress: Callable[[], None],
     ) -> None:
         self.name = name
-        self.fault: StationError | None = NotYetHeardError(f"{name}: it has not answered yet; wait a moment")
+        self.fault: StationError | None = NoAnswerYetError(f"{name}: it has not answered yet; wait a moment")
         self.heard_s: float | None = None
         """Monotonic time of the last look that found the device well."""
         self.in_use = False
         """While somebody else works with it, it is not asked; its user tells what goes wrong."""
-        self._look, self._longest_pause_s = look, longest_pause_s
+        self._check, self._longest_pause_s = check, longest_pause_s
         self._on_change, self._on_progress = on_change, on_progress
         self._again = asyncio.Event()
         self._began_s = time.monotonic()
 
     @property
-    def told_fault(self) -> StationError | None:
+    def reported_fault(self) -> StationError | None:
         """Return the fault that an operator has to see: a device has some time to answer after the start."""
         return None if self.heard_s is None and time.monotonic() < self._began_s + MEETING_S else self.fault
 
@@ -62,17 +62,17 @@ class DeviceWatch:
         """Return the time since it was last found healthy; None if it never was."""
         return None if self.heard_s is None else time.monotonic() - self.heard_s
 
-    def heard(self) -> None:
+    def report_success(self) -> None:
         """Note that a caller has just worked with the device successfully."""
         self.heard_s = time.monotonic()
         self._on_progress()
 
-    def failed(self, fault: StationError) -> None:
+    def report_fault(self, fault: StationError) -> None:
         """Note a fault that a caller met; the next check follows at once."""
         self._set(fault)
         self._again.set()
 
-    def look_again(self) -> None:
+    def check_now(self) -> None:
         """Check again at once, after a repair, without waiting for the next check's time."""
         self._again.set()
 
@@ -84,14 +84,14 @@ class DeviceWatch:
                 self._on_progress()
             else:
                 try:
-                    await self._look()
+                    await self._check()
                 except StationError as fault:
                     pause_s = FIRST_PAUSE_S if self.fault is None else min(2 * pause_s, self._longest_pause_s)
                     self._set(fault)
                     self._on_progress()
                 else:
                     pause_s = PERIOD_S
-                    self.heard()
+                    self.report_success()
                     self._set(None)
             await self._pause(pause_s)
 

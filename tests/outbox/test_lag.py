@@ -72,7 +72,7 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
             await asyncio.to_thread(server.stop, "fast")
             entries = [AuditEntry("ada", "quality", "tried", f"thing {number}") for number in range(40)]
             assert station.service is not None
-            await station.service.ledger.records.audit(*entries)
+            await station.service.registry.records.audit(*entries)
             await until(lambda: told().state == "unacknowledged")
             assert "postgresql: 4" in told().detail
             assert "entries wait, for " in told().detail

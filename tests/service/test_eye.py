@@ -9,10 +9,10 @@ import pytest
 from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.service import eye as eye_module
-from station.service.eye import Eye
+from station.service.eye import VisionWorker
 from station.service.grip import GripStep
-from station.service.keeping import Kept
-from station.service.reference import Golden
+from station.service.keeping import StateFiles
+from station.service.reference import GoldenReference
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.vision.methods import make_method
@@ -68,11 +68,11 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
     references, frames = [frame(seed) for seed in range(3)], [frame(10 + seed, 2.0) for seed in range(3)]
 
     async def scenario():
-        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
             await eye.take_reference(references, BLUEBERRY.segmentation)
             for each in frames[:2]:
-                eye.look_ahead(each)
+                eye.measure_ahead(each)
             return await eye.measure(step_of(frames))
         finally:
             eye.close()
@@ -90,11 +90,11 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
 
 def test_a_frame_that_was_begun_against_an_old_reference_is_measured_anew(tmp_path, seen_images):
     async def scenario():
-        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
             await eye.take_reference([frame(1)], BLUEBERRY.segmentation)
             pressed = frame(10, 2.0)
-            eye.look_ahead(pressed)
+            eye.measure_ahead(pressed)
             await eye.take_reference([frame(2)], BLUEBERRY.segmentation)
             await eye.measure(step_of([pressed]))
             return id(pressed.image)
@@ -109,7 +109,7 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
     steps = [[frame(100 * number + seed, 1.0 + number / 2) for seed in range(2)] for number in range(4)]
 
     async def scenario():
-        eye = Eye(Golden(Kept(tmp_path)), ReferenceSettings())
+        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
             await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
             glanced = await eye.measure(step_of(steps[0]))
@@ -118,7 +118,7 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
             measuring = asyncio.ensure_future(eye.measure(step_of(steps[2])))
             await asyncio.sleep(0)
             for each in steps[3]:  # captured while the step before is still measured
-                eye.look_ahead(each)
+                eye.measure_ahead(each)
             followed = [first, await measuring, await eye.measure(step_of(steps[3]))]
             await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
             await eye.measure(step_of(steps[0]))

@@ -54,7 +54,7 @@ def inspect(bench, settings_file):
             async with bench(file) as cell:
                 await cell.choose("blueberry")
                 outcome = await cell.line.inspect()
-                records = cell.station.service.ledger.records
+                records = cell.station.service.registry.records
                 async with asyncio.timeout(60):
                     while records.status().images_waiting:
                         await asyncio.sleep(0.05)

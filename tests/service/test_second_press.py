@@ -27,7 +27,7 @@ def inspected(bench, roomy):
                 openings = []
                 cell.at(State.OPENING_AGAIN, lambda: (openings.append(cell.phase), meanwhile(cell)))
                 outcome = await cell.line.inspect()
-                record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+                record = await cell.station.service.registry.records.inspection(outcome.sequence)
                 return outcome, record, openings
 
         return asyncio.run(scenario())

@@ -72,7 +72,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             crew = cell.station.service._crew
             renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
             async with asyncio.timeout(60):
-                while not crew.program_to_play_again:
+                while not crew.needs_program_restart:
                     await asyncio.sleep(0.05)
             assert AlarmId.ARM_LINK_LOST in active(cell)
             assert not (await line.state()).ready
