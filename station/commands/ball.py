@@ -19,8 +19,8 @@ from station.errors import BadInputError
 from station.records.database import records_folder
 from station.records.errors import LockedError
 from station.records.opening import lock_folder
-from station.service.ball_bench import StationRig
 from station.service.bare_grip import renewed_lease
+from station.service.calibration_rig import StationRig
 from station.service.grip import Cell
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe

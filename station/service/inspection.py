@@ -12,9 +12,9 @@ from station.inspection.second_press import together
 from station.records.first_press import first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
-from station.service.eye import MeasuredStep
+from station.service.active_recipes import ActiveRecipe
 from station.service.grip import GripStep
-from station.service.recipe_book import ActiveRecipe
+from station.service.vision_worker import MeasuredStep
 from station.vocabulary import OutcomeName, Reason
 
 

@@ -16,14 +16,14 @@ from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.records.model import Image
-from station.service.alarm_desk import AlarmManager
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import CAMERA, GRIPPER, DeviceManager
-from station.service.eye import MeasuredStep, VisionWorker
+from station.service.active_calibration import ActiveCalibration
+from station.service.alarm_manager import AlarmManager
+from station.service.device_manager import CAMERA, GRIPPER, DeviceManager
 from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError, at_once
 from station.service.inspection import Inspection
 from station.service.metrics import Metrics
 from station.service.reference import ALARMS, BadReferenceError
+from station.service.vision_worker import MeasuredStep, VisionWorker
 from station.settings.arm import ArmSettings
 from station.settings.service import ServiceSettings
 from station.vocabulary import Reason

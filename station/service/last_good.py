@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from station.service.keeping import StateFiles
+from station.service.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.environment import CONFIG_VARIABLE, variable
 from station.settings.problems import SettingsError

@@ -147,7 +147,7 @@ class Metrics:
         self._status = status
 
     def watch_calibration(self, figures: Callable[[], Sequence[float | None]]) -> None:
-        """Read at each scrape the calibration's age, the verification's age, and the drift: `ActiveCalibration.figures`."""
+        """Read at each scrape the ages of calibration and verification, and the drift: `ActiveCalibration.figures`."""
         self._figures = figures
 
     def watch_outbox(self, status: Callable[[], OutboxStatus | None]) -> None:

@@ -32,16 +32,16 @@ from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
 from station.records.audit import AuditEntry
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import GRIPPER, DeviceManager
+from station.service.active_calibration import ActiveCalibration
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import GRIPPER, DeviceManager
 from station.service.health import Liveness
-from station.service.orders import PlcCommands
 from station.service.panel_log import LogRing
 from station.service.panel_worker import PanelWorker
+from station.service.plc_commands import PlcCommands
 from station.service.readiness import Interlock
 from station.service.reference import GOLDEN, sharpness
 from station.service.service import Service
-from station.service.trail import AuditLogger
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
 from station.vision.methods import make_method

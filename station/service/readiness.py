@@ -2,12 +2,12 @@
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import DeviceManager
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipes
+from station.service.device_manager import DeviceManager
 from station.service.health import Dependency, Liveness, Readiness
-from station.service.lot import LotManager
-from station.service.orders import PlcCommands
-from station.service.recipe_book import ActiveRecipes
+from station.service.lot_manager import LotManager
+from station.service.plc_commands import PlcCommands
 from station.service.service import Service
 from station.vocabulary import PackmlState, Refusal
 

@@ -10,7 +10,7 @@ import numpy as np
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.service.keeping import StateFiles
+from station.service.state_files import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Flag, Method

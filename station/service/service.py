@@ -14,19 +14,19 @@ from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
-from station.service.alarm_desk import AlarmManager
-from station.service.calibrated import ActiveCalibration
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipe
+from station.service.alarm_manager import AlarmManager
 from station.service.conductor import Conductor, Happened, Work, event_of
-from station.service.crew import DeviceManager
+from station.service.device_manager import DeviceManager
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
+from station.service.inspection_registry import InspectionRegistry
 from station.service.inspector import Inspector
-from station.service.ledger import InspectionRegistry
 from station.service.metrics import Metrics
-from station.service.outcome_watch import OutcomeMonitor
+from station.service.outcome_monitor import OutcomeMonitor
 from station.service.pacing import RECORD_NO_RESULT_S, Pacing, late_now
-from station.service.recipe_book import ActiveRecipe
-from station.service.triggers import PendingTrigger, RecentTriggers
+from station.service.recent_triggers import PendingTrigger, RecentTriggers
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
 

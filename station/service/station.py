@@ -16,27 +16,27 @@ from station.outbox.lag import Lag
 from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.alarm_desk import AlarmManager
-from station.service.alarm_orders import AlarmCommands
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import DeviceManager
-from station.service.eye import VisionWorker
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipes
+from station.service.alarm_commands import AlarmCommands
+from station.service.alarm_manager import AlarmManager
+from station.service.audit_logger import FLUSH_S, AuditLogger
+from station.service.device_manager import DeviceManager
 from station.service.health import HealthServer, Liveness
+from station.service.housekeeping import UPKEEP, Housekeeping
 from station.service.inspector import Inspector
-from station.service.keeping import StateFiles
-from station.service.line_server import PlcInterfaceServer
-from station.service.lot import LotManager
+from station.service.lot_manager import LotManager
 from station.service.metrics import Metrics
-from station.service.orders import PlcCommands
-from station.service.panel import PanelServer
-from station.service.panel_rooms import PanelPages
+from station.service.panel_pages import PanelPages
+from station.service.panel_server import PanelServer
+from station.service.plc_commands import PlcCommands
+from station.service.plc_interface_server import PlcInterfaceServer
 from station.service.readiness import Interlock
-from station.service.recipe_book import ActiveRecipes
 from station.service.reference import GoldenReference
 from station.service.service import CYCLE, Service
-from station.service.starting import end_entry, start_entries
-from station.service.trail import FLUSH_S, AuditLogger
-from station.service.upkeep import UPKEEP, Housekeeping
+from station.service.startup_audit import end_entry, start_entries
+from station.service.state_files import StateFiles
+from station.service.vision_worker import VisionWorker
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint

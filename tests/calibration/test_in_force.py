@@ -28,9 +28,9 @@ from station.channel.line import (
 from station.channel.panel_live import AskPanel, PanelState
 from station.records.database import reading, records_folder
 from station.records.reading import read_inspection
-from station.service.calibrated import ActiveCalibration
-from station.service.keeping import StateFiles
+from station.service.active_calibration import ActiveCalibration
 from station.service.reference import GoldenReference
+from station.service.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint

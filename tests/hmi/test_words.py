@@ -40,7 +40,18 @@ FAULTS_FROM = (
     ),
     *(f"devices/gripper/{name}" for name in ("calibration", "errors", "modbus_rtu", "robotiq", "urcap")),
     *(f"devices/camera/{name}" for name in ("digit", "feed")),
-    *(f"service/{name}" for name in ("bare_grip", "crew", "grip", "outcome_watch", "reference", "upkeep", "watching")),
+    *(
+        f"service/{name}"
+        for name in (
+            "bare_grip",
+            "device_manager",
+            "grip",
+            "outcome_monitor",
+            "reference",
+            "housekeeping",
+            "device_monitor",
+        )
+    ),
 )
 """Where what is wrong with a device, and so an alarm's detail or why fruit are refused, is put into words."""
 NO_FAULTS = {

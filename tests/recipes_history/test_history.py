@@ -9,8 +9,8 @@ import pytest
 
 from station.recipe_store.revision import RecipeStoreError
 from station.records.model import RecipeSnapshot
-from station.service.keeping import StateFiles
-from station.service.recipe_book import ActiveRecipes
+from station.service.active_recipes import ActiveRecipes
+from station.service.state_files import StateFiles
 from station.settings.recipe import APPROVED_NAME, approved_list, load_recipe, shipped_folder
 from station.settings.recipe_form import canonical_text, content_sha256
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from station.service.keeping import StateFiles
+from station.service.active_recipes import ActiveRecipe, ActiveRecipes
 from station.service.last_good import load_or_last_good
-from station.service.recipe_book import ActiveRecipe, ActiveRecipes
+from station.service.state_files import StateFiles
 from station.settings.problems import SettingsError
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from station.channel.panel_queries import GetStages
 from station.records.database import records_folder
-from station.service import eye as eye_module
+from station.service import vision_worker
 from station.service.panel_pictures import PanelPictures
 from station.service.panel_worker import PanelWorker
 from station.vision.contact import Flag
@@ -37,7 +37,7 @@ def measurements(monkeypatch):
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
-    monkeypatch.setattr(eye_module, "make_method", recording)
+    monkeypatch.setattr(vision_worker, "make_method", recording)
     return made
 
 

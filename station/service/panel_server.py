@@ -31,19 +31,19 @@ from station.inspection.states import STATES
 from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.alarm_orders import AlarmCommands
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import DeviceManager
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipe, ActiveRecipes
+from station.service.alarm_commands import AlarmCommands
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import DeviceManager
 from station.service.inspection import utc_ms
-from station.service.lot import LotManager
-from station.service.orders import PlcCommands
-from station.service.panel_memory import RecentInspections
-from station.service.panel_orders import OperatorCommands
-from station.service.panel_recall import read_recent
+from station.service.lot_manager import LotManager
+from station.service.operator_commands import OperatorCommands
+from station.service.plc_commands import PlcCommands
 from station.service.readiness import Interlock
-from station.service.recipe_book import ActiveRecipe, ActiveRecipes
+from station.service.recent_inspections import RecentInspections
+from station.service.restored_inspections import read_recent
 from station.service.service import Service
-from station.service.trail import AuditLogger
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)

@@ -15,12 +15,12 @@ from station.inspection.states import State
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
-from station.service.crew import ARM, DeviceManager
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import ARM, DeviceManager
 from station.service.inspection import utc_ms
-from station.service.lot import LotManager
-from station.service.orders import PlcCommands
+from station.service.lot_manager import LotManager
+from station.service.plc_commands import PlcCommands
 from station.service.service import Service
-from station.service.trail import AuditLogger
 
 AT_ONCE_S = 0.4
 """Longest time for which a command's answer waits for the command's end."""

@@ -19,8 +19,8 @@ from station.devices.gripper.errors import (
 )
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import StationError
+from station.service.device_monitor import DeviceMonitor
 from station.service.grip import FRAME_DEADLINE_S, Cell, FramesError
-from station.service.watching import DeviceMonitor
 from station.settings.configuration import Configuration
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"

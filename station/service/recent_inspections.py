@@ -16,8 +16,8 @@ from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
-from station.service.eye import MeasuredStep
 from station.service.inspection import Inspection
+from station.service.vision_worker import MeasuredStep
 from station.settings.recipe import Recipe
 from station.vision.contact import Mask
 

@@ -10,10 +10,10 @@ from station.inspection.cycle import Event
 from station.logs import inspecting
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.crew import DeviceManager
-from station.service.fruit_line import fruit_line
+from station.service.device_manager import DeviceManager
 from station.service.inspection import Inspection
-from station.service.triggers import PendingTrigger, RecentTriggers
+from station.service.log_line import fruit_line
+from station.service.recent_triggers import PendingTrigger, RecentTriggers
 from station.vocabulary import Reason
 
 log = logging.getLogger(__name__)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from station.records.audit import STATION, AuditEntry
-from station.service.keeping import StateFiles
+from station.service.state_files import StateFiles
 from station.settings.configuration import Configuration
 
 _LAST = "audited_configuration.json"

@@ -32,12 +32,12 @@ from station.channel.server import Handler
 from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
-from station.service.ball_bench import StationRig
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import DeviceManager
-from station.service.orders import PlcCommands
+from station.service.active_calibration import ActiveCalibration
+from station.service.audit_logger import AuditLogger, calibration_entry, verification_entry
+from station.service.calibration_rig import StationRig
+from station.service.device_manager import DeviceManager
 from station.service.panel_worker import PanelWorker
-from station.service.trail import AuditLogger, calibration_entry, verification_entry
+from station.service.plc_commands import PlcCommands
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
 

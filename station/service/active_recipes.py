@@ -18,7 +18,7 @@ from station.recipe_store.store import RecipeStore
 from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError
 from station.records.model import RecipeSnapshot
-from station.service.keeping import StateFiles
+from station.service.state_files import StateFiles
 from station.settings.problems import SettingsError
 from station.settings.recipe import Recipe
 from station.settings.recipe_form import content_sha256

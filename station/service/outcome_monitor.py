@@ -4,7 +4,7 @@ from collections import deque
 
 from station.channel.line import Outcome
 from station.inspection.alarm_table import AlarmId
-from station.service.alarm_desk import AlarmManager
+from station.service.alarm_manager import AlarmManager
 from station.vocabulary import OutcomeName
 
 _LAST = 20

@@ -20,7 +20,7 @@ from station.inspection.alarms import CAUSED, Alarms
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
-from station.service.crew import ARM, CAMERA, GRIPPER
+from station.service.device_manager import ARM, CAMERA, GRIPPER
 from station.service.grip import FramesError
 from station.service.inspection import utc_ms
 from station.service.metrics import Metrics

@@ -12,13 +12,13 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
-from station.service.crew import DeviceManager
-from station.service.keeping import StateFiles
-from station.service.lot import LotManager
+from station.service.active_recipes import ActiveRecipes
+from station.service.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
+from station.service.device_manager import DeviceManager
+from station.service.lot_manager import LotManager
 from station.service.metrics import Metrics
-from station.service.recipe_book import ActiveRecipes
 from station.service.service import Service
-from station.service.trail import PANEL, PLC, AuditLogger, alarm_entry, command_entry
+from station.service.state_files import StateFiles
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)

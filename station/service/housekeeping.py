@@ -11,15 +11,15 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.records.errors import RecordsError
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import GRIPPER, DeviceManager
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipes
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import GRIPPER, DeviceManager
 from station.service.health import Liveness
 from station.service.metrics import Metrics
-from station.service.orders import PlcCommands
+from station.service.plc_commands import PlcCommands
 from station.service.readiness import Interlock
-from station.service.recipe_book import ActiveRecipes
 from station.service.service import Service
-from station.service.trail import AuditLogger
 from station.supervision import restarts
 
 UPKEEP = "upkeep"

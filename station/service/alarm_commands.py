@@ -17,8 +17,8 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import ALARMS, AlarmId, anchor
 from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
 from station.records.audit import AuditEntry, check_entry
-from station.service.alarm_desk import AlarmManager
-from station.service.trail import AuditLogger, alarm_entry
+from station.service.alarm_manager import AlarmManager
+from station.service.audit_logger import AuditLogger, alarm_entry
 
 
 class AlarmCommands:

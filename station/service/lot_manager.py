@@ -5,9 +5,9 @@ import logging
 
 from station.errors import StationError
 from station.records.audit import STATION, AuditEntry
-from station.service.recipe_book import ActiveRecipe, ActiveRecipes
+from station.service.active_recipes import ActiveRecipe, ActiveRecipes
+from station.service.audit_logger import PLC, AuditLogger
 from station.service.service import Service
-from station.service.trail import PLC, AuditLogger
 
 log = logging.getLogger(__name__)
 

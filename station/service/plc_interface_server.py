@@ -17,9 +17,9 @@ from station.channel.line import (
 )
 from station.channel.panel import Recover
 from station.channel.server import ChannelServer
-from station.service.alarm_orders import AlarmCommands
-from station.service.lot import LotManager
-from station.service.orders import PlcCommands
+from station.service.alarm_commands import AlarmCommands
+from station.service.lot_manager import LotManager
+from station.service.plc_commands import PlcCommands
 from station.service.readiness import Interlock
 from station.service.service import Service
 from station.vocabulary import Refusal

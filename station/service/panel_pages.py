@@ -7,11 +7,11 @@ from typing import Self
 from station.channel.messages import Message
 from station.channel.server import Handler
 from station.records.records import Records
-from station.service.calibrated import ActiveCalibration
-from station.service.crew import DeviceManager
+from station.service.active_calibration import ActiveCalibration
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import DeviceManager
 from station.service.health import Liveness
-from station.service.orders import PlcCommands
-from station.service.panel_ball import PanelCalibration
+from station.service.panel_calibration import PanelCalibration
 from station.service.panel_history import PanelHistory
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_log import LogRing
@@ -19,9 +19,9 @@ from station.service.panel_maintenance import PanelMaintenance
 from station.service.panel_pictures import PanelPictures
 from station.service.panel_recipes import PanelRecipes
 from station.service.panel_worker import PanelWorker
+from station.service.plc_commands import PlcCommands
 from station.service.readiness import Interlock
 from station.service.service import Service
-from station.service.trail import AuditLogger
 from station.settings.configuration import Configuration
 
 

@@ -8,11 +8,11 @@ import pytest
 
 from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
-from station.service import eye as eye_module
-from station.service.eye import VisionWorker
+from station.service import vision_worker as module
 from station.service.grip import GripStep
-from station.service.keeping import StateFiles
 from station.service.reference import GoldenReference
+from station.service.state_files import StateFiles
+from station.service.vision_worker import VisionWorker
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.vision.methods import make_method
@@ -47,7 +47,7 @@ def previous_contacts():
 
 @pytest.fixture
 def seen_images(monkeypatch, previous_contacts):
-    """The images that the eye's method was asked to measure, by their identity, in order."""
+    """The images that the worker's method was asked to measure, by their identity, in order."""
     seen: list[int] = []
 
     def counting(references, segmentation):
@@ -60,7 +60,7 @@ def seen_images(monkeypatch, previous_contacts):
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
-    monkeypatch.setattr(eye_module, "make_method", counting)
+    monkeypatch.setattr(module, "make_method", counting)
     return seen
 
 
@@ -68,14 +68,14 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
     references, frames = [frame(seed) for seed in range(3)], [frame(10 + seed, 2.0) for seed in range(3)]
 
     async def scenario():
-        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
+        worker = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
-            await eye.take_reference(references, BLUEBERRY.segmentation)
+            await worker.take_reference(references, BLUEBERRY.segmentation)
             for each in frames[:2]:
-                eye.measure_ahead(each)
-            return await eye.measure(step_of(frames))
+                worker.measure_ahead(each)
+            return await worker.measure(step_of(frames))
         finally:
-            eye.close()
+            worker.close()
 
     seen = asyncio.run(scenario())
     assert seen_images[:3] == [id(each.image) for each in frames]
@@ -90,16 +90,16 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
 
 def test_a_frame_that_was_begun_against_an_old_reference_is_measured_anew(tmp_path, seen_images):
     async def scenario():
-        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
+        worker = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
-            await eye.take_reference([frame(1)], BLUEBERRY.segmentation)
+            await worker.take_reference([frame(1)], BLUEBERRY.segmentation)
             pressed = frame(10, 2.0)
-            eye.measure_ahead(pressed)
-            await eye.take_reference([frame(2)], BLUEBERRY.segmentation)
-            await eye.measure(step_of([pressed]))
+            worker.measure_ahead(pressed)
+            await worker.take_reference([frame(2)], BLUEBERRY.segmentation)
+            await worker.measure(step_of([pressed]))
             return id(pressed.image)
         finally:
-            eye.close()
+            worker.close()
 
     image = asyncio.run(scenario())
     assert seen_images == [image, image]
@@ -109,22 +109,22 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
     steps = [[frame(100 * number + seed, 1.0 + number / 2) for seed in range(2)] for number in range(4)]
 
     async def scenario():
-        eye = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
+        worker = VisionWorker(GoldenReference(StateFiles(tmp_path)), ReferenceSettings())
         try:
-            await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
-            glanced = await eye.measure(step_of(steps[0]))
-            first = await eye.measure(step_of(steps[1]))
-            await eye.follow(first.contact)
-            measuring = asyncio.ensure_future(eye.measure(step_of(steps[2])))
+            await worker.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
+            glanced = await worker.measure(step_of(steps[0]))
+            first = await worker.measure(step_of(steps[1]))
+            await worker.follow(first.contact)
+            measuring = asyncio.ensure_future(worker.measure(step_of(steps[2])))
             await asyncio.sleep(0)
             for each in steps[3]:  # captured while the step before is still measured
-                eye.measure_ahead(each)
-            followed = [first, await measuring, await eye.measure(step_of(steps[3]))]
-            await eye.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
-            await eye.measure(step_of(steps[0]))
+                worker.measure_ahead(each)
+            followed = [first, await measuring, await worker.measure(step_of(steps[3]))]
+            await worker.take_reference([frame(seed) for seed in range(3)], BLUEBERRY.segmentation)
+            await worker.measure(step_of(steps[0]))
             return glanced, followed
         finally:
-            eye.close()
+            worker.close()
 
     glanced, followed = asyncio.run(scenario())
     assert glanced.contact.found

@@ -17,7 +17,7 @@ from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.model import FullRecord, StoredImage
 from station.records.reading import read_inspection
-from station.service.panel_memory import (
+from station.service.recent_inspections import (
     MOST_IN_FULL,
     MOST_IN_SHORT,
     ReadStep,
