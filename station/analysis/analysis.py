@@ -105,7 +105,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             stages=request.stages,
         ):
             if isinstance(item, Refused):
-                output.leave_out(item)
+                output.skip(item)
                 found[item.number] = item
             else:
                 output.add(item, scale.area_mm2(item.contact.area_px)[0])
@@ -265,7 +265,7 @@ def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[s
         ("Method", request.segmentation.method),
         ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
         ("Recipe", request.recipe or "none: the method's defaults"),
-        ("Measured as", _presses_in_words(order)),
+        ("Measured as", _describe_presses(order)),
         (
             "Reference",
             "; ".join([request.reference_name + (f", median of {count} images" if count > 1 else ""), *converted]),
@@ -275,7 +275,7 @@ def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[s
     ]
 
 
-def _presses_in_words(order: Sequence[Run]) -> str:
+def _describe_presses(order: Sequence[Run]) -> str:
     steps = [len(run.numbers) for run in order if run.followed]
     alone = sum(not run.followed for run in order)
     pressed = f"{len(steps)} {'press' if len(steps) == 1 else 'presses'} of {', '.join(map(str, steps))} images"

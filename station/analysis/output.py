@@ -112,7 +112,7 @@ class OutputFolder:
         )
         self._in_turn(measured.number, row)
 
-    def leave_out(self, refused: Refused) -> None:
+    def skip(self, refused: Refused) -> None:
         """Skip the row of an image that could not be measured.
 
         Raises:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from natsort import natsorted, ns
 
-from station.analysis.decoding import SUFFIXES, Decoded, decode_file, shown
+from station.analysis.decoding import SUFFIXES, Decoded, decode_file, printable_name
 from station.errors import BadInputError
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg"})
@@ -95,7 +95,7 @@ def _list_place(place: Path, reference: Path | None) -> Listing:
     try:
         return _found_at(place, reference)
     except OSError as error:  # a name too long, or a folder above it that may not be searched
-        raise BadInputError(f"{shown(place)}: cannot be read: {error.strerror}") from error
+        raise BadInputError(f"{printable_name(place)}: cannot be read: {error.strerror}") from error
 
 
 def _found_at(place: Path, reference: Path | None) -> Listing:
@@ -103,13 +103,15 @@ def _found_at(place: Path, reference: Path | None) -> Listing:
         files = natsorted((path for path in place.iterdir() if path.is_file()), alg=ns.PATH)
         chosen = [path for path in files if path.suffix.lower() in SUFFIXES and not _same(path, reference)]
         if not chosen:
-            raise BadInputError(f"{shown(place)}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}")
+            raise BadInputError(
+                f"{printable_name(place)}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}"
+            )
         passed_over = tuple(path for path in files if path not in chosen)
         return Listing(tuple(_file_source(path) for path in chosen), passed_over)
     if place.suffix.lower() in VIDEO_SUFFIXES:
         return Listing(tuple(_video_sources(place)), ())
     if not place.exists():
-        raise BadInputError(f"{shown(place)}: there is no such file")
+        raise BadInputError(f"{printable_name(place)}: there is no such file")
     return Listing((_file_source(place),), ())
 
 
@@ -118,29 +120,31 @@ def _same(path: Path, other: Path | None) -> bool:
 
 
 def _file_source(path: Path) -> Source:
-    stem = shown(path.stem)
+    stem = printable_name(path.stem)
     if len(stem.encode()) > _LONGEST_STEM_BYTES:
-        return _refused_source(path, BadInputError(f"{shown(path)}: the name is too long for its mask's; rename it"))
-    return Source(shown(path.name), stem, lambda: decode_file(path))
+        return _refused_source(
+            path, BadInputError(f"{printable_name(path)}: the name is too long for its mask's; rename it")
+        )
+    return Source(printable_name(path.name), stem, lambda: decode_file(path))
 
 
 def _refused_source(place: Path, error: BadInputError) -> Source:
     def load() -> Decoded:
         raise error
 
-    return Source(shown(place.name), shown(place), load, refused=True)
+    return Source(printable_name(place.name), printable_name(place), load, refused=True)
 
 
 def _video_sources(path: Path) -> Iterator[Source]:
     """List a video's frames; they are decoded in order, because seeking in a compressed video is not exact."""
     if not path.is_file():
-        raise BadInputError(f"{shown(path)}: there is no such file")
+        raise BadInputError(f"{printable_name(path)}: there is no such file")
     frames = _Video(path)
     if frames.announced > frames.count:
         whole = f"{frames.count} of {frames.announced} frames could be decoded; it is cut short or damaged"
-        yield _refused_source(path, BadInputError(f"{shown(path)}: {whole}"))
+        yield _refused_source(path, BadInputError(f"{printable_name(path)}: {whole}"))
     for index in range(frames.count):
-        name = f"{shown(path.stem)}_{index:05d}"
+        name = f"{printable_name(path.stem)}_{index:05d}"
         yield Source(name, name, lambda index=index: frames.frame(index), from_video=True)
 
 
@@ -164,7 +168,9 @@ class _Video:
             count += 1
         capture.release()
         if count == 0:
-            raise BadInputError(f"{shown(self._path)}: no frame of this video can be decoded; export it as MP4 or AVI")
+            raise BadInputError(
+                f"{printable_name(self._path)}: no frame of this video can be decoded; export it as MP4 or AVI"
+            )
         return count
 
     def frame(self, index: int) -> Decoded:
@@ -173,7 +179,7 @@ class _Video:
             self._next += 1
         good, image = self._capture.read()
         if not good:
-            raise BadInputError(f"{shown(self._path)}: frame {index} cannot be decoded")
+            raise BadInputError(f"{printable_name(self._path)}: frame {index} cannot be decoded")
         self._next += 1
         if self._next == self.count:
             self._capture.release()

@@ -33,7 +33,7 @@ class Pressed:
     """Frames without faults, all captured after the fingers had come to rest."""
 
 
-class Bench(Protocol):
+class Rig(Protocol):
     """Gripper and camera with a ball between them."""
 
     async def untouched(self, number: int) -> Sequence[Image]:

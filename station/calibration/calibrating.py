@@ -14,7 +14,7 @@ from math import hypot
 from typing import NamedTuple
 
 from station.calibration import figures, gel
-from station.calibration.bench import Bench, Place, Progress, Tell, Unit
+from station.calibration.bench import Place, Progress, Rig, Tell, Unit
 from station.calibration.checks import ROUNDEST, calibration_checks
 from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
@@ -73,7 +73,7 @@ class _Measured(NamedTuple):
     places: Sequence[PlacePoint]
 
 
-class Calibrating:
+class CalibrationProcedure:
     """One run. It stores nothing; when it is cancelled the jaws open.
 
     Args:
@@ -86,19 +86,19 @@ class Calibrating:
 
     def __init__(
         self,
-        bench: Bench,
+        rig: Rig,
         unit: Unit,
         recipe: Recipe,
         settings: CalibrationSettings,
         places: Sequence[Place],
         operator: str,
         program: str,
-        tell: Tell,
+        on_progress: Tell,
     ) -> None:
-        self._bench, self._unit, self._recipe, self._settings = bench, unit, recipe, settings
+        self._bench, self._unit, self._recipe, self._settings = rig, unit, recipe, settings
         self._places = [Place(0.0, 0.0), *places]
-        self._operator, self._program, self._tell = operator, program, tell
-        self._press = BallPress(bench, recipe)
+        self._operator, self._program, self._tell = operator, program, on_progress
+        self._press = BallPress(rig, recipe)
         self._pressed: list[Step] = []
         self._checks: tuple[Check, ...] = ()
         if any(hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < _LEAST_WAY_MM for a, b in combinations(self._places, 2)):

@@ -31,7 +31,7 @@ _LED_COLOURS = ("blue", "green", "red")
 _MARK = (0, 0, 255)
 
 
-class Ill(StrEnum):
+class GelFault(StrEnum):
     """Faults of gel and light."""
 
     TEAR = "tear"
@@ -42,11 +42,11 @@ class Ill(StrEnum):
 
 
 REMEDIES = {
-    Ill.TEAR: "change the gel, then calibrate",
-    Ill.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
-    Ill.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
-    Ill.FOG: "clean the sensor's lens and gel, then try again",
-    Ill.WEAR: "change the gel, then calibrate",
+    GelFault.TEAR: "change the gel, then calibrate",
+    GelFault.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
+    GelFault.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
+    GelFault.FOG: "clean the sensor's lens and gel, then try again",
+    GelFault.WEAR: "change the gel, then calibrate",
 }
 
 
@@ -54,7 +54,7 @@ REMEDIES = {
 class Finding:
     """One fault, as a sentence and a picture."""
 
-    ill: Ill
+    ill: GelFault
     sentence: str
     picture: Image
 
@@ -72,7 +72,7 @@ def examine(image: Image, golden: Image | None, least_light: float) -> list[Find
         return lost
     if golden is not None and (fog := sharpness(image) / sharpness(golden)) < least_light:
         text = f"the untouched gel shows {fog:.0%} of the detail it had: fogged or smeared"
-        return [Finding(Ill.FOG, text, side_by_side(golden, image))]
+        return [Finding(GelFault.FOG, text, side_by_side(golden, image))]
     return _blemishes(image, golden)
 
 
@@ -126,7 +126,7 @@ def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[
     words = ", ".join(f"{colour} {share:.0%}" for share, colour in lost)
     what = "is dead or not connected" if min(lost)[0] < _DEAD_LED else "has grown dim"
     text = f"light of {words} of {'the other colours' if golden is None else 'what it was'}: an LED {what}"
-    return [Finding(Ill.LED, text, image if golden is None else side_by_side(golden, image))]
+    return [Finding(GelFault.LED, text, image if golden is None else side_by_side(golden, image))]
 
 
 def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
@@ -135,13 +135,13 @@ def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
     findings: list[Finding] = []
     if torn.any():
         text = "a long thin line runs across the gel: it is torn or cut"
-        findings.append(Finding(Ill.TEAR, text, _marked(image, torn)))
+        findings.append(Finding(GelFault.TEAR, text, _marked(image, torn)))
     share = float(np.mean(found > 0))
     if share > (_MOST_BLEMISHED if golden is None else 0.0):
         number = cv2.connectedComponents(found)[0] - 1
         what = "places" if golden is None else "new places"
         text = f"{number} {what} on the gel, {share:.1%} of the field, look like dirt or damage"
-        findings.append(Finding(Ill.DIRT, text, _marked(image, found)))
+        findings.append(Finding(GelFault.DIRT, text, _marked(image, found)))
     return findings
 
 

@@ -123,7 +123,7 @@ class Calibration(Stored):
         """Return the relative uncertainty of an area in mm²."""
         return 2 * self.scale_uncertainty
 
-    def in_words(self) -> str:
+    def summary(self) -> str:
         """Describe it in one line, for records and reports."""
         how = "measured" if self.scale_measured else "usual"
         return f"{self.id}: {self.mm_per_px:.5f} mm/px ± {self.scale_uncertainty:.1%}, {how}"

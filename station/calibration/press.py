@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from station.calibration.bench import Bench, Pressed
+from station.calibration.bench import Pressed, Rig
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
 from station.settings.recipe import Recipe
@@ -48,8 +48,8 @@ class Step:
 class BallPress:
     """Presses and measures by a recipe."""
 
-    def __init__(self, bench: Bench, recipe: Recipe, gate_factor: float = 1.0) -> None:
-        self._bench, self._recipe = bench, recipe
+    def __init__(self, rig: Rig, recipe: Recipe, gate_factor: float = 1.0) -> None:
+        self._bench, self._recipe = rig, recipe
         self._segmentation = gated(recipe.segmentation, gate_factor)
         self._method: Method | None = None
         self.reference: Image | None = None

@@ -9,7 +9,7 @@ from station.calibration.calibrating import Draft, Evidence
 from station.calibration.model import Calibration, Refusal
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE, press_name
-from station.calibration.verifying import Verified, outlined
+from station.calibration.verifying import VerificationResult, outlined
 from station.vision.contact import Image
 
 _TILE_PX = 220
@@ -38,7 +38,7 @@ def calibration_files(draft: Draft) -> dict[str, bytes]:
     return {REFERENCE: png(draft.reference), "area.png": area, "field.png": field, **presses, PAGE: page}
 
 
-def verification_files(verified: Verified, calibration: Calibration) -> dict[str, bytes]:
+def verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
     """Return the pictures and the page of a verification, by file name."""
     verification = verified.verification
     area = area_plot(calibration, verification.curve)
@@ -56,7 +56,7 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
         verdict=verification.passed,
         facts=[
             ("Unit", calibration.unit),
-            ("Calibration", calibration.in_words()),
+            ("Calibration", calibration.summary()),
             ("Operator", verification.operator or "not told"),
             ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
         ],

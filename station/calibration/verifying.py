@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from station.calibration import figures, gel
-from station.calibration.bench import Bench, Progress, Tell
+from station.calibration.bench import Progress, Rig, Tell
 from station.calibration.checks import verification_checks
-from station.calibration.gel import REMEDIES, Finding, Ill
+from station.calibration.gel import REMEDIES, Finding, GelFault
 from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
 from station.calibration.store import press_name
@@ -24,16 +24,16 @@ _NOISE_FRAMES = 9
 _EVERY = 2
 """One of so many widths of the calibration is pressed."""
 _SOUND = {
-    Ill.TEAR: "no tear is seen",
-    Ill.DIRT: "no dirt is seen",
-    Ill.LED: "every LED is as bright as it was",
-    Ill.FOG: "gel and lens are clear",
-    Ill.WEAR: "the gel answers as strongly as it did",
+    GelFault.TEAR: "no tear is seen",
+    GelFault.DIRT: "no dirt is seen",
+    GelFault.LED: "every LED is as bright as it was",
+    GelFault.FOG: "gel and lens are clear",
+    GelFault.WEAR: "the gel answers as strongly as it did",
 }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Verified:
+class VerificationResult:
     """A verification with its pictures."""
 
     verification: Verification
@@ -42,7 +42,7 @@ class Verified:
     """By file name."""
 
 
-class Verifying:
+class VerificationProcedure:
     """One run; the jaws are open afterwards.
 
     Args:
@@ -53,21 +53,21 @@ class Verifying:
 
     def __init__(
         self,
-        bench: Bench,
+        rig: Rig,
         recipe: Recipe,
         settings: CalibrationSettings,
         calibration: Calibration,
         golden: Image,
         presses: Sequence[Image],
         operator: str,
-        tell: Tell,
+        on_progress: Tell,
     ) -> None:
-        self._bench, self._recipe, self._settings = bench, recipe, settings
+        self._bench, self._recipe, self._settings = rig, recipe, settings
         self._calibration, self._golden, self._presses = calibration, golden, presses
-        self._operator, self._tell = operator, tell
-        self._press = BallPress(bench, recipe, calibration.noise.gate_factor)
+        self._operator, self._tell = operator, on_progress
+        self._press = BallPress(rig, recipe, calibration.noise.gate_factor)
 
-    async def run(self) -> Verified:
+    async def run(self) -> VerificationResult:
         """Verify once. The gripper closes on the ball.
 
         Raises:
@@ -84,7 +84,7 @@ class Verifying:
         await self._bench.release()
         return verified
 
-    async def _run(self) -> Verified:
+    async def _run(self) -> VerificationResult:
         self._tell(Progress(1, 1, "the untouched gel", f"{_NOISE_FRAMES} frames, nothing may touch the gel"))
         frames = await self._press.take_reference(_NOISE_FRAMES)
         reference = self._press.reference
@@ -95,10 +95,10 @@ class Verifying:
         curve = tuple(step.point for step in steps)
         blue, green, red = (float(level) for level in pixel_levels)
         checks = verification_checks(self._settings, self._calibration, curve, onset_mm, (blue, green, red))
-        if not any(finding.ill in {Ill.LED, Ill.FOG} for finding in findings):
+        if not any(finding.ill in {GelFault.LED, GelFault.FOG} for finding in findings):
             findings += self._worn(steps)
         pictures = {f"{finding.ill}.png": finding.picture for finding in findings}
-        checks += [self._health(ill, findings) for ill in Ill]
+        checks += [self._health(ill, findings) for ill in GelFault]
         pictures |= {press_name(number): outlined(step) for number, step in enumerate(steps)}
         verification = Verification(
             id=stamp(datetime.now(UTC)),
@@ -111,7 +111,7 @@ class Verifying:
             checks=tuple(checks),
             curve=curve,
         )
-        return Verified(verification, reference, pictures)
+        return VerificationResult(verification, reference, pictures)
 
     async def _press_ball(self) -> tuple[list[Step], float | None]:
         """Measure without contact, at every second width that showed a whole contact, and the onset."""
@@ -140,10 +140,10 @@ class Verifying:
         text = f"the ball changes the picture {ratio:.0%} as much as at the calibration: the coating is worn"
         now = touched[len(touched) // 2]
         widths = [abs(point.width_mm - now.width_mm) for point in self._calibration.curve]
-        return [Finding(Ill.WEAR, text, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
+        return [Finding(GelFault.WEAR, text, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
 
     @staticmethod
-    def _health(ill: Ill, findings: list[Finding]) -> Check:
+    def _health(ill: GelFault, findings: list[Finding]) -> Check:
         found = next((finding for finding in findings if finding.ill is ill), None)
         return Check(
             name=ill,

@@ -45,7 +45,7 @@ def listed(config: Path | None) -> None:
     if not found:
         click.echo("no alarm stands")
     for each in sorted(found, key=lambda each: each.shelved_until_utc_ms is not None):
-        click.echo(printable(_told(each)))
+        click.echo(printable(_format(each)))
 
 
 @alarms.command()
@@ -101,7 +101,7 @@ async def _ask(config: Path | None, request: Message, reply: type[ReplyT]) -> Re
             raise StationError(f"{error}; alarms are a running station's: see whether one runs") from error
 
 
-def _told(each: ListedAlarm) -> str:
+def _format(each: ListedAlarm) -> str:
     times = "" if each.raised <= 1 else f", {each.raised} times"
     head = f"{each.alarm} ({each.priority}, {each.state}) since {_time(each.since_utc_ms)}{times}"
     if each.shelved_until_utc_ms is not None:

@@ -7,7 +7,7 @@ import click
 from station.errors import BadInputError
 from station.records.audit_check import check_audit
 from station.records.audit_head import Head, read_head
-from station.records.audit_report import read_audit, told
+from station.records.audit_report import format_rows, read_audit
 from station.records.database import reading, records_folder
 from station.settings.configuration import load_configuration
 
@@ -32,7 +32,7 @@ def audit() -> None:
 def show(last: int, action: str, subject: str, config: Path | None) -> None:
     """Show the last rows, oldest first: action, object, person, time, reason, and the value before."""
     with reading(records_folder(load_configuration(config).home)) as connection:
-        click.echo(told(read_audit(connection, last, action, subject)))
+        click.echo(format_rows(read_audit(connection, last, action, subject)))
 
 
 @audit.command()

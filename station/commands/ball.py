@@ -29,9 +29,7 @@ _ARM_DEADLINE_S = 15.0
 
 
 @contextlib.asynccontextmanager
-async def at_the_bench(
-    site: Configuration, *, bench: bool, yes: bool
-) -> AsyncIterator[tuple[StationRig, Unit, Recipe]]:
+async def open_rig(site: Configuration, *, bench: bool, yes: bool) -> AsyncIterator[tuple[StationRig, Unit, Recipe]]:
     """Open the devices that the site names, for this program alone.
 
     Args:
@@ -51,7 +49,7 @@ async def at_the_bench(
             where = (
                 f"{place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its first place"
             )
-            await _answered(f"lay the ball {where}, then press Enter")
+            await _wait_for_enter(f"lay the ball {where}, then press Enter")
 
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(os.close, _lock(site))
@@ -70,14 +68,14 @@ async def at_the_bench(
             await stack.enter_async_context(renewed_lease(arm))
         if not yes:
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
-            await _answered(
+            await _wait_for_enter(
                 f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
             )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
         yield StationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
 
 
-async def _answered(request: str) -> None:
+async def _wait_for_enter(request: str) -> None:
     """Wait for a person's Enter; Ctrl-C ends the wait, and the end of the input cancels the run."""
     click.echo(request)
     loop, line = asyncio.get_running_loop(), asyncio.Event()

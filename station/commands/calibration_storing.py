@@ -7,7 +7,7 @@ from station.calibration.report import calibration_files
 from station.calibration.store import CalibrationStore
 from station.records.audit import append_audit
 from station.records.database import records_folder
-from station.records.direct import writing
+from station.records.direct import direct_transaction
 from station.service.audit_logger import calibration_entry
 from station.settings.configuration import Configuration
 
@@ -20,7 +20,7 @@ def store_calibration(site: Configuration, operator: str, draft: Draft) -> Path:
     """
     calibrations, new = CalibrationStore(site.home), draft.calibration
     before = calibrations.current(new.serial)
-    with writing(records_folder(site.home)) as connection:
+    with direct_transaction(records_folder(site.home)) as connection:
         old = None if before is None else before.id
         append_audit(connection, calibration_entry(operator, "", f"sensor {new.serial}", old, new.id))
         return calibrations.add_calibration(new, calibration_files(draft))

@@ -80,7 +80,7 @@ def demo(
     pace = Pace(every_s=60 / speed if speed else 0.0)
     new = calibrate_simulated_unit(site, "demo")
     if new is not None:
-        click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.in_words()}")
+        click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.summary()}")
     supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])
     asyncio.run(_run(site, supervisor, nest, LineProgram(plan, _LOT), pace, count))
 

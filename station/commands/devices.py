@@ -15,7 +15,7 @@ from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
 from station.devices.camera.probe import probe_camera
-from station.devices.finding import Finding
+from station.devices.finding import CheckResult
 from station.devices.gripper.probe import probe_gripper
 from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
@@ -40,7 +40,7 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
 
     Prints for each the finding, a verdict, and what to do. The exit code is 1 if a device is faulty.
     """
-    findings = asyncio.run(_look(load_configuration(config), bench=bench))
+    findings = asyncio.run(_check_devices(load_configuration(config), bench=bench))
     for finding in findings:
         verdict = click.style(f"{finding.verdict:8}", fg=_COLOURS[finding.verdict])
         click.echo(f"{verdict}{finding.device:16}{finding.found}")
@@ -105,7 +105,7 @@ async def _recover_alone(configuration: Configuration, what: RecoveryName) -> No
         await arm.ready(_ARM_DEADLINE_S)
 
 
-async def _look(configuration: Configuration, *, bench: bool) -> list[Finding]:
+async def _check_devices(configuration: Configuration, *, bench: bool) -> list[CheckResult]:
     others = asyncio.gather(probe_gripper(configuration.gripper), probe_camera(configuration.camera))
     arm = [] if bench else await probe_arm(configuration.arm)
     return [*arm, *(finding for found in await others for finding in found)]

@@ -53,7 +53,7 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
 
 
 async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
-    called_off = _call_off_by_signal()
+    called_off = _cancelled_by_signal()
     camera = camera_from(configuration.camera)
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(camera.close)
@@ -79,7 +79,7 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
         raise asyncio.CancelledError
 
 
-def _call_off_by_signal() -> asyncio.Event:
+def _cancelled_by_signal() -> asyncio.Event:
     """Let Ctrl-C, and the signal that ends a service, cancel the calling task and set the event."""
     called_off = asyncio.Event()
     task = asyncio.current_task()

@@ -13,7 +13,7 @@ from station.errors import StationError
 from station.logs import configure_logging
 from station.outbox.lag import LOST_S
 from station.outbox.status import outbox_folder, read_status
-from station.outbox.telling import destinations, keep_telling
+from station.outbox.telling import destinations, run_outbox
 from station.settings.configuration import Configuration, load_configuration
 from station.supervision.notify import feed_watchdog, notify
 
@@ -70,7 +70,7 @@ async def _until_ended(site: Configuration) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     tasks = [
-        asyncio.create_task(keep_telling(site.outbox, site.home, progress), name="outbox"),
+        asyncio.create_task(run_outbox(site.outbox, site.home, progress), name="outbox"),
         asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < LOST_S), name="watchdog"),
         asyncio.create_task(ended.wait(), name="order to end"),
     ]

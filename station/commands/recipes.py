@@ -13,7 +13,7 @@ from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.revision import Revision, Status
-from station.recipe_store.standing import FileState, Standing
+from station.recipe_store.standing import FileState, RecipeState
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened
@@ -62,7 +62,7 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
     found = [path for file in files for path in (recipe_files(file) if os.path.isdir(file) else [file])]  # noqa: PTH112
     checked = check_recipes(dict.fromkeys(found))
     for path, recipe in checked.recipes.items():
-        click.echo(f"OK {shortened(str(path), 1000)}: {_facts(recipe)}")
+        click.echo(f"OK {shortened(str(path), 1000)}: {_format_recipe(recipe)}")
     for problem in checked.problems:
         click.echo(str(problem), err=True)
     if checked.problems:
@@ -93,7 +93,7 @@ def list_all(config: Path | None) -> None:
 def show(name: str, revision: int | None, config: Path | None) -> None:
     """Show a recipe's file, or the text of one of its revisions, unchanged."""
     store = _store(config)
-    click.echo(store.good_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
+    click.echo(store.valid_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
 
 
 @recipes.command()
@@ -102,10 +102,10 @@ def show(name: str, revision: int | None, config: Path | None) -> None:
 def history(name: str, config: Path | None) -> None:
     """Show a recipe's revisions: author, approver, retirement, times, reasons and changes."""
     store = _store(config)
-    store.standing(name)
+    store.state(name)
     before: Revision | None = None
     for each in store.history(name):
-        click.echo("\n".join(_told(each, before)))
+        click.echo("\n".join(_format_revision(each, before)))
         before = each
 
 
@@ -117,14 +117,14 @@ def history(name: str, config: Path | None) -> None:
 def diff(name: str, old: int | None, new: int | None, config: Path | None) -> None:
     """Show every value that differs between two revisions, or between the approved one and the file."""
     store = _store(config)
-    standing = store.standing(name)
+    standing = store.state(name)
     if old is not None:
         before = store.revision(name, old).recipe
     elif standing.control is not None:
         before = standing.control.recipe
     else:
         raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --from")
-    after = store.good_file(name).recipe if new is None else store.revision(name, new).recipe
+    after = store.valid_file(name).recipe if new is None else store.revision(name, new).recipe
     for difference in differences(before, after):
         click.echo(str(difference))
 
@@ -264,7 +264,7 @@ def _change(text: str) -> tuple[str, Any]:
         raise BadInputError(f"--set {shortened(text)}: {error}") from error
 
 
-def _line(standing: Standing) -> str:
+def _line(standing: RecipeState) -> str:
     """Format a recipe's state in one line."""
     control = standing.control
     force = "not in force" if control is None else f"revision {control.revision} in force"
@@ -278,7 +278,7 @@ def _line(standing: Standing) -> str:
     return f"{standing.name}: {force}{what}; file: {standing.file_state}{waits}"
 
 
-def _told(each: Revision, before: Revision | None) -> list[str]:
+def _format_revision(each: Revision, before: Revision | None) -> list[str]:
     """Format a revision in some lines."""
     lines = [f"{each.name} revision {each.revision}: {each.status}, {each.origin}, {each.sha256[:12]}"]
     lines.append(f"    by {each.author} at {_time(each.created_utc_ms)}: {each.reason}")
@@ -296,7 +296,7 @@ def _time(utc_ms: int) -> str:
     return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def _facts(recipe: Recipe) -> str:
+def _format_recipe(recipe: Recipe) -> str:
     """Format a recipe in one line."""
     steps = recipe.steps
     closings = ", ".join(f"{closing_mm:g}" for closing_mm in steps.result_closings_mm)

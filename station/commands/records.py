@@ -11,7 +11,7 @@ from station.commands.records_output import export, report
 from station.records.database import reading
 from station.records.opening import set_mark
 from station.records.reading import Summary, read_inspection
-from station.records.report import described, listed
+from station.records.report import format_inspection, format_list
 from station.records.search import LARGEST_PAGE, Query, find_page
 
 
@@ -27,7 +27,7 @@ def show(sequence: int, config: Path | None) -> None:
     """Show everything stored of the inspection with the number SEQUENCE: explanation, curve, images."""
     folder = folder_of(config)
     with reading(folder) as connection:
-        click.echo(described(read_inspection(connection, sequence, folder)))
+        click.echo(format_inspection(read_inspection(connection, sequence, folder)))
 
 
 @records.command("list")
@@ -45,7 +45,7 @@ def list_last(last: int, below: int | None, query: Query, config: Path | None) -
             below = page.below
             if below is None:
                 break
-    click.echo(listed(found))
+    click.echo(format_list(found))
     if below is not None:
         click.echo(f"more: --below {below}", err=True)
 

@@ -9,7 +9,7 @@ from station.commands.records_options import by_option, config_option, folder_of
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.backup import make_backup
-from station.records.changing import changing
+from station.records.changing import short_transaction
 from station.records.checking import check_records
 from station.records.database import reading
 from station.records.holds import hold as place_hold
@@ -37,7 +37,7 @@ def lot() -> None:
 @config_option
 def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:
     """Register that the lot NAME starts. Repeating it changes nothing."""
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         known = {row.name: row for row in read_lots(connection, 1, name=name)}.get(name)
         started = start_lot(connection, name, grower, correct=correct)
         if started != known:
@@ -53,7 +53,7 @@ def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | 
 @config_option
 def lot_end(name: str, by: str, config: Path | None) -> None:
     """Register that the lot NAME has ended. Repeating it changes nothing."""
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         running = any(row.ended_utc_ms is None for row in read_lots(connection, 1, name=name))
         ended = end_lot(connection, name)
         if running:
@@ -80,12 +80,14 @@ def lot_list(grower: str | None, last: int, config: Path | None) -> None:
 @config_option
 def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
     """Hold the images of an inspection, or all images of a lot: the quota does not remove them."""
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         before = read_holds(connection)
         held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
         if held not in before:
-            append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.what, reason))
-    click.echo(printable(f"{held.what} is on hold since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}"))
+            append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
+    click.echo(
+        printable(f"{held.description} is on hold since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}")
+    )
 
 
 @click.command()
@@ -96,11 +98,11 @@ def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None)
 @config_option
 def release(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
     """Release held images: the quota may remove them."""
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         released = release_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
-        entry = AuditEntry(by, _ROLE, "images.released", released.what, reason, {"held for": released.reason})
+        entry = AuditEntry(by, _ROLE, "images.released", released.description, reason, {"held for": released.reason})
         append_audit(connection, entry)
-    click.echo(printable(f"{released.what} is released"))
+    click.echo(printable(f"{released.description} is released"))
 
 
 @click.command()
@@ -109,7 +111,7 @@ def holds(config: Path | None) -> None:
     """List what is on hold, oldest first."""
     with reading(folder_of(config)) as connection:
         for held in read_holds(connection):
-            click.echo(printable(f"{_time(held.placed_utc_ms)}  {held.what}  by {held.by}: {held.reason}"))
+            click.echo(printable(f"{_time(held.placed_utc_ms)}  {held.description}  by {held.by}: {held.reason}"))
 
 
 @click.command()

@@ -7,7 +7,7 @@ import click
 
 from station.commands.records_options import by_option, config_option, folder_of
 from station.records.audit import AuditEntry, append_audit
-from station.records.changing import changing
+from station.records.changing import short_transaction
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked
 from station.records.wording import printable
@@ -26,7 +26,7 @@ def mark(sequences: tuple[int, ...], word: str, by: str, config: Path | None) ->
     `station thresholds` proposes limits from the marks. All of the fruit are marked, or none.
     """
     wanted, changed = _MARKS[word], 0
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         for sequence in sequences:
             before = place_mark(connection, sequence, wanted, by)
             if (was := None if before is None else before.mark) != wanted:

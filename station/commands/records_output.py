@@ -7,7 +7,7 @@ import click
 from station.commands.records_options import config_option, folder_of, query_options
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.lot_report import WAYS, write_report
 from station.records.lot_summary import summarise
 from station.records.search import Query
@@ -36,5 +36,5 @@ def report(lot: str, file: Path, config: Path | None) -> None:
     try:
         write_report(summary, file)
     except OSError as error:
-        raise in_words(error, str(file)) from error
+        raise map_error(error, str(file)) from error
     click.echo(f"{file}: {summary.total} inspections of lot {lot}")

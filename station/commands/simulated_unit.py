@@ -4,14 +4,14 @@ import asyncio
 from importlib.metadata import version
 
 from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import Calibrating
+from station.calibration.calibrating import CalibrationProcedure
 from station.calibration.model import Calibration
 from station.calibration.store import CalibrationStore
 from station.commands.calibration_storing import store_calibration
 from station.devices.camera.twin import TwinCamera
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
-from station.studies.drawn_ball import DrawnBall
+from station.studies.drawn_ball import SimulatedRig
 
 PLACES = (Place(-2.5, 0.0), Place(0.0, 3.0))
 """Further places, as docs/calibration.md requires of a person: so the scale is measured."""
@@ -37,8 +37,8 @@ def calibrate_simulated_unit(site: Configuration, operator: str) -> Calibration 
     if CalibrationStore(site.home).current(camera.serial) is not None:
         return None
     draft = asyncio.run(
-        Calibrating(
-            DrawnBall(),
+        CalibrationProcedure(
+            SimulatedRig(),
             Unit(camera.serial, camera.name, simulated=True),
             find_recipe(site.calibration.recipe, site.recipes_folder),
             site.calibration,

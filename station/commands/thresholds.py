@@ -58,7 +58,7 @@ def thresholds(
     """
     site, costs = load_configuration(config), Costs(false_accept, damaged)
     recipe, folder = find_recipe(name, site.recipes_folder), records_folder(site.home)
-    marked = _told_marks(folder) if marks is None else read_marks(marks)
+    marked = _stored_marks(folder) if marks is None else read_marks(marks)
     stored, own = _marked(folder, recipe.name, lots, set(marked))
     for mark in ("good", "bad"):
         if not any(marked[each.sequence] == mark for each in stored):
@@ -94,7 +94,7 @@ def thresholds(
     click.echo(f"see {out / 'thresholds.html'}" + (f"; the draft is {draft}" if draft else ""))
 
 
-def _told_marks(folder: Path) -> dict[int, Mark]:
+def _stored_marks(folder: Path) -> dict[int, Mark]:
     """Read the marks that people made by `station records mark`, or on the panel."""
     with reading(folder) as connection:
         told: dict[int, Mark] = {each.sequence: each.mark for each in read_marked(connection)}

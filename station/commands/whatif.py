@@ -15,7 +15,7 @@ from station.settings.recipe import Recipe, find_recipe
 from station.settings.recipe_form import content_sha256
 from station.whatif.against_marks import Compared, compared
 from station.whatif.outcome_table import Counted, as_csv, counted
-from station.whatif.page import MOST_SHOWN, Page, as_json, render, shown
+from station.whatif.page import MOST_SHOWN, Page, as_json, fruit_views, render
 from station.whatif.progress_file import ProgressFile
 from station.whatif.replay import Replayed, recipe_of_snapshot
 from station.whatif.runner import batches, run
@@ -87,7 +87,7 @@ def _page(
     single = known[-1] if known else None
     changed = [each for each in results if each.changes_side]
     with reading(folder) as connection:
-        tiles = shown(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
+        tiles = fruit_views(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
     facts = [
         ("draft", f"{draft.title}, {content_sha256(draft)[:12]}"),
         ("inspections", f"{results[0].sequence} to {results[-1].sequence}{_of(lots)}"),

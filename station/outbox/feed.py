@@ -102,7 +102,7 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
     return Batch(lineage, tuple(told), entries[-1].entry if entries else after, last, oldest)
 
 
-def text_of(data: dict[str, Any]) -> str:
+def json_text(data: dict[str, Any]) -> str:
     """Return an event's JSON, in one line, without what JSON, UTF-8 or PostgreSQL's jsonb cannot store."""
     try:
         text = _dumped(data)

@@ -10,7 +10,7 @@ LOST_S = 30.0
 """A process that writes no status for so long does not run."""
 
 
-class Lag:
+class OutboxMonitor:
     """Delay of the outbox."""
 
     def __init__(self, settings: OutboxSettings, home: Path) -> None:
@@ -18,7 +18,7 @@ class Lag:
         self._enabled = settings.postgresql.enabled or settings.mqtt.enabled
         self._began_s = time.monotonic()
 
-    def trouble(self) -> str:
+    def alarm_detail(self) -> str:
         """Return what is delayed, in a sentence each; empty for nothing, and if no destination is enabled."""
         if not self._enabled:
             return ""

@@ -13,9 +13,9 @@ from pathlib import Path
 import aiomqtt
 
 from station.outbox.errors import OutboxError
-from station.outbox.feed import Batch, text_of
+from station.outbox.feed import Batch, json_text
 from station.outbox.secrets import password
-from station.outbox.status import write_whole
+from station.outbox.status import write_atomically
 from station.settings.outbox import OutboxMqttSettings
 
 log = logging.getLogger(__name__)
@@ -93,7 +93,7 @@ class Session:
         known = lineage.known(kept)
         return lineage.last if known is None and not kept else known or 0
 
-    async def tell(self, batch: Batch) -> None:
+    async def publish(self, batch: Batch) -> None:
         """Publish a batch, each event after the broker has acknowledged the one before.
 
         Args:
@@ -102,7 +102,7 @@ class Session:
         for event in batch.events:
             now = datetime.now(UTC).isoformat(timespec="milliseconds")
             data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}
-            await self._client.publish(f"{self._root}/{event.kind}", text_of(data).encode(), _AT_LEAST_ONCE)
+            await self._client.publish(f"{self._root}/{event.kind}", json_text(data).encode(), _AT_LEAST_ONCE)
         self._keep(batch, batch.up_to)
 
     async def idle(self, pause_s: float) -> None:
@@ -113,4 +113,4 @@ class Session:
                     pass
 
     def _keep(self, batch: Batch, position: int) -> None:
-        write_whole(self._path, json.dumps({batch.lineage[0].id: position}))
+        write_atomically(self._path, json.dumps({batch.lineage[0].id: position}))

@@ -10,7 +10,7 @@ import psycopg
 from psycopg import AsyncConnection, sql
 
 from station.outbox.errors import OutboxError
-from station.outbox.feed import Batch, Event, text_of
+from station.outbox.feed import Batch, Event, json_text
 from station.outbox.secrets import password
 from station.records.writing import OutboxKind
 from station.settings.outbox import OutboxPostgresqlSettings
@@ -135,7 +135,7 @@ class Session:
         await self._connection.commit()
         return lineage.known(dict(rows)) or 0
 
-    async def tell(self, batch: Batch) -> None:
+    async def publish(self, batch: Batch) -> None:
         """Write a batch and its position: all of it, or nothing.
 
         Args:
@@ -172,7 +172,7 @@ class Session:
         async with self._connection.cursor() as cursor:
             async with cursor.copy("COPY incoming FROM STDIN") as copy:
                 for event in events:
-                    await copy.write_row((event.entry, event.kind, text_of(event.data)))
+                    await copy.write_row((event.entry, event.kind, json_text(event.data)))
             kinds: set[OutboxKind] = {event.kind for event in events}
             if "inspection" in kinds:
                 await cursor.execute(_RECIPES)
@@ -192,7 +192,7 @@ class Session:
                 row = (self._station, batch.lineage[0].id, event.entry, event.kind, _first_line(error))
                 await self._connection.execute(
                     "INSERT INTO refused VALUES (%s, %s, %s, %s, %s, %s) ON CONFLICT DO NOTHING",
-                    (*row, text_of(event.data)),
+                    (*row, json_text(event.data)),
                 )
                 log.error("%s %s was refused: %s", event.kind, event.entry, _first_line(error))  # noqa: TRY400
 

@@ -49,7 +49,7 @@ def write_status(folder: Path, destinations: dict[str, DestinationStatus]) -> No
         OSError: it cannot be written.
     """
     status = OutboxStatus(utc_ms=time.time_ns() // 1_000_000, destinations=destinations)
-    write_whole(folder / _FILE_NAME, status.model_dump_json())
+    write_atomically(folder / _FILE_NAME, status.model_dump_json())
 
 
 def read_status(folder: Path) -> OutboxStatus | None:
@@ -60,7 +60,7 @@ def read_status(folder: Path) -> OutboxStatus | None:
         return None
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_atomically(path: Path, text: str) -> None:
     """Write a file atomically.
 
     Args:

@@ -34,7 +34,7 @@ class Session(Protocol):
         """Return the last entry that the destination has."""
         ...
 
-    async def tell(self, batch: Batch) -> None:
+    async def publish(self, batch: Batch) -> None:
         """Publish a batch; it and its position are durable when this returns."""
         ...
 
@@ -54,7 +54,7 @@ class Destination(Protocol):
         ...
 
 
-class Teller:
+class Publisher:
     """Publisher for one destination.
 
     Args:
@@ -84,7 +84,7 @@ class Teller:
                 if not isinstance(error, StationError):
                     log.exception("%s: a fault of the program", self.destination.name)
                 self._now(connected=False, error=f"{error}")
-            await self._look()
+            await self._count_waiting()
             pause_s = min(self._longest_pause_s, FIRST_PAUSE_S * 2**tries)
             tries = min(tries + 1, 20)
             await asyncio.sleep(pause_s * random.uniform(0.5, 1.0))  # noqa: S311 (no secret)
@@ -101,7 +101,7 @@ class Teller:
             away_since_utc_ms=self._away_since_utc_ms,
         )
 
-    async def _look(self) -> None:
+    async def _count_waiting(self) -> None:
         """Count what waits while the destination is away."""
         if self._position is not None:
             with contextlib.suppress(RecordsError):
@@ -117,7 +117,7 @@ class Teller:
                 continue
             self._note(batch, position)
             if batch.up_to > position:
-                await session.tell(batch)
+                await session.publish(batch)
                 position = batch.up_to
                 self._told += len(batch.events)
                 self._waiting, self._position = batch.last - position, position
@@ -156,7 +156,7 @@ def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:
     return chosen
 
 
-async def keep_telling(settings: OutboxSettings, home: Path, progress: Callable[[], None] = lambda: None) -> None:
+async def run_outbox(settings: OutboxSettings, home: Path, progress: Callable[[], None] = lambda: None) -> None:
     """Publish to every destination until cancelled, and write the status.
 
     Args:
@@ -164,7 +164,7 @@ async def keep_telling(settings: OutboxSettings, home: Path, progress: Callable[
     """
     folder = records_folder(home)
     chosen = destinations(settings, home)
-    tellers = [Teller(folder, settings.station, each, settings.longest_pause_s) for each in chosen]
+    tellers = [Publisher(folder, settings.station, each, settings.longest_pause_s) for each in chosen]
     async with asyncio.TaskGroup() as group:
         for teller in tellers:
             group.create_task(teller.run(), name=f"outbox {teller.destination.name}")

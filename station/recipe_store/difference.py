@@ -25,7 +25,7 @@ def differences(old: Recipe, new: Recipe) -> tuple[Difference, ...]:
     return tuple(_walk(old.model_dump(mode="json"), new.model_dump(mode="json"), ()))
 
 
-def in_a_line(old: Recipe, new: Recipe) -> str:
+def format_differences(old: Recipe, new: Recipe) -> str:
     """Format the differences for a message."""
     return "; ".join(map(str, differences(old, new))) or "no value differs"
 

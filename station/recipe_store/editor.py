@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from station.errors import BadInputError
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.files import locked, read_folder, write_back
 from station.recipe_store.history import Person
 from station.recipe_store.revision import ConflictError, RecipeStoreError, Status
-from station.recipe_store.standing import Found, Standing
+from station.recipe_store.standing import RecipeState, ValidFile
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
-from station.records.direct import writing
+from station.records.direct import direct_transaction
 from station.settings.recipe import shipped_folder
 from station.settings.recipe_form import content_sha256, parse_recipe
 from station.settings.recipe_model import Recipe
@@ -39,7 +39,7 @@ class RecipeEditor:
         self._home, self._folder = home, folder
         self._store = RecipeStore(home, folder)
 
-    def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> Standing:
+    def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> RecipeState:
         """Change values in a recipe's file; comments remain. The file is then an unapproved draft.
 
         Args:
@@ -55,9 +55,9 @@ class RecipeEditor:
             self._check_base(file, base)
             text, recipe = with_values(file.text, changes, str(file.path))
             self._put(file, text, recipe, "recipe.edited", person)
-        return self._store.standing(name)
+        return self._store.state(name)
 
-    def import_text(self, text: str, person: Person, base: str = "") -> Standing:
+    def import_text(self, text: str, person: Person, base: str = "") -> RecipeState:
         """Replace a recipe's file. The file is then an unapproved draft.
 
         Args:
@@ -83,7 +83,7 @@ class RecipeEditor:
                     raise RecipeStoreError(
                         f"{path}: there is a file of that name which is no good recipe; mend it first"
                     )
-                self._put(Found(path, "", recipe), body, recipe, "recipe.imported", person)
+                self._put(ValidFile(path, "", recipe), body, recipe, "recipe.imported", person)
             else:
                 if not base:
                     raise BadInputError(
@@ -92,7 +92,7 @@ class RecipeEditor:
                     )
                 self._check_base(file, base)
                 self._put(file, body, recipe, "recipe.imported", person)
-        return self._store.standing(recipe.name)
+        return self._store.state(recipe.name)
 
     def export_text(self, name: str, revision: int | None = None) -> str:
         """Return a recipe's file; its first line names the version, so that `import_text` notices later changes.
@@ -103,7 +103,7 @@ class RecipeEditor:
         Raises:
             BadInputError: there is none.
         """
-        standing = self._store.standing(name)
+        standing = self._store.state(name)
         now = standing.file
         if revision is not None:
             text = self._store.revision(name, revision).text
@@ -114,7 +114,7 @@ class RecipeEditor:
         base = "" if now is None else f"# base: sha256 {content_sha256(now.recipe)}\n"
         return base + _BASE.sub("", text, count=1)
 
-    def revert(self, name: str, person: Person, revision: int | None = None) -> Standing:
+    def revert(self, name: str, person: Person, revision: int | None = None) -> RecipeState:
         """Put a revision's text back into the recipe's file; the present text is stored as a backup.
 
         Args:
@@ -133,8 +133,8 @@ class RecipeEditor:
                 raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --revision")
             good = {file.recipe.name: file for file in read_folder(self._sites()).found}
             path = good[name].path if name in good else self._sites() / f"{name}.yaml"
-            self._put(Found(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
-        return self._store.standing(name)
+            self._put(ValidFile(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
+        return self._store.state(name)
 
     def upgrade(self, person: Person) -> list[tuple[Path, int]]:
         """Convert every file of an earlier schema to this program's, comments included, with a backup.
@@ -155,28 +155,30 @@ class RecipeEditor:
         return done
 
     @contextmanager
-    def _editing(self, name: str) -> Iterator[Found]:
+    def _editing(self, name: str) -> Iterator[ValidFile]:
         with locked(self._home):
             self._sites()
-            yield self._store.good_file(name)
+            yield self._store.valid_file(name)
 
-    def _check_base(self, file: Found, base: str) -> None:
+    def _check_base(self, file: ValidFile, base: str) -> None:
         """Check that the file is the version that the editor has seen."""
         now = content_sha256(file.recipe)
         if not base or (len(base) >= _SHORTEST_BASE and now.startswith(base.lower())):
             return
         seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
-        changed = f": {in_a_line(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
+        changed = (
+            f": {format_differences(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
+        )
         raise ConflictError(
             f"recipe {file.recipe.name}: it was changed since {base[:12]} was looked at, to {now[:12]}{changed}; "
             "look at it as it is now and make the change again"
         )
 
-    def _put(self, file: Found, text: str, recipe: Recipe, action: str, person: Person) -> None:
+    def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:
         """Write a file and its audit entry: the entry first, so that no change is made without one."""
         old = content_sha256(parse_recipe(file.text, str(file.path))) if file.text else None
         new = {"sha256": content_sha256(recipe), "file": file.path.name}
-        with writing(records_folder(self._home)) as connection:
+        with direct_transaction(records_folder(self._home)) as connection:
             entry = AuditEntry(
                 person.who, person.role, action, f"recipe {recipe.name}", person.reason, {"sha256": old}, new
             )

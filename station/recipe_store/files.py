@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from station.recipe_store.revision import RecipeStoreError
-from station.recipe_store.standing import Found
+from station.recipe_store.standing import ValidFile
 from station.records.sequence_mark import sync_folder
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import check_recipes, recipe_files
@@ -24,7 +24,7 @@ _LOCK = "recipes.lock"
 class Folder(NamedTuple):
     """Content of a recipe folder."""
 
-    found: tuple[Found, ...]
+    found: tuple[ValidFile, ...]
     broken: dict[str, list[Problem]]
     """Errors of the invalid files, by their stems."""
     problems: tuple[Problem, ...]
@@ -46,7 +46,7 @@ def read_folder(folder: Path | None) -> Folder:
     for path in checked.recipes:
         try:
             text = path.read_text(encoding="utf-8-sig")
-            found.append(Found(path, text, parse_recipe(text, str(path))))  # as it is now, with its text
+            found.append(ValidFile(path, text, parse_recipe(text, str(path))))  # as it is now, with its text
         except (OSError, UnicodeDecodeError) as error:
             problems.append(Problem(f"{path}:1", "file", f"expected a readable file: {error}"))
         except SettingsError as error:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, func, insert, select, update
 
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.revision import ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
 from station.records.schema import recipe_revisions
@@ -58,14 +58,14 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
     if draft is not None and draft.author != person.who:
         raise ConflictError(
             f"recipe {recipe.name}: revision {draft.revision} of {draft.author} waits for approval, and differs from "
-            f"this one in {in_a_line(draft.recipe, recipe)}; let it be approved or retired first"
+            f"this one in {format_differences(draft.recipe, recipe)}; let it be approved or retired first"
         )
     if draft is not None:
         _retire(connection, draft, person, f"replaced by its author's next draft: {person.reason}")
     made = _new(known, text, recipe, Origin.SUBMITTED, person)
     _insert(connection, made)
-    before = None if approved is None else _told(approved)
-    _note(connection, person, "recipe.submitted", made, before, {**_told(made), "text": text})
+    before = None if approved is None else _audited(approved)
+    _note(connection, person, "recipe.submitted", made, before, {**_audited(made), "text": text})
     return made
 
 
@@ -90,7 +90,7 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
     if draft.author.casefold().split() == person.who.casefold().split():
         raise RecipeStoreError(f"{place}: {draft.author} is its author; another person has to approve it")
     if file != draft.recipe:
-        what = "cannot be read" if file is None else f"says otherwise: {in_a_line(draft.recipe, file)}"
+        what = "cannot be read" if file is None else f"says otherwise: {format_differences(draft.recipe, file)}"
         raise ConflictError(f"{place}: the recipe's file {what}; submit the file again, or put it back with revert")
     for other in read_revisions(connection):
         if other.status is Status.APPROVED and other.name != draft.name and other.number == draft.number:
@@ -106,9 +106,9 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         approved_utc_ms=utc_ms(),
     )
     _update(connection, made)
-    changes = in_a_line(before.recipe, draft.recipe) if before else "the first revision"
-    old = None if before is None else _told(before)
-    _note(connection, person, "recipe.approved", made, old, {**_told(made), "changes": changes})
+    changes = format_differences(before.recipe, draft.recipe) if before else "the first revision"
+    old = None if before is None else _audited(before)
+    _note(connection, person, "recipe.approved", made, old, {**_audited(made), "changes": changes})
     return made
 
 
@@ -129,7 +129,9 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
     return _retire(connection, now, person, person.reason)
 
 
-def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str) -> Revision:
+def store_approved(
+    connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str
+) -> Revision:
     """Store a recipe that is approved by its origin, in place of the revision approved before.
 
     Args:
@@ -151,8 +153,8 @@ def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, w
         approved_utc_ms=utc_ms(),
     )
     _insert(connection, made)
-    old = None if before is None else _told(before)
-    _note(connection, person, f"recipe.{origin}", made, old, {**_told(made), "text": text})
+    old = None if before is None else _audited(before)
+    _note(connection, person, f"recipe.{origin}", made, old, {**_audited(made), "text": text})
     return made
 
 
@@ -181,7 +183,7 @@ def _retire(connection: Connection, now: Revision, person: Person, reason: str, 
     made = replace(now, status=Status.RETIRED, retired_by=person.who, retired_reason=reason, retired_utc_ms=utc_ms())
     _update(connection, made)
     if told:
-        _note(connection, person, "recipe.retired", made, _told(now), _told(made))
+        _note(connection, person, "recipe.retired", made, _audited(now), _audited(made))
     return made
 
 
@@ -206,7 +208,7 @@ def _note(connection: Connection, person: Person, action: str, of: Revision, old
     append_audit(connection, AuditEntry(person.who, person.role, action, subject, person.reason, old, new))
 
 
-def _told(revision: Revision) -> dict[str, Any]:
+def _audited(revision: Revision) -> dict[str, Any]:
     return {"revision": revision.revision, "status": str(revision.status), "sha256": revision.sha256}
 
 

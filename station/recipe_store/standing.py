@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.revision import Revision, Status
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe_model import Recipe
@@ -31,7 +31,7 @@ class Control:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ValidFile:
     """Valid file of the folder."""
 
     path: Path
@@ -40,14 +40,14 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class RecipeState:
     """State of one recipe."""
 
     name: str
     control: Control | None
     """None if no revision is approved."""
     file_state: FileState
-    file: Found | None
+    file: ValidFile | None
     """None if it is invalid or missing."""
     submitted: Revision | None
     """The draft that waits for approval, whatever the file's state."""
@@ -55,9 +55,9 @@ class Standing:
     """Information or instruction for a person, one sentence; empty if the file is the approved revision."""
 
 
-def standings(
-    found: Sequence[Found], broken: Mapping[str, Sequence[Problem]], history: Sequence[Revision]
-) -> tuple[Standing, ...]:
+def recipe_states(
+    found: Sequence[ValidFile], broken: Mapping[str, Sequence[Problem]], history: Sequence[Revision]
+) -> tuple[RecipeState, ...]:
     """Combine the files and the history, in the order of names.
 
     Args:
@@ -70,14 +70,16 @@ def standings(
     names = dict.fromkeys(sorted({*files, *(each.name for each in history)}))
     nobodys = [problem for stem, problems in broken.items() if stem not in names for problem in problems]
     return tuple(
-        _standing(
+        _recipe_state(
             name, files.get(name), [*broken.get(name, ()), *nobodys], [each for each in history if each.name == name]
         )
         for name in names
     )
 
 
-def _standing(name: str, file: Found | None, broken: Sequence[Problem], history: Sequence[Revision]) -> Standing:
+def _recipe_state(
+    name: str, file: ValidFile | None, broken: Sequence[Problem], history: Sequence[Revision]
+) -> RecipeState:
     submitted = next((each for each in reversed(history) if each.status is Status.DRAFT), None)
     approved = next((each for each in reversed(history) if each.status is Status.APPROVED), None)
     control, note = None, ""
@@ -97,11 +99,11 @@ def _standing(name: str, file: Found | None, broken: Sequence[Problem], history:
     else:
         state = FileState.DRAFT
         note = note or _draft_note(name, file, control, submitted)
-    return Standing(name, control, state, file, submitted, note)
+    return RecipeState(name, control, state, file, submitted, note)
 
 
-def _draft_note(name: str, file: Found, control: Control | None, submitted: Revision | None) -> str:
-    changed = "" if control is None else f" ({in_a_line(control.recipe, file.recipe)})"
+def _draft_note(name: str, file: ValidFile, control: Control | None, submitted: Revision | None) -> str:
+    changed = "" if control is None else f" ({format_differences(control.recipe, file.recipe)})"
     if submitted is not None and submitted.recipe == file.recipe:
         todo = f"revision {submitted.revision} of {submitted.author} waits for another person: station recipes approve"
     else:

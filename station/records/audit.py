@@ -83,7 +83,7 @@ def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
     Raises:
         BadRecordError: a text is empty, too long or not printable, or a value has no JSON.
     """
-    check_entry(entry)
+    validate_entry(entry)
     return _append(connection, entry, last_row(connection), None)
 
 
@@ -99,7 +99,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
         missing.
     """
     last = last_row(connection)
-    if (known is None and last is None) or (known is not None and holds(connection, known)):
+    if (known is None and last is None) or (known is not None and has_row(connection, known)):
         return None
     if known is None:
         reason = f"{HEAD_NAME} is missing or unreadable: whether these are the last rows of the trail is not known"
@@ -123,16 +123,16 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
         BadRecordError: the trail cannot store `by`.
     """
     last = last_row(connection)
-    lost = known if known is not None and not holds(connection, known) else None
+    lost = known if known is not None and not has_row(connection, known) else None
     here = None if last is None else {"seq": last.seq, "hash": last.hash}
     old = None if lost is None else {"audit": lost._asdict()}
     entry = AuditEntry(by, "command line", RESTORED, "records", "", old, {**new, "audit": here})
-    check_entry(entry)
+    validate_entry(entry)
     seq = None if lost is None else max(lost.seq, last.seq if last else 0) + _SPARE_NUMBERS
     return _append(connection, entry, last, seq)
 
 
-def holds(connection: Connection, head: Head) -> bool:
+def has_row(connection: Connection, head: Head) -> bool:
     """Check that the trail has exactly this row."""
     return connection.scalar(select(audit.c.hash).where(audit.c.seq == head.seq)) == head.hash
 
@@ -200,7 +200,7 @@ def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, se
     return row
 
 
-def check_entry(entry: AuditEntry) -> None:
+def validate_entry(entry: AuditEntry) -> None:
     """Check that the trail can store an entry's texts, before the action is carried out.
 
     Raises:

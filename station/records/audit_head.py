@@ -59,7 +59,7 @@ def save_head(folder: Path, head: Head) -> None:
         sync_folder(folder)
 
 
-def keep_head(folder: Path, head: Head) -> None:
+def try_save_head(folder: Path, head: Head) -> None:
     """Save the head; a failure is logged only, because the trail itself is durable without it.
 
     Args:

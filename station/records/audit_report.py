@@ -30,7 +30,7 @@ def read_audit(connection: Connection, number: int, action: str = "", subject: s
     return [row_of(found) for found in connection.execute(query)][::-1]
 
 
-def told(rows: Sequence[AuditRow]) -> str:
+def format_rows(rows: Sequence[AuditRow]) -> str:
     """Format rows for a person, some lines each."""
     return printable("\n".join(line for row in rows for line in _lines(row)))
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from station.records.audit import holds, newer_head
+from station.records.audit import has_row, newer_head
 from station.records.audit_head import Head, read_head
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.errors import DamagedError, DiskFullError, RecordsError
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.images import FOLDER_NAME, image_path
 from station.records.retention import forget_missing, referred
-from station.records.sequence_mark import LARGEST, SequenceMark, sync_folder
+from station.records.sequence_mark import LARGEST, HighWaterMark, sync_folder
 from station.records.writing import utc_ms
 
 MANIFEST_NAME = "backup.json"
@@ -71,7 +71,7 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
         raise
     except (OSError, sqlite3.Error) as error:
         _remove(partial)
-        raise in_words(error, str(directory)) from error
+        raise map_error(error, str(directory)) from error
     return manifest
 
 
@@ -91,7 +91,7 @@ def read_manifest(directory: Path) -> Manifest:
     except ValidationError as error:
         raise DamagedError(f"{directory / MANIFEST_NAME}: {error.errors()[0]['msg']}", "take another backup") from error
     except OSError as error:
-        raise in_words(error, str(directory)) from error
+        raise map_error(error, str(directory)) from error
 
 
 def copy_image(source: Path, target: Path, sha256: str) -> int:
@@ -150,7 +150,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     _sync(path)
     return Manifest(
         made_utc_ms=utc_ms(),
-        sequence=max(SequenceMark(folder / MARK_NAME).value, last or 0),
+        sequence=max(HighWaterMark(folder / MARK_NAME).value, last or 0),
         inspections=inspections,
         images=images,
         size_bytes=size_bytes + path.stat().st_size,
@@ -166,7 +166,7 @@ def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
     try:
         with engine.connect() as connection:
             head = newer_head(connection, None)
-            cut = known is not None and not holds(connection, known)
+            cut = known is not None and not has_row(connection, known)
     finally:
         engine.dispose()
     note = "the audit trail lacks rows that it had: see `station audit verify`"

@@ -7,14 +7,14 @@ from pathlib import Path
 from sqlalchemy import Connection
 
 from station.records.audit import newer_head
-from station.records.audit_head import keep_head, read_head
+from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, open_engine
 from station.records.errors import RecordsError
-from station.records.failures import in_words
+from station.records.failures import map_error
 
 
 @contextmanager
-def changing(folder: Path) -> Iterator[Connection]:
+def short_transaction(folder: Path) -> Iterator[Connection]:
     """Run one transaction: durable when the block ends, rolled back if it raises. The station waits: be short.
 
     Raises:
@@ -29,10 +29,10 @@ def changing(folder: Path) -> Iterator[Connection]:
             yield connection
             head = newer_head(connection, read_head(folder))
         if head is not None:
-            keep_head(folder, head)
+            try_save_head(folder, head)
     except RecordsError:
         raise
     except Exception as error:
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
     finally:
         engine.dispose()

@@ -13,7 +13,7 @@ from station.records.retention import referred
 from station.records.schema import inspections
 
 
-class Found(NamedTuple):
+class IntegrityReport(NamedTuple):
     """Result of the integrity check."""
 
     inspections: int
@@ -24,7 +24,7 @@ class Found(NamedTuple):
     """Faults that the next start repairs."""
 
 
-def check_records(folder: Path) -> Found:
+def check_records(folder: Path) -> IntegrityReport:
     """Check everything, also while the station writes; changes nothing.
 
     Raises:
@@ -52,4 +52,4 @@ def check_records(folder: Path) -> Found:
     faults += [*damaged, *(f"{path}: missing, though an inspection refers to it" for path in gone)]
     orphans = len(files - wanted.keys() - still.keys())
     notes = [f"{orphans} image files belong to no inspection (yet)"] if orphans else []
-    return Found(number, len(wanted), tuple(faults), tuple(notes))
+    return IntegrityReport(number, len(wanted), tuple(faults), tuple(notes))

@@ -16,7 +16,7 @@ from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool
 
 from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.sequence_mark import sync_folder
 
 FILE_NAME = "records.sqlite3"
@@ -84,9 +84,9 @@ def check(path: Path) -> None:
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_INTERRUPT:
             return
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
     if found != "ok":
-        raise in_words(_corrupt(found), str(path))
+        raise map_error(_corrupt(found), str(path))
 
 
 def _corrupt(found: str) -> sqlite3.DatabaseError:
@@ -156,7 +156,7 @@ def migrate(engine: Engine, folder: Path) -> None:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
     except Exception as error:
-        told = in_words(error, str(folder / FILE_NAME))
+        told = map_error(error, str(folder / FILE_NAME))
         if isinstance(told, (DiskFullError, ReadOnlyError, LockedError, DamagedError)):
             raise told from error
         kept = f"; a copy of it is {backup}" if backup else ""
@@ -199,7 +199,7 @@ def reading(folder: Path) -> Iterator[Connection]:
     except RecordsError:
         raise
     except Exception as error:
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
 
 
 def plain(connection: Connection) -> sqlite3.Connection:

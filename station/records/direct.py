@@ -13,15 +13,15 @@ from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError
 
 from station.records.audit import continue_audit, newer_head
-from station.records.audit_head import keep_head, read_head
+from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, open_engine
 from station.records.errors import LockedError
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.opening import lock_folder
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Connection]:
+def direct_transaction(folder: Path) -> Iterator[Connection]:
     """Run a transaction: durable when the block has ended, rolled back if it raised.
 
     If no station has the folder open, a missing database is made, and one of an older schema is migrated.
@@ -40,9 +40,9 @@ def writing(folder: Path) -> Iterator[Connection]:
                 yield connection
                 ahead = newer_head(connection, head)
             if ahead is not None:
-                keep_head(folder, ahead)
+                try_save_head(folder, ahead)
     except (DBAPIError, sqlite3.Error, OSError) as error:
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
 
 
 def _make_ready(folder: Path) -> None:

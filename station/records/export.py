@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from station.records.database import plain, reading
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.search import Query
 from station.records.sequence_mark import LARGEST
 
@@ -102,7 +102,7 @@ def export(folder: Path, query: Query, target: Path) -> int:
                 number += len(rows)
         partial.replace(target)
     except OSError as error:
-        raise in_words(error, str(target)) from error
+        raise map_error(error, str(target)) from error
     finally:
         partial.unlink(missing_ok=True)
     return number

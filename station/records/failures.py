@@ -50,7 +50,7 @@ _SYSTEM: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
 }
 
 
-def in_words(error: Exception, place: str) -> RecordsError:
+def map_error(error: Exception, place: str) -> RecordsError:
     """Convert what a write or read raised to a `RecordsError`.
 
     Args:

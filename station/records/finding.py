@@ -8,7 +8,7 @@ from station.records.schema import hours, inspections, reasons
 HOUR_MS = 3_600_000
 
 
-def note_reasons(connection: Connection, before: Outcome | None, now: Outcome) -> None:
+def index_reasons(connection: Connection, before: Outcome | None, now: Outcome) -> None:
     """Update an inspection's reasons in the index.
 
     Args:
@@ -31,7 +31,7 @@ def note_reasons(connection: Connection, before: Outcome | None, now: Outcome) -
         )
 
 
-def note_hour(connection: Connection, sequence: int, began_utc_ms: int) -> None:
+def index_hour(connection: Connection, sequence: int, began_utc_ms: int) -> None:
     """Add an inspection's hour to the index; mostly nothing is written, because the hour is that of the one before.
 
     An inspection may be older than others in the index: their entries do not change.

@@ -20,7 +20,7 @@ class Hold(NamedTuple):
     placed_utc_ms: int
 
     @property
-    def what(self) -> str:
+    def description(self) -> str:
         """Describe the held thing."""
         return f"lot {self.lot}" if self.sequence is None else f"inspection {self.sequence}"
 
@@ -35,7 +35,7 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
         RecordsError: there is no such inspection or lot, or no reason is given.
     """
     _given(reason)
-    standing = _standing(connection, thing)
+    standing = _active(connection, thing)
     if standing is not None:
         return standing
     table = inspections.c
@@ -43,7 +43,7 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
     if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
         raise RecordsError(f"there is no {_named(thing)}", "`station records list` shows what there is")
     connection.execute(insert(holds).values(**_key(thing), reason=reason, by=by, placed_utc_ms=utc_ms()))
-    held = _standing(connection, thing)
+    held = _active(connection, thing)
     if held is None:
         raise RuntimeError("a hold was inserted and is not there")
     return held
@@ -59,7 +59,7 @@ def release(connection: Connection, thing: int | str, reason: str, by: str) -> H
         RecordsError: it is not held, or no reason is given.
     """
     _given(reason)
-    standing = _standing(connection, thing)
+    standing = _active(connection, thing)
     if standing is None:
         raise RecordsError(f"{_named(thing)} is not on hold", "`station records holds` shows what is")
     connection.execute(
@@ -95,7 +95,7 @@ def _is(thing: int | str) -> ColumnElement[bool]:
     return holds.c.sequence == thing if isinstance(thing, int) else holds.c.lot == thing
 
 
-def _standing(connection: Connection, thing: int | str) -> Hold | None:
+def _active(connection: Connection, thing: int | str) -> Hold | None:
     row = connection.execute(select(*_COLUMNS).where(_is(thing), holds.c.released_utc_ms.is_(None))).one_or_none()
     return None if row is None else Hold(*row)
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import cv2
 
 from station.records.errors import RecordsError
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.model import Image
 from station.records.retention import forget_missing, referred, remove_oldest_images
 from station.records.sequence_mark import sync_folder
@@ -43,7 +43,7 @@ class _Set(NamedTuple):
     images: tuple[Image, ...]
 
 
-class _NotKeptError(Exception):
+class _NotStoredError(Exception):
     """An inspection's images are not stored; the message gives the reason."""
 
 
@@ -56,7 +56,7 @@ def image_path(folder: Path, sha256: str) -> Path:
     return folder / FOLDER_NAME / sha256[:2] / f"{sha256}.png"
 
 
-def accepted_is_kept(sequence: int, share: float) -> bool:
+def accepted_is_stored(sequence: int, share: float) -> bool:
     """Check whether the images of an accepted fruit are stored: evenly spread, and the same answer every time.
 
     Args:
@@ -121,11 +121,11 @@ class ImageStore:
         with contextlib.suppress(OSError, RecordsError, TimeoutError):  # tried again before images are written
             self._reconcile()
         while (work := self._queue.get()) is not None and not self._stopping.is_set():
-            self._keep(work)
+            self._store(work)
             self._done += 1
             self.release()
 
-    def _keep(self, work: _Set) -> None:
+    def _store(self, work: _Set) -> None:
         """Write the files first, durably; then the rows that refer to them."""
         rows: list[dict[str, Any]] = []
         try:
@@ -139,12 +139,12 @@ class ImageStore:
                 self._write(image_path(self._folder, sha256), content)
                 rows.append({"kind": image.kind, "step": image.step, "sha256": sha256, "size_bytes": len(content)})
             state, left = "kept", 0
-        except _NotKeptError as error:
+        except _NotStoredError as error:
             state, left = f"dropped: {error}", len(work.images) - len(rows)
             self.results["dropped"] += left
         except Exception as error:  # noqa: BLE001 (an image must not cost the thread)
             left = len(work.images) - len(rows)
-            state = f"failed: {in_words(error, str(self._folder / FOLDER_NAME)).cause}"
+            state = f"failed: {map_error(error, str(self._folder / FOLDER_NAME)).cause}"
             self.results["failed"] += left
         if left and rows:
             state = f"{state}; {len(rows)} of {len(work.images)} kept"
@@ -157,7 +157,7 @@ class ImageStore:
 
     def _go_on(self) -> None:
         if self._stopping.is_set():
-            raise _NotKeptError("the station ended")
+            raise _NotStoredError("the station ended")
 
     def _write(self, path: Path, content: bytes) -> None:
         """Write one durable file; nothing is done if it exists already."""
@@ -185,7 +185,7 @@ class ImageStore:
         """
         quota_bytes = self._settings.images_quota_mb * MB
         if needed_bytes > quota_bytes:
-            raise _NotKeptError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
+            raise _NotStoredError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
         reserve_bytes = 2 * self._settings.free_reserve_mb * MB
         while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
             removed = self._record(lambda connection: remove_oldest_images(connection, accepted=True))
@@ -193,7 +193,7 @@ class ImageStore:
                 removed = self._record(lambda connection: remove_oldest_images(connection, accepted=False))
             if removed is None:
                 whose = "the quota is full of" if over else "the disk is nearly full, beside"
-                raise _NotKeptError(f"{whose} images of rejected fruit, or on hold")
+                raise _NotStoredError(f"{whose} images of rejected fruit, or on hold")
             freed_bytes, names = removed
             for name in names:
                 image_path(self._folder, name).unlink(missing_ok=True)

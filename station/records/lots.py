@@ -6,7 +6,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from station.records.errors import RecordsError
 from station.records.schema import lots
-from station.records.writing import tell, utc_ms
+from station.records.writing import queue_event, utc_ms
 
 LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""
@@ -52,7 +52,7 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
         )
     else:
         _change(connection, known, grower=grower)
-    return _told(connection, name)
+    return _changed(connection, name)
 
 
 def end_lot(connection: Connection, name: str) -> Lot:
@@ -67,7 +67,7 @@ def end_lot(connection: Connection, name: str) -> Lot:
     if known.ended_utc_ms is not None:
         return known
     _change(connection, known, ended_utc_ms=utc_ms())
-    return _told(connection, name)
+    return _changed(connection, name)
 
 
 def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[Lot]:
@@ -97,8 +97,8 @@ def _change(connection: Connection, lot: Lot, **values: object) -> None:
     connection.execute(update(lots).where(lots.c.name == lot.name).values(**values, revision=lot.revision + 1))
 
 
-def _told(connection: Connection, name: str) -> Lot:
+def _changed(connection: Connection, name: str) -> Lot:
     """Return the lot in its present state, and queue it for other systems."""
     row = connection.execute(select(lots.c.id, *_COLUMNS).where(lots.c.name == name)).one()
-    tell(connection, "lot", row.id)
+    queue_event(connection, "lot", row.id)
     return Lot(*row[1:])

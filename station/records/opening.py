@@ -10,15 +10,15 @@ from pathlib import Path
 from sqlalchemy import Connection, func, select
 
 from station.records.audit import continue_audit, newer_head
-from station.records.audit_head import Head, keep_head, read_head
+from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
-from station.records.failures import DAMAGED_REMEDY, in_words
+from station.records.failures import DAMAGED_REMEDY, map_error
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
-from station.records.sequence_mark import SequenceMark, sync_folder
+from station.records.sequence_mark import HighWaterMark, sync_folder
 from station.records.writer import Writer
-from station.records.writing import add_event, end_what_was_left
+from station.records.writing import add_event, end_open_inspections
 from station.settings.records import RecordsSettings
 
 MARK_NAME = "sequence"
@@ -47,7 +47,7 @@ class Opened:
 
     writer: Writer
     images: ImageStore
-    mark: SequenceMark
+    mark: HighWaterMark
     notices: tuple[Notice, ...]
     lost: tuple[int, ...]
     """The inspections that an earlier start left open."""
@@ -67,7 +67,7 @@ def lock_folder(folder: Path) -> int:
         folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     except OSError as error:
-        raise in_words(error, str(folder)) from error
+        raise map_error(error, str(folder)) from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         os.ftruncate(descriptor, 0)
@@ -80,7 +80,7 @@ def lock_folder(folder: Path) -> int:
         ) from error
     except OSError as error:
         os.close(descriptor)
-        raise in_words(error, str(folder)) from error
+        raise map_error(error, str(folder)) from error
     return descriptor
 
 
@@ -96,24 +96,24 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
     """
     path = folder / FILE_NAME
     try:
-        mark = SequenceMark(folder / MARK_NAME)
-        notices = _make_sound(folder, mark)
+        mark = HighWaterMark(folder / MARK_NAME)
+        notices = _move_damaged_aside(folder, mark)
         _migrate(folder)
         sync_folder(folder)
         writer = Writer(*_connector(path, mark), str(path))
         try:
             head = read_head(folder)
-            lost = writer.submit(lambda connection: _begin_again(connection, mark, head, boot, notices)).result()
+            lost = writer.submit(lambda connection: _first_transaction(connection, mark, head, boot, notices)).result()
             images = ImageStore(folder, settings, writer.submit)
         except BaseException:
             writer.close()
             raise
     except OSError as error:
-        raise in_words(error, str(folder)) from error
+        raise map_error(error, str(folder)) from error
     return Opened(writer, images, mark, notices, lost)
 
 
-def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
+def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]:
     """Move a damaged database aside, and what a missing one left, if the numbers can continue without it."""
     path = folder / FILE_NAME
     if not path.exists() or not path.stat().st_size:
@@ -136,7 +136,7 @@ def _make_sound(folder: Path, mark: SequenceMark) -> tuple[Notice, ...]:
     return ()
 
 
-def _lost_mark(mark: SequenceMark) -> SequenceError:
+def _lost_mark(mark: HighWaterMark) -> SequenceError:
     return SequenceError(
         f"{mark.path}: which numbers were given is not known, and the database does not tell",
         "see the last number that the PLC or the reports know, then: station records continue-after NUMBER",
@@ -151,13 +151,13 @@ def _migrate(folder: Path) -> None:
     except RecordsError:
         raise
     except Exception as error:
-        raise in_words(error, str(folder / FILE_NAME)) from error
+        raise map_error(error, str(folder / FILE_NAME)) from error
     finally:
         engine.dispose()
 
 
 def _connector(
-    path: Path, mark: SequenceMark
+    path: Path, mark: HighWaterMark
 ) -> tuple[Callable[[], Connection], Callable[[Connection], None], Callable[[], None]]:
     """Return how the writer connects, and what it does before and after each commit."""
     engine = open_engine(path, "rw")
@@ -187,18 +187,18 @@ def _connector(
     def after_commit() -> None:
         nonlocal head
         if ahead is not None:
-            keep_head(path.parent, ahead)
+            try_save_head(path.parent, ahead)
             head = ahead
 
     return connect, before_commit, after_commit
 
 
-def _begin_again(
-    connection: Connection, mark: SequenceMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
+def _first_transaction(
+    connection: Connection, mark: HighWaterMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
 ) -> tuple[int, ...]:
     """Run the first transaction of a start."""
     mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
-    lost = end_what_was_left(connection)
+    lost = end_open_inspections(connection)
     add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
     continue_audit(connection, head)
     for notice in notices:
@@ -218,12 +218,12 @@ def set_mark(folder: Path, number: int) -> None:
     """
     lock = lock_folder(folder)
     try:
-        mark = SequenceMark(folder / MARK_NAME)
+        mark = HighWaterMark(folder / MARK_NAME)
         if number < mark.value:
             raise SequenceError(f"{mark.value} was given already", f"give {mark.value} or a higher number")
         mark.value = number
         mark.save()
     except OSError as error:
-        raise in_words(error, str(folder)) from error
+        raise map_error(error, str(folder)) from error
     finally:
         os.close(lock)

@@ -17,7 +17,7 @@ from station.channel.line import Outcome
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.database import FILE_NAME, reading
 from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
-from station.records.images import MB, accepted_is_kept
+from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
 from station.records.opening import Notice, Opened, lock_folder, open_records
 from station.records.reading import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
@@ -162,7 +162,7 @@ class Records:
             insert_trigger(connection, sequence, trigger, self._boot)
             return sequence
 
-        def withdraw_begun(future: Future[int]) -> None:
+        def withdraw_late(future: Future[int]) -> None:
             if not future.cancelled() and future.exception() is None:
                 opened.writer.submit(lambda connection: withdraw(connection, future.result()))
 
@@ -170,7 +170,7 @@ class Records:
         try:
             return await self._answer(future)
         except BaseException:  # the caller has gone, or will refuse the trigger
-            future.add_done_callback(withdraw_begun)
+            future.add_done_callback(withdraw_late)
             raise
 
     async def conclude(self, sequence: int, record: InspectionRecord) -> Outcome:
@@ -189,7 +189,7 @@ class Records:
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
         reserved = wanted and opened.images.reserve()
         state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
-        accepted = state if accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
+        accepted = state if accepted_is_stored(sequence, self._settings.accepted_share) else "not wanted"
         future = opened.writer.submit(
             lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
         )

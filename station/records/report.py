@@ -13,12 +13,12 @@ from station.records.reading import Summary
 from station.records.wording import printable, sentence, size_sentence, sparkline
 
 
-def described(record: FullRecord) -> str:
+def format_inspection(record: FullRecord) -> str:
     """Describe one inspection in full."""
     return printable("\n".join(_described(record)))
 
 
-def listed(summaries: Sequence[Summary]) -> str:
+def format_list(summaries: Sequence[Summary]) -> str:
     """Return a line for each inspection."""
     rows = [("number", "begun (UTC)", "trigger", "lot", "grower", "fruit", "outcome", "s", "reasons", "curve")]
     rows += [
@@ -53,7 +53,7 @@ def _described(record: FullRecord) -> Iterator[str]:
         yield _field("simulated", "a twin's device took part")
     yield _field("size", size_sentence(trigger.size))
     yield from _why(judged, standing)
-    yield _field("told the PLC", _told(record))
+    yield _field("told the PLC", _published_text(record))
     if trigger.recipe:
         yield from _recipe(trigger.recipe)
     if judged:
@@ -88,7 +88,7 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
             yield f"  {reason}: {sentence(reason)}"
 
 
-def _told(record: FullRecord) -> str:
+def _published_text(record: FullRecord) -> str:
     if record.standing is None or record.published_utc_ms is None:
         return "not yet"
     told = f"{record.standing.outcome} at {_time(record.published_utc_ms)} UTC"

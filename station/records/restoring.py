@@ -11,22 +11,22 @@ from typing import NamedTuple
 from sqlalchemy import func, insert, select
 
 from station.records.audit import append_restored
-from station.records.audit_head import Head, keep_head, read_head
+from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
 from station.records.errors import DamagedError, RecordsError
-from station.records.failures import in_words
+from station.records.failures import map_error
 from station.records.images import FOLDER_NAME, image_path
 from station.records.opening import BELONGING, lock_folder
 from station.records.retention import referred
 from station.records.schema import origins, outbox
-from station.records.sequence_mark import SequenceMark, sync_folder
+from station.records.sequence_mark import HighWaterMark, sync_folder
 
 _NEW = "restoring"
 _OTHER = "take another backup: this one is not whole"
 
 
-class Restored(NamedTuple):
+class RestoreResult(NamedTuple):
     """Result of a restore."""
 
     inspections: int
@@ -35,7 +35,7 @@ class Restored(NamedTuple):
     """Folder of the previous records."""
 
 
-def restore_backup(folder: Path, directory: Path, by: str) -> Restored:
+def restore_backup(folder: Path, directory: Path, by: str) -> RestoreResult:
     """Restore a backup, all of it or nothing. Numbers given since it was made are not given again.
 
     All is copied and verified first, beside the records; then the present records are moved aside and the copy replaces
@@ -56,7 +56,7 @@ def restore_backup(folder: Path, directory: Path, by: str) -> Restored:
         shutil.rmtree(new, ignore_errors=True)
         (new / FOLDER_NAME).mkdir(parents=True)
         _copied(directory, new, manifest)
-        mark = SequenceMark(folder / MARK_NAME)
+        mark = HighWaterMark(folder / MARK_NAME)
         mark.value = max(mark.value, manifest.sequence)
         mark.save()
         _continue(folder, new, manifest, by)
@@ -67,10 +67,10 @@ def restore_backup(folder: Path, directory: Path, by: str) -> Restored:
         sync_folder(folder)
         shutil.rmtree(new)
     except (OSError, sqlite3.Error) as error:
-        raise in_words(error, str(folder)) from error
+        raise map_error(error, str(folder)) from error
     finally:
         os.close(lock)
-    return Restored(manifest.inspections, manifest.images, aside)
+    return RestoreResult(manifest.inspections, manifest.images, aside)
 
 
 def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
@@ -108,11 +108,11 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
             connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
             told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
             row = append_restored(connection, by, read_head(folder), told)
-        keep_head(folder, Head(row.seq, row.hash))
+        try_save_head(folder, Head(row.seq, row.hash))
     except RecordsError:
         raise
     except Exception as error:
-        raise in_words(error, str(new / FILE_NAME)) from error
+        raise map_error(error, str(new / FILE_NAME)) from error
     finally:
         engine.dispose()
     with closing(sqlite3.connect(new / FILE_NAME)) as connection:

@@ -14,7 +14,7 @@ LARGEST = 2**32 - 1
 _LINE_BYTES = 20
 
 
-class SequenceMark:
+class HighWaterMark:
     """Mark file of one folder. Not safe for use by two threads."""
 
     def __init__(self, path: Path) -> None:

@@ -20,7 +20,7 @@ from station.records.errors import (
     RecordsClosedError,
     RecordsError,
 )
-from station.records.failures import in_words
+from station.records.failures import map_error
 
 T = TypeVar("T")
 Work = Callable[[Connection], T]
@@ -104,7 +104,7 @@ class Writer:
         try:
             self._connection = self._connect()
         except Exception as error:  # noqa: BLE001 (handed to the caller)
-            opened.set_exception(in_words(error, self._place))
+            opened.set_exception(map_error(error, self._place))
             return
         opened.set_result(None)
         last = False
@@ -128,7 +128,7 @@ class Writer:
                 answers.extend(self._attempt(self._connection, work) for work, _ in batch)
                 self._before_commit(self._connection)
         except Exception as error:  # noqa: BLE001 (told to all who asked)
-            told = in_words(error, self._place)
+            told = map_error(error, self._place)
             answers = [told] * len(batch)
             self.error = str(told)
             self._disconnect()  # the next batch begins with a sound connection, if there can be one
@@ -150,7 +150,7 @@ class Writer:
         try:
             result = work(connection)
         except Exception as error:
-            told = in_words(error, self._place)
+            told = map_error(error, self._place)
             if isinstance(told, CONCERNING_ALL):
                 raise told from error  # SQLite may have undone all of it already, the savepoint too
             savepoint.rollback()

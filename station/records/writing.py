@@ -11,7 +11,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.records.errors import BadRecordError, UnknownInspectionError
-from station.records.finding import note_hour, note_reasons
+from station.records.finding import index_hour, index_reasons
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
     alarms,
@@ -67,7 +67,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     _lost(begun)
     sha256 = recipe.sha256 if recipe else None
     connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
-    note_hour(connection, sequence, trigger.began_utc_ms)
+    index_hour(connection, sequence, trigger.began_utc_ms)
 
 
 def withdraw(connection: Connection, sequence: int) -> None:
@@ -121,12 +121,12 @@ def conclude(
         )
     )
     if row.standing is None:
-        note_reasons(connection, None, standing)
+        index_reasons(connection, None, standing)
     if record.curve:
         points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
         connection.execute(insert(curve_points), points)
     if row.published_utc_ms is not None:
-        tell(connection, "inspection", sequence)
+        queue_event(connection, "inspection", sequence)
     return standing, images_state
 
 
@@ -141,19 +141,19 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
     if found is None:
         if outcome.sequence > given_up_to:
             raise UnknownInspectionError(f"inspection {outcome.sequence} was never begun", "ask what is open")
-        _insert_told(connection, outcome, boot)
+        _insert_published(connection, outcome, boot)
     connection.execute(
         update(inspections)
         .where(inspections.c.sequence == outcome.sequence)
         .values(outcome=outcome.outcome, standing=outcome.model_dump_json(), published_utc_ms=utc_ms())
     )
     stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
-    note_reasons(connection, stood, outcome)
-    tell(connection, "inspection", outcome.sequence)
+    index_reasons(connection, stood, outcome)
+    queue_event(connection, "inspection", outcome.sequence)
     return True
 
 
-def tell(connection: Connection, kind: OutboxKind, row: int) -> None:
+def queue_event(connection: Connection, kind: OutboxKind, row: int) -> None:
     """Queue a row for other systems: an inspection when it is published, and again when it changes after that.
 
     Args:
@@ -174,7 +174,7 @@ def acknowledge(connection: Connection, sequence: int) -> int:
     ).rowcount
 
 
-def end_what_was_left(connection: Connection) -> list[int]:
+def end_open_inspections(connection: Connection) -> list[int]:
     """End, after a start, what was not surely delivered: NO_RESULT with `station_lost`.
 
     Returns:
@@ -191,11 +191,11 @@ def end_what_was_left(connection: Connection) -> list[int]:
             .where(table.sequence == row.sequence)
             .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
         )
-        note_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
+        index_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
     lost_images = update(inspections).where(table.images_state == PENDING).values(images_state=LOST)
     for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
         if row.published_utc_ms is not None:
-            tell(connection, "inspection", row.sequence)
+            queue_event(connection, "inspection", row.sequence)
     return [row.sequence for row in rows]
 
 
@@ -229,7 +229,7 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
     table = inspections.c
     changed = update(inspections).where(table.sequence == sequence).values(images_state=state)
     if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
-        tell(connection, "inspection", sequence)
+        queue_event(connection, "inspection", sequence)
 
 
 def _row(connection: Connection, sequence: int) -> Any:
@@ -294,7 +294,7 @@ def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
         raise BadRecordError(f"inspection {begun['sequence']} is malformed: {error}", "see the log") from error
 
 
-def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
+def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> None:
     """Insert an inspection of which only the outcome is known: it began in a database that was moved aside."""
     connection.execute(
         insert(inspections).values(
@@ -314,4 +314,4 @@ def _insert_told(connection: Connection, outcome: Outcome, boot: str) -> None:
             images_state="none: known by its outcome alone",
         )
     )
-    note_hour(connection, outcome.sequence, outcome.began_utc_ms)
+    index_hour(connection, outcome.sequence, outcome.began_utc_ms)

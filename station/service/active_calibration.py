@@ -66,7 +66,7 @@ class ActiveCalibration:
             return CalibrationInUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
         measured = calibration.scale_measured
         scale = calibration.mm_per_px if measured else self._usual_mm_per_px
-        words = f"{calibration.in_words()}, in use {scale:g} mm/px"
+        words = f"{calibration.summary()}, in use {scale:g} mm/px"
         return CalibrationInUse(
             scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY
         )

@@ -11,9 +11,9 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from station.errors import StationError
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.revision import RecipeStoreError
-from station.recipe_store.standing import Control, FileState, Standing
+from station.recipe_store.standing import Control, FileState, RecipeState
 from station.recipe_store.store import RecipeStore
 from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError
@@ -176,7 +176,7 @@ class ActiveRecipes:
     def _take(self, controls: Iterable[Control]) -> None:
         self._controls = {control.recipe.plc_number: control for control in controls}
 
-    def _audit_files(self, standings: Iterable[Standing]) -> None:
+    def _audit_files(self, standings: Iterable[RecipeState]) -> None:
         """Audit what was done to files without the commands, once for each content."""
         for standing in standings:
             file, control, submitted = standing.file, standing.control, standing.submitted
@@ -187,7 +187,7 @@ class ActiveRecipes:
             self._noticed.add((standing.name, sha256))
             if file is not None and submitted is not None and submitted.recipe == file.recipe:
                 continue
-            changes = in_a_line(control.recipe, file.recipe) if control and file else str(standing.file_state)
+            changes = format_differences(control.recipe, file.recipe) if control and file else str(standing.file_state)
             told = {"state": str(standing.file_state), "sha256": sha256, "changes": changes}
             entry = AuditEntry(
                 STATION, STATION, "recipe.file_noticed", f"recipe {standing.name}", standing.note[:900], None, told

@@ -16,7 +16,7 @@ from station.channel.server import Handlers
 from station.errors import BadInputError
 from station.inspection.alarm_table import ALARMS, AlarmId, anchor
 from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
-from station.records.audit import AuditEntry, check_entry
+from station.records.audit import AuditEntry, validate_entry
 from station.service.alarm_manager import AlarmManager
 from station.service.audit_logger import AuditLogger, alarm_entry
 
@@ -89,7 +89,7 @@ class AlarmCommands:
         if request.alarm not in set(AlarmId):
             raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")
         entry = alarm_entry(request.who, request.role, change, request.alarm, reason)
-        check_entry(entry)
+        validate_entry(entry)
         return AlarmId(request.alarm), entry
 
     def _done(self, changed: bool, entry: AuditEntry) -> CommandDone:  # noqa: FBT001 (an answer handed on)

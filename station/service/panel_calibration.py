@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Literal
 
 from station.calibration.bench import Place, Progress, Unit
-from station.calibration.calibrating import Calibrating, Draft
+from station.calibration.calibrating import CalibrationProcedure, Draft
 from station.calibration.model import Calibration, Verification
 from station.calibration.store import CalibrationStore
-from station.calibration.verifying import Verified, Verifying
+from station.calibration.verifying import VerificationProcedure, VerificationResult
 from station.channel.messages import Message
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -208,7 +208,7 @@ class PanelCalibration:
     async def _calibrate(self, run: _Run, request: BeginBallRun) -> str:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
         bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
-        draft = await Calibrating(
+        draft = await CalibrationProcedure(
             bench,
             self._unit(),
             recipe,
@@ -237,7 +237,7 @@ class PanelCalibration:
             lambda: (self._store.golden(calibration), self._store.presses(calibration))
         )
         bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
-        verified = await Verifying(
+        verified = await VerificationProcedure(
             bench,
             recipe,
             self._site.calibration,
@@ -285,7 +285,7 @@ class PanelCalibration:
             id=made.id,
             made_utc_ms=round(1000 * made.made_at.timestamp()),
             operator=made.operator,
-            words=made.in_words(),
+            words=made.summary(),
             passed=True,
             checks=_check_views(made),
             pictures=_files_in(self._store.folder(made)),
@@ -337,7 +337,7 @@ def _calibration_files(draft: Draft) -> dict[str, bytes]:
     return calibration_files(draft)
 
 
-def _verification_files(verified: Verified, calibration: Calibration) -> dict[str, bytes]:
+def _verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
     from station.calibration.report import verification_files  # noqa: PLC0415
 
     return verification_files(verified, calibration)

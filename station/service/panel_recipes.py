@@ -42,7 +42,7 @@ from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.revision import ConflictError, Revision
-from station.recipe_store.standing import Standing
+from station.recipe_store.standing import RecipeState
 from station.recipe_store.store import RecipeStore
 from station.records.database import plain, reading, records_folder
 from station.service.panel_jobs import PanelJobs
@@ -118,9 +118,9 @@ class PanelRecipes:
         """Return one recipe's file, or one of its revisions."""
 
         def read() -> RecipeTold:
-            row = _row(self._store.standing(request.name))
+            row = _row(self._store.state(request.name))
             if request.revision is None:
-                file = self._store.good_file(request.name)
+                file = self._store.valid_file(request.name)
                 text, recipe = file.text, file.recipe
             else:
                 revision = self._store.revision(request.name, request.revision)
@@ -133,7 +133,7 @@ class PanelRecipes:
         """Return a page of a recipe's revisions."""
 
         def read() -> RecipeHistory:
-            self._store.standing(request.name)
+            self._store.state(request.name)
             known = self._store.history(request.name)
             below = request.below or known[-1].revision + 1 if known else 1
             chosen = [place for place, each in enumerate(known) if each.revision < below][::-1]
@@ -147,14 +147,14 @@ class PanelRecipes:
         """Return the differences between two forms of a recipe."""
 
         def read() -> Changes:
-            standing = self._store.standing(request.name)
+            standing = self._store.state(request.name)
             if request.old is not None:
                 old = _recipe(self._store.revision(request.name, request.old))
             elif standing.control is not None:
                 old = standing.control.recipe
             else:
                 raise BadInputError(f"recipe {request.name}: none of its revisions is approved; name one")
-            new = self._store.good_file(request.name).recipe
+            new = self._store.valid_file(request.name).recipe
             if request.new is not None:
                 new = _recipe(self._store.revision(request.name, request.new))
             return Changes(changes=_changes(old, new))
@@ -166,7 +166,7 @@ class PanelRecipes:
 
         def save() -> None:
             person = _person(request.actor, request.reason)
-            waiting = self._store.standing(request.name).submitted
+            waiting = self._store.state(request.name).submitted
             if waiting is not None and waiting.author != person.who:
                 raise ConflictError(
                     f"recipe {request.name}: revision {waiting.revision} of {waiting.author} waits for approval; let "
@@ -220,7 +220,7 @@ class PanelRecipes:
         """Return the last judged curves of a recipe's fruit."""
 
         def read() -> PastCurves:
-            recipe = self._store.good_file(request.name).recipe
+            recipe = self._store.valid_file(request.name).recipe
             with reading(self._records) as connection:
                 ask = plain(connection).execute
                 judged = ask(_JUDGED, (request.name, request.limit)).fetchall()
@@ -242,7 +242,7 @@ class PanelRecipes:
 
         def write() -> None:
             try:
-                draft.write_text(self._store.good_file(request.name).text, encoding="utf-8")
+                draft.write_text(self._store.valid_file(request.name).text, encoding="utf-8")
             except OSError as error:
                 raise StationError(f"{draft}: {(error.strerror or str(error)).lower()}; free space") from error
 
@@ -254,12 +254,12 @@ class PanelRecipes:
     async def _change(self, name: str, work: Callable[[], object]) -> RecipeRow:
         def change() -> RecipeRow:
             work()
-            return _row(self._store.standing(name))
+            return _row(self._store.state(name))
 
         return await self._worker.do(change)
 
 
-def _row(standing: Standing) -> RecipeRow:
+def _row(standing: RecipeState) -> RecipeRow:
     control, file, waiting = standing.control, standing.file, standing.submitted
     known = control.recipe if control else file.recipe if file else None
     return RecipeRow(

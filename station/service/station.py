@@ -12,7 +12,7 @@ from pathlib import Path
 from station.channel.server import ChannelServer
 from station.errors import StationError
 from station.inspection.states import STATES
-from station.outbox.lag import Lag
+from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
@@ -139,7 +139,7 @@ class Station:
             liveness,
             calibrated,
             panel.hmi_fault,
-            Lag(configuration.outbox, configuration.home).trouble,
+            OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
             broken=self._broken,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,

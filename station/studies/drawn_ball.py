@@ -17,7 +17,7 @@ _COUNT_MM = 85 / 227
 _OPEN_MM, _CLOSED_COUNT, _FINGERS_MM = 53.0, 230, 32.0
 
 
-class DrawnBall:
+class SimulatedRig:
     """A rig whose widths are whole counts of the gripper, and whose light drifts from step to step.
 
     Args:

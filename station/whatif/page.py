@@ -31,7 +31,7 @@ _WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class FruitView:
     """View of one fruit."""
 
     result: Replayed
@@ -55,7 +55,7 @@ class Page:
     counted: Counted
     against: Compared | None
     """Comparison with people's marks; None if no fruit is marked."""
-    shown: Sequence[Shown]
+    shown: Sequence[FruitView]
     changed: int
     """Number of fruit that change sides, shown or not."""
 
@@ -73,9 +73,9 @@ def render(page: Page) -> str:
     return template.render(page=page, before=BEFORE, after=AFTER, wide=_WIDE, high=_HIGH, edge=_EDGE)
 
 
-def shown(
+def fruit_views(
     connection: Connection, folder: Path, results: Sequence[Replayed], own: Recipe | None, draft: Recipe
-) -> list[Shown]:
+) -> list[FruitView]:
     """Read the views of some fruit.
 
     Args:
@@ -85,10 +85,10 @@ def shown(
         own: the inspections' own recipe, for its limits; None if they had several.
         draft: the recipe that was tried.
     """
-    return [_shown(connection, folder, result, own, draft) for result in results]
+    return [_fruit_view(connection, folder, result, own, draft) for result in results]
 
 
-def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> Shown:
+def _fruit_view(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> FruitView:
     rows = connection.exec_driver_sql(
         "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm IS NOT NULL "
         "AND area_mm2 IS NOT NULL ORDER BY step",
@@ -109,7 +109,7 @@ def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe |
     )
     placed = tuple((*place(closing_mm, area_mm2), whose) for closing_mm, area_mm2, whose in limits)
     measuring = draft.segmentation if result.areas_mm2 else None
-    return Shown(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
+    return FruitView(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
 
 
 def _picture(connection: Connection, folder: Path, sequence: int, draft: Segmentation | None) -> str:

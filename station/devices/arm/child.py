@@ -22,7 +22,7 @@ FOLDER = "fruit-station-arm-"
 _OWNED = re.compile(rf"{FOLDER}(\d{{1,9}})-.+")
 
 
-def sweep() -> None:
+def remove_stale_folders() -> None:
     """Remove the folders of dead stations: a killed one could not remove its own, nor could its process."""
     for folder in Path(tempfile.gettempdir()).glob(f"{FOLDER}*"):
         owned = _OWNED.fullmatch(folder.name)
@@ -61,7 +61,7 @@ class ArmProcess:
         Raises:
             ArmFault: no process can be started.
         """
-        sweep()
+        remove_stale_folders()
         folder = tempfile.TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-", ignore_cleanup_errors=True)
         endpoint = f"ipc://{folder.name}/0"  # short: a socket's path has 107 bytes at most
         try:
@@ -100,7 +100,7 @@ class ArmProcess:
         """Whether the process is gone."""
         return self._process.returncode is not None
 
-    async def ask(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
         """Send a request to the process; the wait ends also when the process dies.
 
         Raises:
@@ -118,10 +118,10 @@ class ArmProcess:
             for task in (asking, dying):
                 task.cancel()
             await asyncio.gather(asking, dying, return_exceptions=True)
-        raise ArmFault(ArmCause.LINK_LOST, f"the arm's process ended with {self._process.returncode}{self.last_words}")
+        raise ArmFault(ArmCause.LINK_LOST, f"the arm's process ended with {self._process.returncode}{self.last_output}")
 
     @property
-    def last_words(self) -> str:
+    def last_output(self) -> str:
         """Return ur-rtde's last output, for the end of a message."""
         return f" ({' / '.join(self._words)})" if self._words else ""
 

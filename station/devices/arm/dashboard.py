@@ -34,7 +34,7 @@ class DashboardConversation:
     def __init__(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._host, self._reader, self._writer = host, reader, writer
 
-    async def hear(self) -> str:
+    async def read_line(self) -> str:
         """Read the next line.
 
         Raises:
@@ -49,7 +49,7 @@ class DashboardConversation:
             raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} does not speak its protocol")
         return line.decode("ascii").strip()
 
-    async def say(self, command: str) -> str:
+    async def request(self, command: str) -> str:
         """Send a line and return the reply.
 
         Raises:
@@ -60,7 +60,7 @@ class DashboardConversation:
             await self._writer.drain()
         except OSError as error:
             raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} hung up") from error
-        return await self.hear()
+        return await self.read_line()
 
     async def facts(self) -> DashboardFacts:
         """Read all facts for the driver and the device check.
@@ -69,12 +69,12 @@ class DashboardConversation:
             ArmFault: an answer did not come in time.
         """
         return DashboardFacts(
-            version=(await self.say("PolyscopeVersion")).removeprefix("URSoftware "),
-            serial_number=await self.say("get serial number"),
-            model=await self.say("get robot model"),
-            robot_mode=(await self.say("robotmode")).removeprefix("Robotmode: "),
-            safety_status=(await self.say("safetystatus")).removeprefix("Safetystatus: "),
-            remote="true" in await self.say("is in remote control"),
+            version=(await self.request("PolyscopeVersion")).removeprefix("URSoftware "),
+            serial_number=await self.request("get serial number"),
+            model=await self.request("get robot model"),
+            robot_mode=(await self.request("robotmode")).removeprefix("Robotmode: "),
+            safety_status=(await self.request("safetystatus")).removeprefix("Safetystatus: "),
+            remote="true" in await self.request("is in remote control"),
         )
 
 
@@ -95,7 +95,7 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         raise ArmFault(ArmCause.LINK_LOST, detail) from error
     try:
         conversation = DashboardConversation(host, reader, writer)
-        greeting = await conversation.hear()
+        greeting = await conversation.read_line()
         if "Dashboard Server" not in greeting:
             raise ArmFault(ArmCause.LINK_LOST, f"what answers at {host}:{PORT} is no dashboard server: {greeting!r}")
         yield conversation

@@ -31,7 +31,7 @@ def from_state(snapshot: Snapshot) -> ArmFault | None:
     return None
 
 
-def why_not_done(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healthy: bool) -> ArmFault:
+def diagnose(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healthy: bool) -> ArmFault:
     """Return the cause why a command was not done or no program plays.
 
     Args:
@@ -52,7 +52,7 @@ def why_not_done(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_h
     return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {words}".rstrip())
 
 
-def from_words(words: str) -> ArmFault | None:
+def from_output(words: str) -> ArmFault | None:
     """Return the cause in ur-rtde's own exceptions; None if they leave it open."""
     lowered = words.lower()
     if "remote control" in lowered:

@@ -13,7 +13,7 @@ from typing import NoReturn
 
 from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
-from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, from_state, from_words, why_not_done
+from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_output, from_state
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.settings.arm import ArmSettings
@@ -116,7 +116,7 @@ class ArmLink:
             raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
         limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=limit_s)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=limit_s)
         except ArmFault as fault:
             if fault.cause is ArmCause.DEADLINE:
                 raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
@@ -151,7 +151,7 @@ class ArmLink:
             self._lock.release()
 
     async def _ask_watched(self, process: ArmProcess, request: Beside | Move | Reachable | Halt) -> Outcome:
-        asking = asyncio.create_task(process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s))
+        asking = asyncio.create_task(process.request(request, Outcome, deadline_s=self._settings.call_deadline_s))
         fading = asyncio.create_task(self._until_faded(process))
         try:
             await asyncio.wait({asking, fading}, return_when=asyncio.FIRST_COMPLETED)
@@ -167,7 +167,7 @@ class ArmLink:
             await self._heard(process)
 
     async def _heard(self, process: ArmProcess) -> Snapshot:
-        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
         if snapshot.age_s > self._settings.link_lost_after_s:
             raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
         return snapshot
@@ -202,7 +202,7 @@ class ArmLink:
             if self.fault is not None:
                 raise self.fault
         elif snapshot.runtime_state != PLAYING:
-            done = await process.ask(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
+            done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:
                 raise await self._explain(done.words)
             self._up()
@@ -213,7 +213,7 @@ class ArmLink:
         # The RTDE state may lag a little behind what the dashboard server has just said.
         deadline_s = time.monotonic() + SETTLE_S
         while True:
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             fault = from_state(snapshot)
             if fault is None:
                 return snapshot
@@ -243,7 +243,7 @@ class ArmLink:
             await self._watch(self._process)
         elif self._latched is None or self._latched.cause is not ArmCause.RESTARTS:
             process = await self._connect()
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             fault = from_state(snapshot) or self._latched
             if fault is None:
                 await self._command(process)
@@ -263,7 +263,7 @@ class ArmLink:
         elif latched is not None and latched not in STATE_CAUSES:
             return
         elif snapshot.runtime_state != PLAYING:
-            self._face(await self._explain(""))
+            self._store_or_raise(await self._explain(""))
         elif self._lost is not None:
             self._set(None)
 
@@ -280,9 +280,9 @@ class ArmLink:
             )
         self._starts_s.append(now_s)
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
-        outcome = await self._process.ask(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
+        outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
-            raise from_words(outcome.words) or ArmFault(
+            raise from_output(outcome.words) or ArmFault(
                 ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}"
             )
         return self._process
@@ -295,24 +295,24 @@ class ArmLink:
             payload_centre_mm=settings.payload_centre_mm,
             watchdog_hz=settings.watchdog_hz,
         )
-        outcome = await process.ask(request, Outcome, deadline_s=settings.constructor_limit_s)
+        outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
         if not outcome.done:
-            self._face(await self._explain(outcome.words))
+            self._store_or_raise(await self._explain(outcome.words))
         else:
             # The lease that the process knew may have run out while the connection was made: renew it before the
             # watchdog that has just been set up looks for a kick. Whether it answers is the next beat's matter.
             with contextlib.suppress(ArmFault):
-                await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+                await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
 
     async def _explain(self, words: str) -> ArmFault:
-        fault = from_words(words)
+        fault = from_output(words)
         if fault is not None or self._process is None:
             return fault or ArmFault(ArmCause.LINK_LOST, f"the arm is not connected: {words}")
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
-        snapshot = await self._process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        return diagnose(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, words: str) -> ArmFault:
         """Return the cause why a command was not done; it becomes the link's fault.
@@ -323,13 +323,13 @@ class ArmLink:
         async with self._lock:
             try:
                 fault = await self._explain(words)
-                self._face(fault)
+                self._store_or_raise(fault)
             except ArmFault as lost:
                 fault = lost
                 await self._lose(lost)
             return fault
 
-    def _face(self, fault: ArmFault) -> None:
+    def _store_or_raise(self, fault: ArmFault) -> None:
         """Store a fault that waits for a person; raise one that a new process may clear."""
         if fault.cause in SELF_HEALING:
             raise fault

@@ -5,7 +5,7 @@ from math import cos, hypot, sin
 from station.devices.arm.messages import Position, Six
 
 
-def beside(pose: Six, offset_mm: Position) -> Six:
+def offset_pose(pose: Six, offset_mm: Position) -> Six:
     """Return the pose with an offset along its own axes, with the same orientation.
 
     Args:

@@ -5,7 +5,7 @@ import struct
 
 from station.devices.arm.dashboard import DashboardFacts, dashboard
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
-from station.devices.finding import Finding
+from station.devices.finding import CheckResult
 from station.settings.arm import ArmSettings
 
 RTDE_PORT = 30004
@@ -26,17 +26,17 @@ FROZEN = (
 )
 
 
-async def probe_arm(settings: ArmSettings) -> list[Finding]:
+async def probe_arm(settings: ArmSettings) -> list[CheckResult]:
     """Check the controller's dashboard, RTDE and script servers. It moves nothing, starts nothing and never raises."""
     try:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
     except ArmFault as fault:
-        return [Finding("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
+        return [CheckResult("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
     return [_controller(settings.host, facts), await _rtde(settings.host), await _script(settings.host)]
 
 
-def _controller(host: str, facts: DashboardFacts) -> Finding:
+def _controller(host: str, facts: DashboardFacts) -> CheckResult:
     found = (
         f"{_short(facts.model)} at {host}, serial number {_short(facts.serial_number)}, "
         f"PolyScope {_short(facts.version)}: {_short(facts.robot_mode)}, "
@@ -44,8 +44,8 @@ def _controller(host: str, facts: DashboardFacts) -> Finding:
     )
     cause = _cause(facts)
     if cause is None:
-        return Finding("arm controller", found, "ok", "")
-    return Finding("arm controller", found, "fault", REMEDIES[cause])
+        return CheckResult("arm controller", found, "ok", "")
+    return CheckResult("arm controller", found, "fault", REMEDIES[cause])
 
 
 def _cause(facts: DashboardFacts) -> ArmCause | None:
@@ -69,7 +69,7 @@ def _short(words: str) -> str:
     return legible if len(legible) <= LONGEST_WORD else f"{legible[: LONGEST_WORD - 1]}…"
 
 
-async def _rtde(host: str) -> Finding:
+async def _rtde(host: str) -> CheckResult:
     """Request protocol version 2, the registers of a fieldbus, and the clock; the claim ends with the connection."""
     place, connected = f"{host}:{RTDE_PORT}", False
     try:
@@ -86,18 +86,20 @@ async def _rtde(host: str) -> Finding:
                 writer.transport.abort()
     except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error) as error:
         if not connected:
-            return Finding("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
+            return CheckResult("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
         how = f"answers later than {PORT_DEADLINE_S:g} s" if isinstance(error, TimeoutError) else "hangs up"
-        return Finding("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
+        return CheckResult("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
     found = f"RTDE at {place}, controller {'.'.join(map(str, version))}"
     if accepted[:1] != b"\x01":
-        return Finding("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
+        return CheckResult("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
     if not fresh:
-        return Finding("arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN)
+        return CheckResult(
+            "arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN
+        )
     if b"IN_USE" in kinds:
         remedy = REMEDIES[ArmCause.REGISTERS_IN_USE]
-        return Finding("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
-    return Finding("arm RTDE", found, "ok", "")
+        return CheckResult("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
+    return CheckResult("arm RTDE", found, "ok", "")
 
 
 async def _advances(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
@@ -128,12 +130,12 @@ async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
             return answer
 
 
-async def _script(host: str) -> Finding:
+async def _script(host: str) -> CheckResult:
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             _, writer = await asyncio.open_connection(host, SCRIPT_PORT)
     except (TimeoutError, OSError):
         found = f"nobody takes programs at {host}:{SCRIPT_PORT}"
-        return Finding("arm programs", found, "fault", NOBODY_THERE)
+        return CheckResult("arm programs", found, "fault", NOBODY_THERE)
     writer.transport.abort()
-    return Finding("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")
+    return CheckResult("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")

@@ -21,7 +21,7 @@ from station.channel.server import ChannelServer
 from station.devices.arm.age import TimestampAge
 from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
-from station.devices.arm.offset import beside
+from station.devices.arm.offset import offset_pose
 from station.errors import StationError
 
 VARIABLES = [
@@ -121,7 +121,7 @@ class UrRtdeProcess:
         def ask() -> bool:
             control = self._commanding()
             x, y, z, rx, ry, rz = control.getForwardKinematics(joints, self._tool())
-            pose = list(beside((x, y, z, rx, ry, rz), request.offset_mm))
+            pose = list(offset_pose((x, y, z, rx, ry, rz), request.offset_mm))
             if not control.getInverseKinematicsHasSolution(pose, joints):
                 return False
             found.extend(control.getInverseKinematics(pose, joints))
@@ -214,7 +214,7 @@ def die_with(parent: int) -> None:
         os._exit(1)
 
 
-def sleep_loosely() -> None:
+def relax_timers() -> None:
     """Let the kernel wake this thread, and all that it starts from now on, a little later than requested.
 
     ur-rtde's threads poll their sockets every 0.1 ms, which costs more than all data that they read.
@@ -245,7 +245,7 @@ def main() -> None:
     """Run the process; its arguments are the endpoint, the controller's host, the frequency and the parent's id."""
     endpoint, host, frequency_hz, parent = sys.argv[1:]
     die_with(int(parent))
-    sleep_loosely()
+    relax_timers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asyncio.run(serve(endpoint, host, float(frequency_hz)))
 

@@ -155,27 +155,27 @@ class UrArm:
         """Leave the protective stop, which the controller refuses in its first 5 s, and make the arm ready again."""
         async with self._recovering("the protective stop"), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
-            while "PROTECTIVE_STOP" in await conversation.say("safetystatus"):
+            while "PROTECTIVE_STOP" in await conversation.request("safetystatus"):
                 await asyncio.sleep(max(RECOVERY_POLL_S, self._link.fault_since_s + UNLOCK_AFTER_S - time.monotonic()))
-                await conversation.say("close safety popup")
-                await conversation.say("unlock protective stop")
+                await conversation.request("close safety popup")
+                await conversation.request("unlock protective stop")
             await self._link.upload()
 
     async def power_on_and_release_brakes(self) -> None:
         """Power on, release the brakes and start the program; after a safety fault, restart the safety system first."""
         async with self._recovering("powering on"), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
-            status = await conversation.say("safetystatus")
+            status = await conversation.request("safetystatus")
             if "EMERGENCY_STOP" in status:
                 raise ArmFault(ArmCause.EMERGENCY_STOP, "an emergency stop button is still pressed")
             if "FAULT" in status or "VIOLATION" in status:
-                await conversation.say("restart safety")
-            while "RUNNING" not in (mode := await conversation.say("robotmode")):
-                await conversation.say("close safety popup")
+                await conversation.request("restart safety")
+            while "RUNNING" not in (mode := await conversation.request("robotmode")):
+                await conversation.request("close safety popup")
                 if "POWER_OFF" in mode:
-                    await conversation.say("power on")
+                    await conversation.request("power on")
                 elif "IDLE" in mode:
-                    await conversation.say("brake release")
+                    await conversation.request("brake release")
                 await asyncio.sleep(RECOVERY_POLL_S)
             await self._link.upload()
 

@@ -5,7 +5,7 @@ import time
 
 from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError
 from station.devices.camera.open import camera_from
-from station.devices.finding import Finding
+from station.devices.finding import CheckResult
 from station.settings.camera import CameraSettings
 
 _FRAMES = 15
@@ -25,14 +25,14 @@ REMEDIES = {
 }
 
 
-async def probe_camera(settings: CameraSettings) -> list[Finding]:
+async def probe_camera(settings: CameraSettings) -> list[CheckResult]:
     """Open the camera, check half a second of frames, and close it again. Never raises for a bad camera."""
     camera = camera_from(settings)
     try:
         await camera.open()
         return [_judged(camera, await _some_frames(camera, recorded=settings.driver == "replay"))]
     except CameraError as error:
-        return [Finding("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
+        return [CheckResult("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
     finally:
         await camera.close()
 
@@ -51,7 +51,7 @@ async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
     return frames
 
 
-def _judged(camera: Camera, frames: list[Frame]) -> Finding:
+def _judged(camera: Camera, frames: list[Frame]) -> CheckResult:
     description = camera.description
     rate = (len(frames) - 1) / max(_SHORTEST_S, frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
@@ -60,10 +60,10 @@ def _judged(camera: Camera, frames: list[Frame]) -> Finding:
     if faults:
         sick = sum(1 for frame in frames if frame.faults)
         remedy = "; ".join(REMEDIES[fault] for fault in faults)
-        return Finding("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
+        return CheckResult("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
     if description.notice:
-        return Finding("camera", found, "warning", description.notice)
+        return CheckResult("camera", found, "warning", description.notice)
     if description.frames_per_s and len(frames) > 1 and rate < _SLOW_SHARE * description.frames_per_s:
         remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
-        return Finding("camera", found, "warning", remedy)
-    return Finding("camera", found, "ok", "")
+        return CheckResult("camera", found, "warning", remedy)
+    return CheckResult("camera", found, "ok", "")

@@ -106,7 +106,9 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the light could not be set; {_words(error)}") from error
+            raise CameraError(
+                f"camera twin at {self._where}: the light could not be set; {_describe(error)}"
+            ) from error
         if answer.get("kind") != "leds":
             raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
 
@@ -136,7 +138,9 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the truth could not be read; {_words(error)}") from error
+            raise CameraError(
+                f"camera twin at {self._where}: the truth could not be read; {_describe(error)}"
+            ) from error
         return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
 
     async def close(self) -> None:
@@ -153,7 +157,7 @@ class TwinCamera:
             except CameraProtocolError as error:
                 self._feed.trouble = str(error)
             except (OSError, EOFError, TimeoutError) as error:
-                self._feed.trouble = _words(error)
+                self._feed.trouble = _describe(error)
             await asyncio.sleep(_RETRY_S)
 
     async def _listen(self) -> None:
@@ -180,7 +184,7 @@ class TwinCamera:
         return reader, writer
 
 
-def _words(error: OSError | EOFError) -> str:
+def _describe(error: OSError | EOFError) -> str:
     """Describe the connection's failure."""
     if isinstance(error, EOFError):
         return "the connection was closed"

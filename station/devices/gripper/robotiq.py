@@ -86,20 +86,20 @@ class Robotiq2F85:
             GripperError: the wire.
         """
         async with self._turn:
-            status, at_s = await self._look()
+            status, at_s = await self._poll()
             if self._is_active(status):
                 return self._reading(status, at_s)
             self._held_request = None
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
             await self.link.reset()
-            while (await self._look())[0].state != State.RESET:
+            while (await self._poll())[0].state != State.RESET:
                 await self._wait_until(deadline_s, "its reset", None)
                 await self.link.reset()
             await asyncio.sleep(_RESET_HOLD_S)
             await self.link.begin_activation()
             began_s = time.monotonic()
             while True:
-                status, at_s = await self._look()
+                status, at_s = await self._poll()
                 if self._is_active(status):
                     return self._reading(status, at_s)
                 if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
@@ -170,20 +170,20 @@ class Robotiq2F85:
         Raises:
             GripperError: the wire.
         """
-        return self._reading(*await self._look())
+        return self._reading(*await self._poll())
 
     async def close(self) -> None:
         """Close the wire, not the fingers. Idempotent; a later call opens the wire again."""
         await self.link.close()
 
-    async def _look(self) -> tuple[Status, float]:
+    async def _poll(self) -> tuple[Status, float]:
         at_s = time.monotonic()
         return await self.link.status(), at_s
 
     async def _ready(self) -> tuple[Status, float]:
         """Return the status of a gripper that may move."""
-        status, at_s = await self._look()
-        fault = self._standing_fault(status, at_s)
+        status, at_s = await self._poll()
+        fault = self._active_fault(status, at_s)
         if fault:
             raise GripperFaultError(fault)
         if status.state != State.ACTIVE:
@@ -228,14 +228,14 @@ class Robotiq2F85:
     @staticmethod
     async def _wait_until(deadline_s: float, what: str, status: Status | None) -> None:
         if time.monotonic() > deadline_s:
-            seen = f": {_in_words(status)}" if status else ""
+            seen = f": {_describe(status)}" if status else ""
             raise GripperTimeoutError(
                 f"{what} did not end in time{seen}",
                 "look for what holds the fingers, and for a second master that commands the gripper",
             )
         await asyncio.sleep(_POLL_S)
 
-    def _standing_fault(self, status: Status, now_s: float) -> int:
+    def _active_fault(self, status: Status, now_s: float) -> int:
         if status.fault != _NO_COMMUNICATION:
             self._mute_since_s = None
             return status.fault
@@ -259,7 +259,7 @@ class Robotiq2F85:
         )
 
 
-def _in_words(status: Status) -> str:
+def _describe(status: Status) -> str:
     state = _OBJECT_STATES[status.object_] if status.go_to else ObjectState.IDLE
     return f"it stands at count {status.position}, {_STATE_WORDS[state]}"
 

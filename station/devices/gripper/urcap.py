@@ -135,13 +135,13 @@ class UrcapLink:
                     self._streams = await asyncio.open_connection(self._settings.host, self._settings.port)
             except OSError as error:
                 raise GripperUnreachableError(
-                    f"no connection to the {self.place} ({_words(error)})",
+                    f"no connection to the {self.place} ({_describe(error)})",
                     "check the robot's address and network, and that the Robotiq URCap is installed and running",
                 ) from error
         return self._streams
 
 
-def _words(error: OSError) -> str:
+def _describe(error: OSError) -> str:
     """Describe the failure of the connection, without asyncio's own text around it."""
     number = error.errno or 0
     return os.strerror(number) if number > 0 else error.strerror or "no answer"
