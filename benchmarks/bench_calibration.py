@@ -16,14 +16,14 @@ import cv2
 import numpy as np
 
 from station.calibration import figures
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import CalibrationProcedure, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
 from station.calibration.errors import RefusedError
-from station.calibration.verifying import VerificationProcedure
+from station.calibration.rig import Place, Unit
+from station.calibration.verification_procedure import VerificationProcedure
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.segmentation import Segmentation
-from station.studies.drawn_ball import SimulatedRig
+from station.studies.simulated_rig import SimulatedRig
 from station.twin.digit.sensor import Image
 from station.vision.methods import make_method, median_image
 from station.vision.scale import TYPICAL_MM_PER_PX

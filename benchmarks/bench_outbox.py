@@ -22,7 +22,7 @@ from archive.postgres import PORT, Server, programs, throwaway
 
 from station.outbox.feed import json_text, read_batch
 from station.outbox.postgresql import Postgresql
-from station.outbox.telling import Publisher
+from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxPostgresqlSettings
 
 STATIONS = 3

@@ -17,9 +17,9 @@ import numpy as np
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.records.database import reading
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
-from station.records.writing import conclude, insert_trigger
+from station.records.write_requests import conclude, insert_trigger
 from station.settings.recipe import find_recipe
 from station.settings.recipe_model import Recipe
 from station.whatif.runner import batches, run

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from station.calibration.bench import Pressed, Rig
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
+from station.calibration.rig import Pressed, Rig
 from station.settings.recipe import Recipe
 from station.vision.contact import Contact, Flag, Image, Method
 from station.vision.methods import make_method, median_image

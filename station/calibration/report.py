@@ -5,11 +5,11 @@ import base64
 import cv2
 import jinja2
 
-from station.calibration.calibrating import Draft, Evidence
+from station.calibration.calibration_procedure import Draft, Evidence
 from station.calibration.model import Calibration, Refusal
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE, press_name
-from station.calibration.verifying import VerificationResult, outlined
+from station.calibration.verification_procedure import VerificationResult, outlined
 from station.vision.contact import Image
 
 _TILE_PX = 220

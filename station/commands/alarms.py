@@ -21,7 +21,7 @@ from station.channel.panel import (
 from station.commands.records_options import by_option, config_option
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
-from station.records.wording import printable
+from station.records.texts import printable
 from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
 

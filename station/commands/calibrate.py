@@ -9,14 +9,14 @@ from pathlib import Path
 
 import click
 
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import CalibrationProcedure, Draft, Evidence
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft, Evidence
 from station.calibration.errors import CalibrationError, RefusedError
 from station.calibration.model import Check, Refusal, stamp
 from station.calibration.report import refusal_files
+from station.calibration.rig import Place, Unit
 from station.calibration.store import PAGE, CalibrationStore
-from station.commands.ball import cancelled_by_signals, open_rig, show
-from station.commands.calibration_storing import store_calibration
+from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
+from station.commands.calibration_storage import store_calibration
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError
 from station.settings.configuration import Configuration, load_configuration

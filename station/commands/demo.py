@@ -19,8 +19,8 @@ from station.commands.run import addresses
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
-from station.records.reading import read_inspection
-from station.records.wording import sparkline
+from station.records.queries import read_inspection
+from station.records.texts import sparkline
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program

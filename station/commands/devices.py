@@ -15,7 +15,7 @@ from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
 from station.devices.camera.probe import probe_camera
-from station.devices.finding import CheckResult
+from station.devices.check_result import CheckResult
 from station.devices.gripper.probe import probe_gripper
 from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration

@@ -12,8 +12,8 @@ from station.commands.records_options import config_option
 from station.errors import StationError
 from station.logs import configure_logging
 from station.outbox.lag import LOST_S
+from station.outbox.publisher import destinations, run_outbox
 from station.outbox.status import outbox_folder, read_status
-from station.outbox.telling import destinations, run_outbox
 from station.settings.configuration import Configuration, load_configuration
 from station.supervision.notify import feed_watchdog, notify
 

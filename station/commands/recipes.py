@@ -12,8 +12,8 @@ from station.errors import BadInputError
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import FileState, RecipeState
 from station.recipe_store.revision import Revision, Status
-from station.recipe_store.standing import FileState, RecipeState
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened

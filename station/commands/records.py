@@ -4,13 +4,13 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_keeping import backup, check, hold, holds, lot, release, restore
+from station.commands.records_maintenance import backup, check, hold, holds, lot, release, restore
 from station.commands.records_marks import mark, marks
 from station.commands.records_options import config_option, folder_of, query_options
 from station.commands.records_output import export, report
 from station.records.database import reading
-from station.records.opening import set_mark
-from station.records.reading import Summary, read_inspection
+from station.records.open import set_mark
+from station.records.queries import Summary, read_inspection
 from station.records.report import format_inspection, format_list
 from station.records.search import LARGEST_PAGE, Query, find_page
 

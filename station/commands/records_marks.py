@@ -7,10 +7,10 @@ import click
 
 from station.commands.records_options import by_option, config_option, folder_of
 from station.records.audit import AuditEntry, append_audit
-from station.records.changing import short_transaction
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked
-from station.records.wording import printable
+from station.records.short_transaction import short_transaction
+from station.records.texts import printable
 
 _MARKS: dict[str, Mark | None] = {"good": "good", "bad": "bad", "none": None}
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 
 from station.commands.records_options import config_option, folder_of, query_options
+from station.records.error_mapping import map_error
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
-from station.records.failures import map_error
 from station.records.lot_report import WAYS, write_report
 from station.records.lot_summary import summarise
 from station.records.search import Query

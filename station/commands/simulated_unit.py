@@ -3,15 +3,15 @@
 import asyncio
 from importlib.metadata import version
 
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import CalibrationProcedure
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.model import Calibration
+from station.calibration.rig import Place, Unit
 from station.calibration.store import CalibrationStore
-from station.commands.calibration_storing import store_calibration
+from station.commands.calibration_storage import store_calibration
 from station.devices.camera.twin import TwinCamera
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
-from station.studies.drawn_ball import SimulatedRig
+from station.studies.simulated_rig import SimulatedRig
 
 PLACES = (Place(-2.5, 0.0), Place(0.0, 3.0))
 """Further places, as docs/calibration.md requires of a person: so the scale is measured."""

@@ -11,12 +11,12 @@ from station.calibration.errors import CalibrationError
 from station.calibration.model import Calibration
 from station.calibration.report import verification_files
 from station.calibration.store import PAGE, CalibrationStore
-from station.calibration.verifying import VerificationProcedure, VerificationResult
-from station.commands.ball import cancelled_by_signals, open_rig, show
+from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
+from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
 from station.errors import StationError
 from station.records.audit import append_audit
 from station.records.database import records_folder
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.service.audit_logger import verification_entry
 from station.settings.configuration import Configuration, load_configuration
 

@@ -20,7 +20,7 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
-from station.records.writing import OutboxKind
+from station.records.write_requests import OutboxKind
 
 LARGEST_BATCH = 500
 _LAST_UTC_MS = 253_402_300_799_000

@@ -12,7 +12,7 @@ from psycopg import AsyncConnection, sql
 from station.outbox.errors import OutboxError
 from station.outbox.feed import Batch, Event, json_text
 from station.outbox.secrets import password
-from station.records.writing import OutboxKind
+from station.records.write_requests import OutboxKind
 from station.settings.outbox import OutboxPostgresqlSettings
 
 log = logging.getLogger(__name__)

@@ -13,12 +13,12 @@ from station.errors import BadInputError
 from station.recipe_store.difference import format_differences
 from station.recipe_store.files import locked, read_folder, write_back
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import RecipeState, ValidFile
 from station.recipe_store.revision import ConflictError, RecipeStoreError, Status
-from station.recipe_store.standing import RecipeState, ValidFile
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.settings.recipe import shipped_folder
 from station.settings.recipe_form import content_sha256, parse_recipe
 from station.settings.recipe_model import Recipe

@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
-from station.recipe_store.standing import ValidFile
-from station.records.sequence_mark import sync_folder
+from station.records.high_water_mark import sync_folder
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import check_recipes, recipe_files
 from station.settings.recipe_form import parse_recipe

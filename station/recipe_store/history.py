@@ -9,7 +9,7 @@ from station.recipe_store.difference import format_differences
 from station.recipe_store.revision import ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
 from station.records.schema import recipe_revisions
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
 

@@ -10,11 +10,11 @@ from sqlalchemy import Connection
 from station.errors import BadInputError
 from station.recipe_store.files import Folder, locked, read_folder
 from station.recipe_store.history import Person, approve, read_revisions, retire, store_approved, submit
+from station.recipe_store.recipe_state import RecipeState, ValidFile, recipe_states
 from station.recipe_store.revision import Origin, RecipeStoreError, Revision, Status
-from station.recipe_store.standing import RecipeState, ValidFile, recipe_states
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import FILE_NAME, reading, records_folder
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.records.errors import RecordsError
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import approved_by_distribution, shipped_folder

@@ -11,7 +11,7 @@ from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
 from station.records.errors import BadRecordError
 from station.records.schema import audit
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 GENESIS = "0" * 64
 """The very first row's value for the hash of the row before."""

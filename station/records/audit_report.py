@@ -9,7 +9,7 @@ from sqlalchemy import Connection, select
 
 from station.records.audit import AuditRow, row_of
 from station.records.schema import audit
-from station.records.wording import printable
+from station.records.texts import printable
 
 _LONGEST_VALUE = 300
 

@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from station.records.database import plain, reading
-from station.records.failures import map_error
+from station.records.error_mapping import map_error
+from station.records.high_water_mark import LARGEST
 from station.records.search import Query
-from station.records.sequence_mark import LARGEST
 
 WINDOW = 10_000
 """Sequence numbers read in one transaction, and rows of one Parquet row group at most."""

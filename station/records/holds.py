@@ -6,7 +6,7 @@ from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, u
 
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 
 class Hold(NamedTuple):

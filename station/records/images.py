@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 
 import cv2
 
+from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
-from station.records.failures import map_error
+from station.records.high_water_mark import sync_folder
 from station.records.model import Image
 from station.records.retention import forget_missing, referred, remove_oldest_images
-from station.records.sequence_mark import sync_folder
+from station.records.write_requests import add_images
 from station.records.writer import Work
-from station.records.writing import add_images
 from station.settings.records import RecordsSettings
 
 log = logging.getLogger(__name__)

@@ -12,7 +12,7 @@ from fpdf import FPDF
 from fpdf.enums import XPos, YPos
 
 from station.records.lot_summary import Example, LotSummary
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 _PICTURE_PX = 320
 _JPEG_QUALITY = 82

@@ -10,7 +10,7 @@ from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
 from station.records.search import Query, find_page
-from station.records.wording import sentence
+from station.records.texts import sentence
 
 BINS = 24
 EXAMPLES = 12

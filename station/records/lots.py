@@ -6,7 +6,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from station.records.errors import RecordsError
 from station.records.schema import lots
-from station.records.writing import queue_event, utc_ms
+from station.records.write_requests import queue_event, utc_ms
 
 LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""

@@ -7,7 +7,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.records.errors import UnknownInspectionError
 from station.records.schema import inspections, marks
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 Mark = Literal["good", "bad"]
 

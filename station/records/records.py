@@ -19,10 +19,9 @@ from station.records.database import FILE_NAME, reading
 from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
-from station.records.opening import Notice, Opened, lock_folder, open_records
-from station.records.reading import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
-from station.records.writer import Work
-from station.records.writing import (
+from station.records.open import Notice, Opened, lock_folder, open_records
+from station.records.queries import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
+from station.records.write_requests import (
     PENDING,
     acknowledge,
     add_counts,
@@ -33,6 +32,7 @@ from station.records.writing import (
     replace_alarms,
     withdraw,
 )
+from station.records.writer import Work
 from station.settings.records import RecordsSettings
 
 T = TypeVar("T")

@@ -9,8 +9,8 @@ from station.channel.line import Outcome
 from station.records.first_press import first_press_findings, is_first_press
 from station.records.judgement import budget_rows, is_judgement, judgement_sentence
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
-from station.records.reading import Summary
-from station.records.wording import printable, sentence, size_sentence, sparkline
+from station.records.queries import Summary
+from station.records.texts import printable, sentence, size_sentence, sparkline
 
 
 def format_inspection(record: FullRecord) -> str:

@@ -4,7 +4,7 @@ from sqlalchemy import Connection, delete, func, select
 
 from station.records.holds import is_held
 from station.records.schema import images, inspections
-from station.records.writing import add_event, add_images
+from station.records.write_requests import add_event, add_images
 
 
 def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:

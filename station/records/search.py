@@ -19,9 +19,9 @@ from sqlalchemy import Connection
 from station.channel.line import OutcomeName, Reason
 from station.records.database import plain
 from station.records.errors import RecordsError
-from station.records.finding import HOUR_MS
-from station.records.reading import Summary, read_summaries
-from station.records.sequence_mark import LARGEST
+from station.records.high_water_mark import LARGEST
+from station.records.queries import Summary, read_summaries
+from station.records.search_index import HOUR_MS
 
 LARGEST_PAGE = 1000
 

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 
+from station.records.error_mapping import map_error
 from station.records.errors import (
     DamagedError,
     DiskError,
@@ -20,7 +21,6 @@ from station.records.errors import (
     RecordsClosedError,
     RecordsError,
 )
-from station.records.failures import map_error
 
 T = TypeVar("T")
 Work = Callable[[Connection], T]

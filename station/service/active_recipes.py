@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from station.errors import StationError
 from station.recipe_store.difference import format_differences
+from station.recipe_store.recipe_state import Control, FileState, RecipeState
 from station.recipe_store.revision import RecipeStoreError
-from station.recipe_store.standing import Control, FileState, RecipeState
 from station.recipe_store.store import RecipeStore
 from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError

@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Sequence
 
-from station.calibration.bench import Place, Pressed
+from station.calibration.rig import Place, Pressed
 from station.devices.camera.interface import Image
 from station.devices.gripper.interface import ObjectState
 from station.service.grip import FRAME_DEADLINE_S, Cell, Grip, GripError

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from station.channel.line import Outcome
-from station.records.wording import sparkline
+from station.records.texts import sparkline
 
 
 def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_mm2: Sequence[float | None]) -> str:

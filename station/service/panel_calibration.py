@@ -8,11 +8,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
-from station.calibration.bench import Place, Progress, Unit
-from station.calibration.calibrating import CalibrationProcedure, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
 from station.calibration.model import Calibration, Verification
+from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
-from station.calibration.verifying import VerificationProcedure, VerificationResult
+from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
 from station.channel.messages import Message
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (

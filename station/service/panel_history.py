@@ -38,10 +38,10 @@ from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.records.lots import Lot, end_lot, read_lots, start_lot
 from station.records.model import FullRecord
-from station.records.reading import Summary, read_inspection
+from station.records.queries import Summary, read_inspection
 from station.records.records import Records
 from station.records.search import Query, find_page
-from station.records.wording import sentence
+from station.records.texts import sentence
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_worker import PanelWorker
 

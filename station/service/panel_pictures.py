@@ -13,7 +13,7 @@ from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
 from station.records.model import FullRecord, StoredImage
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 from station.service.panel_worker import PanelWorker
 from station.settings.problems import SettingsError
 from station.settings.recipe_form import parse_recipe

@@ -41,8 +41,8 @@ from station.inspection.sized_limits import SizedLimits
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import RecipeState
 from station.recipe_store.revision import ConflictError, Revision
-from station.recipe_store.standing import RecipeState
 from station.recipe_store.store import RecipeStore
 from station.records.database import plain, reading, records_folder
 from station.service.panel_jobs import PanelJobs

@@ -16,7 +16,7 @@ from station.errors import StationError
 from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.model import FullRecord, StoredImage
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 from station.service.recent_inspections import (
     MOST_IN_FULL,
     MOST_IN_SHORT,

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from station.cli import cli
 from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 
 
 @pytest.fixture

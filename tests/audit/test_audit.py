@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.audit_head import Head, read_head, save_head
 from station.records.database import reading
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.records.errors import BadRecordError
 from station.records.records import Records
 from station.settings.records import RecordsSettings

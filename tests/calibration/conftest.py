@@ -15,13 +15,13 @@ from typing import Any
 import cv2
 import pytest
 
-from station.calibration.bench import Place, Progress, Unit
-from station.calibration.calibrating import CalibrationProcedure, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
 from station.calibration.report import calibration_files
+from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
-from station.studies.drawn_ball import SimulatedRig
+from station.studies.simulated_rig import SimulatedRig
 from station.twin.console import ask
 
 UNIT = Unit("T0001", "drawn DIGIT", simulated=True)
@@ -35,7 +35,7 @@ def one_thread() -> None:
 
 @pytest.fixture(scope="session")
 def drawn_ball() -> Callable[..., Any]:
-    """Makes a drawn ball; see `station/studies/drawn_ball.py`."""
+    """Makes a drawn ball; see `station/studies/simulated_rig.py`."""
     return SimulatedRig
 
 

@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from station.calibration.bench import Unit
-from station.calibration.calibrating import CalibrationProcedure
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.errors import RefusedError
 from station.calibration.figures import noise, scale_of
 from station.calibration.gate import gated
 from station.calibration.model import PlacePoint, Refusal
 from station.calibration.report import refusal_files
+from station.calibration.rig import Unit
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation

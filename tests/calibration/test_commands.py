@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from station.calibration.store import CalibrationStore
-from station.records.opening import lock_folder
+from station.records.open import lock_folder
 
 pytestmark = pytest.mark.timeout(600)
 

@@ -27,7 +27,7 @@ from station.channel.line import (
 )
 from station.channel.panel_live import AskPanel, PanelState
 from station.records.database import reading, records_folder
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 from station.service.active_calibration import ActiveCalibration
 from station.service.reference import GoldenReference
 from station.service.state_files import StateFiles

@@ -9,7 +9,7 @@ import pytest
 
 from station.calibration.gel import GelFault, examine
 from station.calibration.report import verification_files
-from station.calibration.verifying import VerificationProcedure
+from station.calibration.verification_procedure import VerificationProcedure
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.twin.digit.sensor import Condition

@@ -36,7 +36,7 @@ NOT_FOR_OPERATORS = {
 FAULTS_FROM = (
     *(
         f"devices/arm/{name}"
-        for name in ("child", "dashboard", "diagnosis", "faults", "link", "messages", "process", "ur")
+        for name in ("process_handle", "dashboard", "diagnosis", "faults", "link", "messages", "process", "ur")
     ),
     *(f"devices/gripper/{name}" for name in ("calibration", "errors", "modbus_rtu", "robotiq", "urcap")),
     *(f"devices/camera/{name}" for name in ("digit", "feed")),

@@ -10,8 +10,8 @@ import pytest
 from station.inspection.alarm_table import AlarmId
 from station.outbox import lag
 from station.outbox.lag import OutboxMonitor
+from station.outbox.publisher import run_outbox
 from station.outbox.status import DestinationStatus, outbox_folder, write_status
-from station.outbox.telling import run_outbox
 from station.records.audit import AuditEntry
 from station.service.station import Station
 from station.settings.configuration import load_configuration

@@ -10,7 +10,7 @@ import pytest
 
 from station.outbox.errors import OutboxError
 from station.outbox.mqtt import Mqtt
-from station.outbox.telling import Publisher
+from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxMqttSettings
 
 LIMIT_S = 90.0

@@ -18,11 +18,11 @@ from station.outbox.feed import read_batch
 from station.outbox.postgresql import Postgresql
 from station.records.audit import AuditEntry, append_audit
 from station.records.backup import make_backup
-from station.records.changing import short_transaction
 from station.records.database import FILE_NAME
 from station.records.lots import end_lot, start_lot
-from station.records.restoring import restore_backup
-from station.records.writing import queue_event
+from station.records.restore import restore_backup
+from station.records.short_transaction import short_transaction
+from station.records.write_requests import queue_event
 from station.settings.outbox import OutboxPostgresqlSettings
 
 LIMIT_S = 90.0

@@ -27,10 +27,10 @@ from station.records.errors import (
     RecordsError,
     SequenceError,
 )
+from station.records.high_water_mark import HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
-from station.records.opening import MARK_NAME
+from station.records.open import MARK_NAME
 from station.records.records import Records
-from station.records.sequence_mark import HighWaterMark
 
 
 def bulky(trigger: Trigger, size_bytes: int) -> Trigger:
@@ -74,7 +74,7 @@ def test_a_full_disk_refuses_and_takes_again_when_there_is_space(opened, scenari
 
 def test_a_full_database_is_a_full_disk(opened, scenario, trigger, monkeypatch):
     """SQLite's own SQLITE_FULL, without a disk of the test's."""
-    monkeypatch.setattr("station.records.opening.open_engine", _limited)
+    monkeypatch.setattr("station.records.open.open_engine", _limited)
 
     async def steps():
         async with opened() as records:

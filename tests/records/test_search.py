@@ -9,14 +9,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.channel.line import Reason
-from station.records.changing import short_transaction
 from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
-from station.records.finding import HOUR_MS
 from station.records.lots import end_lot, read_lots, start_lot
 from station.records.model import RecipeSnapshot
 from station.records.search import Query, find, find_page
-from station.records.writing import conclude, insert_trigger, publish
+from station.records.search_index import HOUR_MS
+from station.records.short_transaction import short_transaction
+from station.records.write_requests import conclude, insert_trigger, publish
 
 FRUIT = st.sampled_from(["strawberry", "strawberry, revised", "raspberry", None])
 GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}

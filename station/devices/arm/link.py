@@ -11,11 +11,11 @@ import time
 from collections import deque
 from typing import NoReturn
 
-from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
 from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_output, from_state
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.process_handle import ArmProcess
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1

@@ -5,7 +5,7 @@ import struct
 
 from station.devices.arm.dashboard import DashboardFacts, dashboard
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
-from station.devices.finding import CheckResult
+from station.devices.check_result import CheckResult
 from station.settings.arm import ArmSettings
 
 RTDE_PORT = 30004

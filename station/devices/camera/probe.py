@@ -5,7 +5,7 @@ import time
 
 from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError
 from station.devices.camera.open import camera_from
-from station.devices.finding import CheckResult
+from station.devices.check_result import CheckResult
 from station.settings.camera import CameraSettings
 
 _FRAMES = 15

@@ -1,6 +1,6 @@
 """Gripper check of `station devices check`: nothing is moved."""
 
-from station.devices.finding import CheckResult
+from station.devices.check_result import CheckResult
 from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.devices.gripper.interface import GripperReading
 from station.devices.gripper.robotiq import make_gripper

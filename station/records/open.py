@@ -12,13 +12,13 @@ from sqlalchemy import Connection, func, select
 from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
+from station.records.error_mapping import DAMAGED_REMEDY, map_error
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
-from station.records.failures import DAMAGED_REMEDY, map_error
+from station.records.high_water_mark import HighWaterMark, sync_folder
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
-from station.records.sequence_mark import HighWaterMark, sync_folder
+from station.records.write_requests import add_event, end_open_inspections
 from station.records.writer import Writer
-from station.records.writing import add_event, end_open_inspections
 from station.settings.records import RecordsSettings
 
 MARK_NAME = "sequence"

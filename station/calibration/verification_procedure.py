@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from station.calibration import figures, gel
-from station.calibration.bench import Progress, Rig, Tell
 from station.calibration.checks import verification_checks
 from station.calibration.gel import REMEDIES, Finding, GelFault
 from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
+from station.calibration.rig import Progress, Rig, Tell
 from station.calibration.store import press_name
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings

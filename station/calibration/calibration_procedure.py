@@ -14,12 +14,12 @@ from math import hypot
 from typing import NamedTuple
 
 from station.calibration import figures, gel
-from station.calibration.bench import Place, Progress, Rig, Tell, Unit
 from station.calibration.checks import ROUNDEST, calibration_checks
 from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
 from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
+from station.calibration.rig import Place, Progress, Rig, Tell, Unit
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from station.calibration.calibrating import Draft
+from station.calibration.calibration_procedure import Draft
 from station.calibration.report import calibration_files
 from station.calibration.store import CalibrationStore
 from station.records.audit import append_audit
 from station.records.database import records_folder
-from station.records.direct import direct_transaction
+from station.records.direct_transaction import direct_transaction
 from station.service.audit_logger import calibration_entry
 from station.settings.configuration import Configuration
 

@@ -15,9 +15,9 @@ from sqlalchemy.exc import DBAPIError
 from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, open_engine
+from station.records.error_mapping import map_error
 from station.records.errors import LockedError
-from station.records.failures import map_error
-from station.records.opening import lock_folder
+from station.records.open import lock_folder
 
 
 @contextmanager

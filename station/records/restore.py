@@ -14,13 +14,13 @@ from station.records.audit import append_restored
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
+from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, RecordsError
-from station.records.failures import map_error
+from station.records.high_water_mark import HighWaterMark, sync_folder
 from station.records.images import FOLDER_NAME, image_path
-from station.records.opening import BELONGING, lock_folder
+from station.records.open import BELONGING, lock_folder
 from station.records.retention import referred
 from station.records.schema import origins, outbox
-from station.records.sequence_mark import HighWaterMark, sync_folder
 
 _NEW = "restoring"
 _OTHER = "take another backup: this one is not whole"

@@ -9,8 +9,8 @@ from sqlalchemy import Connection
 from station.records.audit import newer_head
 from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, open_engine
+from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
-from station.records.failures import map_error
 
 
 @contextmanager

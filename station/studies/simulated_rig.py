@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from station.calibration.bench import Place, Pressed
+from station.calibration.rig import Place, Pressed
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import Condition, DigitSensor, Image
 from station.twin.fruit import Kind, draw_fruit

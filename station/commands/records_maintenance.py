@@ -9,15 +9,15 @@ from station.commands.records_options import by_option, config_option, folder_of
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.backup import make_backup
-from station.records.changing import short_transaction
-from station.records.checking import check_records
 from station.records.database import reading
 from station.records.holds import hold as place_hold
 from station.records.holds import read_holds
 from station.records.holds import release as release_hold
+from station.records.integrity_check import check_records
 from station.records.lots import Lot, end_lot, read_lots, start_lot
-from station.records.restoring import restore_backup
-from station.records.wording import printable
+from station.records.restore import restore_backup
+from station.records.short_transaction import short_transaction
+from station.records.texts import printable
 
 _ROLE = "command line"
 _thing = click.argument("thing", metavar="SEQUENCE|LOT")

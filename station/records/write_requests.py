@@ -11,7 +11,6 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.records.errors import BadRecordError, UnknownInspectionError
-from station.records.finding import index_hour, index_reasons
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
     alarms,
@@ -24,6 +23,7 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
+from station.records.search_index import index_hour, index_reasons
 
 OutboxKind = Literal["inspection", "lot", "audit"]
 PENDING = "pending"

@@ -10,15 +10,15 @@ from collections.abc import AsyncIterator
 import click
 import cv2
 
-from station.calibration.bench import Place, Progress, Unit
 from station.calibration.errors import CalibrationError
+from station.calibration.rig import Place, Progress, Unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
 from station.records.database import records_folder
 from station.records.errors import LockedError
-from station.records.opening import lock_folder
+from station.records.open import lock_folder
 from station.service.bare_grip import renewed_lease
 from station.service.calibration_rig import StationRig
 from station.service.grip import Cell
