@@ -81,7 +81,7 @@ class CalibrationProcedure:
         settings: ball and limits.
         places: further places of the ball.
         program: this program's version.
-        tell: called with the progress.
+        on_progress: called with the progress.
     """
 
     def __init__(
@@ -95,9 +95,9 @@ class CalibrationProcedure:
         program: str,
         on_progress: Tell,
     ) -> None:
-        self._bench, self._unit, self._recipe, self._settings = rig, unit, recipe, settings
+        self._rig, self._unit, self._recipe, self._settings = rig, unit, recipe, settings
         self._places = [Place(0.0, 0.0), *places]
-        self._operator, self._program, self._tell = operator, program, on_progress
+        self._operator, self._program, self._on_progress = operator, program, on_progress
         self._press = BallPress(rig, recipe)
         self._pressed: list[Step] = []
         self._checks: tuple[Check, ...] = ()
@@ -121,13 +121,13 @@ class CalibrationProcedure:
         except BaseException:
             await self._let_go()
             raise
-        await self._bench.release()
+        await self._rig.release()
         self._say("judge", 1, 1, "")
         return await asyncio.to_thread(self._judge, measured)
 
     async def _let_go(self) -> None:
         try:
-            await self._bench.release()
+            await self._rig.release()
         except StationError as error:
             log.warning("the jaws could not be opened: %s", error)
 
@@ -180,8 +180,8 @@ class CalibrationProcedure:
         found: list[PlacePoint] = []
         for number, place in enumerate(self._places):
             if number:
-                await self._bench.release()
-                await self._bench.lay(place)
+                await self._rig.release()
+                await self._rig.lay(place)
                 await self._press.take_reference(self._recipe.imaging.reference_frames)
             step = await self._press.step(onset_mm - _PLACES_CLOSING_MM)
             self._pressed.append(step)
@@ -244,4 +244,4 @@ class CalibrationProcedure:
         return Draft(calibration, reference, tuple(steps))
 
     def _say(self, what: str, number: int, of: int, detail: str) -> None:
-        self._tell(Progress(number, of, TEXTS[what], detail))
+        self._on_progress(Progress(number, of, TEXTS[what], detail))

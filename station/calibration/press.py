@@ -49,14 +49,14 @@ class BallPress:
     """Presses and measures by a recipe."""
 
     def __init__(self, rig: Rig, recipe: Recipe, gate_factor: float = 1.0) -> None:
-        self._bench, self._recipe = rig, recipe
+        self._rig, self._recipe = rig, recipe
         self._segmentation = gated(recipe.segmentation, gate_factor)
         self._method: Method | None = None
         self.reference: Image | None = None
 
     async def take_reference(self, number: int) -> Sequence[Image]:
         """Take frames of the untouched gel, and measure against their median from now on."""
-        frames = await self._bench.untouched(number)
+        frames = await self._rig.untouched(number)
         self.reference = await asyncio.to_thread(median_image, frames)
         self._method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
         return frames
@@ -74,7 +74,7 @@ class BallPress:
 
     async def step(self, width_mm: float) -> Step:
         """Move to a width and measure there."""
-        pressed: Pressed = await self._bench.press_to(width_mm)
+        pressed: Pressed = await self._rig.press_to(width_mm)
         contact = await self.measure(pressed.frames)
         image = mean_image(pressed.frames)
         assert self.reference is not None  # noqa: S101 (measured against it just now)

@@ -48,7 +48,7 @@ class VerificationProcedure:
     Args:
         golden: the calibration's picture of the untouched gel.
         presses: the calibration's pictures of the ball, in the order of its curve.
-        tell: called with the progress.
+        on_progress: called with the progress.
     """
 
     def __init__(
@@ -62,9 +62,9 @@ class VerificationProcedure:
         operator: str,
         on_progress: Tell,
     ) -> None:
-        self._bench, self._recipe, self._settings = rig, recipe, settings
+        self._rig, self._recipe, self._settings = rig, recipe, settings
         self._calibration, self._golden, self._presses = calibration, golden, presses
-        self._operator, self._tell = operator, on_progress
+        self._operator, self._on_progress = operator, on_progress
         self._press = BallPress(rig, recipe, calibration.noise.gate_factor)
 
     async def run(self) -> VerificationResult:
@@ -77,15 +77,15 @@ class VerificationProcedure:
             verified = await self._run()
         except BaseException:
             try:
-                await self._bench.release()
+                await self._rig.release()
             except StationError as error:
                 log.warning("the jaws could not be opened: %s", error)
             raise
-        await self._bench.release()
+        await self._rig.release()
         return verified
 
     async def _run(self) -> VerificationResult:
-        self._tell(Progress(1, 1, "the untouched gel", f"{_NOISE_FRAMES} frames, nothing may touch the gel"))
+        self._on_progress(Progress(1, 1, "the untouched gel", f"{_NOISE_FRAMES} frames, nothing may touch the gel"))
         frames = await self._press.take_reference(_NOISE_FRAMES)
         reference = self._press.reference
         assert reference is not None  # noqa: S101 (taken just now)
@@ -123,13 +123,13 @@ class VerificationProcedure:
             steps.append(await self._press.step(width_mm))
             area = f"{steps[-1].contact.area_px} px" if steps[-1].contact.found else "no contact"
             detail = f"{steps[-1].width_mm:.2f} mm: {area}"
-            self._tell(Progress(number, len(widths), "the ball, step by step", detail))
+            self._on_progress(Progress(number, len(widths), "the ball, step by step", detail))
         touched = next((step for step in steps if step.contact.is_firm), None)
         if touched is None or touched is steps[0]:
             return steps, None if touched is None else touched.width_mm
         before = max(step.width_mm for step in steps if step.width_mm > touched.width_mm)
         from_mm = min(before, self._calibration.onset_mm + 2 * self._settings.onset_tolerance_mm)
-        self._tell(Progress(1, 1, "where the contact begins", f"from {from_mm:.1f} mm"))
+        self._on_progress(Progress(1, 1, "where the contact begins", f"from {from_mm:.1f} mm"))
         return steps, await self._press.fine_onset(max(from_mm, touched.width_mm), touched.width_mm)
 
     def _worn(self, steps: list[Step]) -> list[Finding]:

@@ -29,7 +29,7 @@ from station.supervision.supervisor import Supervisor
 FRUITS = ("strawberry", "raspberry", "blueberry")
 _LOT = "DEMO"
 _FAULT_EVERY = 4
-# A desk's machine is no real-time controller, and no arm can come to harm here by a state that is a little old.
+# A desktop computer is no real-time controller, and a slightly old state can harm no arm here.
 _PATIENCE = {"stale_after_s": 0.5, "link_lost_after_s": 2.0}
 
 

@@ -24,7 +24,7 @@ class OutboxMonitor:
             return ""
         status, now_s = read_status(self._folder), time.time()
         silent_s = time.monotonic() - self._began_s
-        if status is not None:  # what an earlier start said is not held against this one
+        if status is not None:  # the status of an earlier start does not count
             silent_s = min(silent_s, now_s - status.utc_ms / 1000)
         if silent_s > LOST_S:
             return f"the outbox's process has not been heard for {silent_s:.0f} s"

@@ -157,7 +157,7 @@ class Session:
     async def idle(self, pause_s: float) -> None:
         """Wait; raises if the connection ends meanwhile. TCP keepalives find a silent one (25 s)."""
         loop, heard, socket = asyncio.get_running_loop(), asyncio.Event(), self._connection.fileno()
-        loop.add_reader(socket, heard.set)  # nothing is asked for: the server only tells of its end
+        loop.add_reader(socket, heard.set)  # no request: the server only reports its end
         try:
             async with asyncio.timeout(pause_s):
                 await heard.wait()

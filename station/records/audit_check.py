@@ -25,18 +25,18 @@ class AuditCheck:
     """Rows that are missing because a person restored a backup, as the trail records; no fault by itself."""
 
 
-def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
+def check_audit(connection: Connection, saved: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
     """Check the trail from its first row to its last.
 
     Args:
-        kept: the head stored outside the database; None if it is missing.
+        saved: the head stored outside the database; None if it is missing.
         anchors: rows known from other sources, as a backup or a printed report.
         since: skip rows before this one, as after a known and explained break.
     """
     broken: list[str] = []
     restored: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
-    wanted = {anchor.seq for anchor in anchors} | ({kept.seq} if kept else set())
+    wanted = {anchor.seq for anchor in anchors} | ({saved.seq} if saved else set())
     for row in _rows(connection, since):
         number += 1
         if before is not None and (gap := _restored(row, before)):
@@ -48,9 +48,13 @@ def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Hea
         before = row
     head = None if before is None else Head(before.seq, before.hash)
     broken += [text for anchor in anchors if (text := _missing(anchor, hashes, "the anchor"))]
-    if kept is not None and kept.seq >= since and (text := _missing(kept, hashes, "the head kept beside the database")):
+    if (
+        saved is not None
+        and saved.seq >= since
+        and (text := _missing(saved, hashes, "the head kept beside the database"))
+    ):
         broken.append(text)
-    if kept is None and last_row(connection) is not None:
+    if saved is None and last_row(connection) is not None:
         broken.append("the head kept beside the database is missing: rows may have been cut off at the end")
     return AuditCheck(number, head, tuple(broken), tuple(restored))
 

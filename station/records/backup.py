@@ -137,7 +137,7 @@ def integrity(connection: sqlite3.Connection) -> Iterator[str]:
 def _copied(folder: Path, partial: Path) -> Manifest:
     path, known = partial / FILE_NAME, read_head(folder)
     with reading(folder) as live, closing(sqlite3.connect(path)) as target:
-        plain(live).backup(target)  # in one step: a reader of the write-ahead log holds up nobody
+        plain(live).backup(target)  # in one step: a reader of the write-ahead log delays no other
         target.execute("PRAGMA journal_mode = DELETE")
         faults = list(integrity(target))
     if faults:

@@ -109,7 +109,7 @@ def export(folder: Path, query: Query, target: Path) -> int:
 
 
 def _windows(folder: Path, query: Query) -> Iterator[Rows]:
-    """Yield the rows, a window of numbers at a time, so that no reader keeps the write-ahead log from being emptied."""
+    """Yield the rows, a window of numbers at a time, so that no reader blocks the truncation of the write-ahead log."""
     where, values = _conditions(query)
     statement = (
         f"SELECT {', '.join(column.sql for column in COLUMNS)} FROM inspections AS i"  # noqa: S608 (of constants)

@@ -1,4 +1,4 @@
-"""Search index, kept by the writer: reasons and hours of inspections."""
+"""Search index, maintained by the writer: reasons and hours of inspections."""
 
 from sqlalchemy import Connection, delete, insert, select
 

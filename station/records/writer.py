@@ -127,7 +127,7 @@ class Writer:
             with self._connection.begin():
                 answers.extend(self._attempt(self._connection, work) for work, _ in batch)
                 self._before_commit(self._connection)
-        except Exception as error:  # noqa: BLE001 (told to all who asked)
+        except Exception as error:  # noqa: BLE001 (raised to all callers)
             told = map_error(error, self._place)
             answers = [told] * len(batch)
             self.error = str(told)

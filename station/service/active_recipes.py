@@ -63,18 +63,18 @@ class ActiveRecipes:
 
     Args:
         folder: the site's recipe files; None for those shipped.
-        kept: stores the recipes in force and the active one.
+        state_files: stores the recipes in force and the active one.
     """
 
-    def __init__(self, folder: Path | None, kept: StateFiles) -> None:
-        self._store, self._kept = RecipeStore(kept.folder, folder), kept
+    def __init__(self, folder: Path | None, state_files: StateFiles) -> None:
+        self._store, self._state_files = RecipeStore(state_files.folder, folder), state_files
         self._controls: dict[int, Control] = {}
         self._noticed: set[tuple[str, str]] = set()
         self._signature: Hashable = None
         self.problems: tuple[str, ...] = ()
-        """What is to be told of the files, as of the last reading; one sentence each."""
+        """Problems of the files at the last reading; one sentence each."""
         self.noticed: list[AuditEntry] = []
-        """Drafts and gaps that were found and not yet told: who takes them, empties the list."""
+        """Audit entries of drafts and gaps that were found; the caller that queues them empties the list."""
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -139,7 +139,7 @@ class ActiveRecipes:
 
         A lot continues with exactly the recipe that it began with, if its revision still has that content.
         """
-        data = self._kept.read(_ACTIVE)
+        data = self._state_files.read(_ACTIVE)
         try:
             told = json.loads(data or b"null")
             active = ActiveRecipe.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
@@ -164,7 +164,7 @@ class ActiveRecipes:
         """
         snapshot = active.snapshot
         told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
-        return self._kept.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
+        return self._state_files.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
 
     def _is_revision(self, active: ActiveRecipe) -> bool:
         """Check that the history has exactly this content as this revision."""
@@ -197,21 +197,21 @@ class ActiveRecipes:
     def _store_controls(self, controls: dict[str, Control]) -> None:
         for name, control in controls.items():
             told = {"revision": control.revision, "values": control.recipe.model_dump(mode="json")}
-            self._kept.write(f"{_CONTROLS}/{name}.json", json.dumps(told).encode())
+            self._state_files.write(f"{_CONTROLS}/{name}.json", json.dumps(told).encode())
         for name in set(self._stored_names()) - set(controls):
             with contextlib.suppress(OSError):
-                (self._kept.folder / _CONTROLS / f"{name}.json").unlink()
+                (self._state_files.folder / _CONTROLS / f"{name}.json").unlink()
 
     def _stored_controls(self) -> dict[str, Control]:
         found = {}
         for name in self._stored_names():
             try:
-                told = json.loads(self._kept.read(f"{_CONTROLS}/{name}.json") or b"null")
+                told = json.loads(self._state_files.read(f"{_CONTROLS}/{name}.json") or b"null")
                 found[name] = Control(Recipe.model_validate_json(json.dumps(told["values"])), int(told["revision"]))
             except (ValueError, TypeError, KeyError, ValidationError):
                 continue  # of another form of the program
         return found
 
     def _stored_names(self) -> list[str]:
-        folder = self._kept.folder / _CONTROLS
+        folder = self._state_files.folder / _CONTROLS
         return sorted(path.stem for path in folder.glob("*.json")) if folder.is_dir() else []

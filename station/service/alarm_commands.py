@@ -24,8 +24,8 @@ from station.service.audit_logger import AuditLogger, alarm_entry
 class AlarmCommands:
     """Handlers of alarm requests."""
 
-    def __init__(self, alarms: AlarmManager, trail: AuditLogger) -> None:
-        self._alarms, self._trail = alarms, trail
+    def __init__(self, alarms: AlarmManager, audit: AuditLogger) -> None:
+        self._alarms, self._audit = alarms, audit
         self.handlers: Handlers = {
             ListAlarms: self.list_alarms,
             AcknowledgeAlarm: self.acknowledge,
@@ -94,7 +94,7 @@ class AlarmCommands:
 
     def _done(self, changed: bool, entry: AuditEntry) -> CommandDone:  # noqa: FBT001 (an answer handed on)
         if changed:
-            self._trail.log(entry)
+            self._audit.log(entry)
         return CommandDone(done=True, why="")
 
 

@@ -92,7 +92,7 @@ class AlarmManager:
         self._metrics = metrics
         self._present: set[AlarmId] = set()
         self._told: dict[str, AlarmId | None] = {}
-        """By device, what its watch told last; a reference may tell the same of a camera."""
+        """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
         self._unsaved: list[AlarmEntry] = []
         self._changed = asyncio.Event()
 

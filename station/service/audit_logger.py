@@ -52,7 +52,6 @@ class AuditLogger:
             subject: object of the command.
             why_not: reason of the refusal; empty if it was carried out.
             role: of `who`; by default the same as `who`.
-            old: what was before, where that tells something.
             **old: values before the command, where they matter.
         """
         new = {"done": not why_not} | ({"why": why_not} if why_not else {})

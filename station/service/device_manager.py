@@ -58,7 +58,7 @@ class DeviceManager:
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
         self.confirmed_clear = False
-        """A person has said that nothing is between the jaws; used up by the next activation."""
+        """A person has confirmed that nothing is between the jaws; valid for one activation."""
         self._bad_frames, self._stale_looks = 0, 0
         self._not_activated: StationError | None = None
         looks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}

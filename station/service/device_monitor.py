@@ -27,7 +27,7 @@ class DeviceMonitor:
 
     Args:
         name: of the device, as in messages.
-        look: checks the device.
+        check: checks the device.
         longest_pause_s: between two checks.
         on_change: gets the fault from now on, None for no fault.
         on_progress: called after each check, whatever its result.
@@ -44,9 +44,9 @@ class DeviceMonitor:
         self.name = name
         self.fault: StationError | None = NoAnswerYetError(f"{name}: it has not answered yet; wait a moment")
         self.heard_s: float | None = None
-        """Monotonic time of the last look that found the device well."""
+        """Monotonic time of the last check that found the device healthy."""
         self.in_use = False
-        """While somebody else works with it, it is not asked; its user tells what goes wrong."""
+        """True while a caller works with it: it is not checked then, and the caller reports faults."""
         self._check, self._longest_pause_s = check, longest_pause_s
         self._on_change, self._on_progress = on_change, on_progress
         self._again = asyncio.Event()

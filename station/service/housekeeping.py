@@ -36,14 +36,14 @@ class Housekeeping:
     """One task beside the cycle.
 
     Args:
-        gate: readiness, for the metrics.
-        orders: raises the line's alarms.
-        book: the recipes; read again regularly, because people edit and approve them.
-        trail: gets the findings.
+        interlock: readiness, for the metrics.
+        plc_commands: raises the line's alarms.
+        recipes: the recipes; read again regularly, because people edit and approve them.
+        audit: gets the findings.
         metrics: gets the readiness.
         liveness: gets this task's progress.
         calibrated: age of the sensor's calibration.
-        pages_trouble: returns the fault of the HMI's process; empty for none.
+        hmi_fault: returns the fault of the HMI's process; empty for none.
         outbox: returns the outbox's delay, empty for none.
         broken: error of the configuration at the start; empty for none.
         reserve_mb: free disk space below which nothing is inspected.
@@ -53,24 +53,30 @@ class Housekeeping:
     def __init__(
         self,
         service: Service,
-        crew: DeviceManager,
-        gate: Interlock,
-        orders: PlcCommands,
-        book: ActiveRecipes,
-        trail: AuditLogger,
+        devices: DeviceManager,
+        interlock: Interlock,
+        plc_commands: PlcCommands,
+        recipes: ActiveRecipes,
+        audit: AuditLogger,
         metrics: Metrics,
         liveness: Liveness,
         calibrated: ActiveCalibration,
-        pages_trouble: Callable[[], str],
+        hmi_fault: Callable[[], str],
         outbox: Callable[[], str],
         *,
         broken: str,
         reserve_mb: int,
         longest_pause_s: float,
     ) -> None:
-        self._service, self._crew, self._gate, self._orders, self._book = service, crew, gate, orders, book
-        self._metrics, self._liveness, self._trail, self._calibrated = metrics, liveness, trail, calibrated
-        self._pages_trouble = pages_trouble
+        self._service, self._devices, self._interlock, self._plc_commands, self._recipes = (
+            service,
+            devices,
+            interlock,
+            plc_commands,
+            recipes,
+        )
+        self._metrics, self._liveness, self._audit, self._calibrated = metrics, liveness, audit, calibrated
+        self._hmi_fault = hmi_fault
         self._book_at_s, self._outbox = time.monotonic(), outbox
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
         self._told_ready_s = 0.0
@@ -91,43 +97,43 @@ class Housekeeping:
                 self._update_alarms()
             if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
                 await self._refresh_recipes()
-            self._metrics.ready(ready=self._gate.refusal()[0] is None)
+            self._metrics.ready(ready=self._interlock.refusal()[0] is None)
             self._liveness.progress(UPKEEP)
             await asyncio.sleep(PERIOD_S)
 
     async def _refresh_recipes(self) -> None:
         """Read what people changed in the recipes. The current lot does not change."""
-        await asyncio.to_thread(self._book.refresh)
+        await asyncio.to_thread(self._recipes.refresh)
         self._book_at_s = time.monotonic()
-        noticed, self._book.noticed = self._book.noticed, []
-        self._trail.log(*noticed)
+        noticed, self._recipes.noticed = self._recipes.noticed, []
+        self._audit.log(*noticed)
 
     async def _recover(self) -> None:
         service = self._service
         await self._try_recovery()
         entered_s = service.conductor.entered_s
-        if service.registry.fault is None and self._told_ready_s < entered_s and self._crew.healthy_since(entered_s):
+        if service.registry.fault is None and self._told_ready_s < entered_s and self._devices.healthy_since(entered_s):
             self._told_ready_s = time.monotonic()
             service.conductor.post(Event.READY)
 
     async def _try_recovery(self) -> None:
         """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
-        activate = self._activation_is_lost and set(self._crew.faults) == {GRIPPER}
-        play = self._crew.needs_program_restart and not self._liveness.stuck()
+        activate = self._activation_is_lost and set(self._devices.faults) == {GRIPPER}
+        play = self._devices.needs_program_restart and not self._liveness.stuck()
         if time.monotonic() < self._again_s or not (activate or play or self._service.registry.fault is not None):
             return
         self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
         await self._reopen_records()
         with contextlib.suppress(StationError):
             if activate:
-                await self._crew.activate_if_safe()
+                await self._devices.activate_if_safe()
             elif play:
-                await self._crew.restart_program()
+                await self._devices.restart_program()
         self._again_s = time.monotonic() + self._pause_s
 
     @property
     def _activation_is_lost(self) -> bool:
-        return isinstance(self._crew.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
+        return isinstance(self._devices.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
 
     async def _reopen_records(self) -> None:
         service = self._service
@@ -144,7 +150,7 @@ class Housekeeping:
     def _update_alarms(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
-        for name, watch in self._crew.monitors.items():
+        for name, watch in self._devices.monitors.items():
             alarms.set_device_fault(name, watch.reported_fault)
         fault = service.registry.fault
         alarms.update(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
@@ -156,14 +162,14 @@ class Housekeeping:
             else "",
         )
         alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
-        alarms.update(AlarmId.RECIPE_BROKEN, "; ".join(self._book.problems))
+        alarms.update(AlarmId.RECIPE_BROKEN, "; ".join(self._recipes.problems))
         alarms.update(
             AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
         )
         alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
-        alarms.update(AlarmId.HMI_LOST, self._pages_trouble())
+        alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
         alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
-        self._orders.update_line_alarms()
+        self._plc_commands.update_line_alarms()
         self._count_restarts()
         self._check_clock()
 

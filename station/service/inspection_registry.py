@@ -25,19 +25,19 @@ class InspectionRegistry:
     Args:
         records: opened, or reopened once `fault` is repaired.
         triggers: receives the outcomes for the callers that wait.
-        crew: gives the device names for the records.
+        devices: gives the device names for the records.
         versions: of the programs, for the records.
     """
 
     def __init__(
-        self, records: Records, triggers: RecentTriggers, crew: DeviceManager, versions: Mapping[str, str]
+        self, records: Records, triggers: RecentTriggers, devices: DeviceManager, versions: Mapping[str, str]
     ) -> None:
         self.records = records
         self.fault: RecordsError | None = None
-        """Why the records are not to be relied on, until they were opened again."""
+        """Fault of the records, until they were reopened."""
         self.on_outcome: Callable[[Inspection], None] = lambda _: None
-        """Told of every inspection with its durable outcome."""
-        self._triggers, self._crew, self._versions = triggers, crew, versions
+        """Called with every inspection once its outcome is durable."""
+        self._triggers, self._devices, self._versions = triggers, devices, versions
         self._begun: list[Inspection] = []
         """Accepted, in order, and perhaps without a durable outcome."""
         self._closing = asyncio.Lock()
@@ -76,7 +76,7 @@ class InspectionRegistry:
         """
         if now.sequence is None:
             raise RuntimeError("an inspection without a number is recorded")
-        devices = {**self._crew.names, "calibration": now.calibration}
+        devices = {**self._devices.names, "calibration": now.calibration}
         signed = replace(now.record(), devices=devices, versions=self._versions)
         try:
             now.standing = await self.records.conclude(now.sequence, signed)

@@ -17,11 +17,11 @@ class LotManager:
 
     Args:
         service: inspects by the frozen recipe.
-        book: the recipes in force.
+        recipes: the recipes in force.
     """
 
-    def __init__(self, service: Service, book: ActiveRecipes, trail: AuditLogger) -> None:
-        self._service, self._book, self._trail = service, book, trail
+    def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:
+        self._service, self._recipes, self._audit = service, recipes, audit
         self._turn = asyncio.Lock()
         self.lot: str | None = None
         """The lot under way; None before the first fruit of one."""
@@ -34,7 +34,7 @@ class LotManager:
 
     def restore(self) -> None:
         """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
-        remembered = self._book.restored()
+        remembered = self._recipes.restored()
         if remembered is not None:
             self._service.active, self.lot = remembered
 
@@ -46,13 +46,13 @@ class LotManager:
         """
         self.mismatch = ""
         self._service.active = active
-        return self._book.store_active(active, self.lot)
+        return self._recipes.store_active(active, self.lot)
 
     def lot_of(self, named_by_plc: str) -> str:
         """Return the lot of a fruit.
 
         Args:
-            told: the lot as the PLC names it; may be empty.
+            named_by_plc: the lot as the PLC names it; may be empty.
         """
         self.plc_names = bool(named_by_plc)
         return named_by_plc or self.named
@@ -79,13 +79,13 @@ class LotManager:
             if active is None or lot == self.lot:
                 return active is not None
             try:
-                now = self._book.current(active)
+                now = self._recipes.current(active)
                 self._service.pacing.expected(now.recipe)
             except StationError as error:
                 self.mismatch = f"Lot {lot or 'without a name'} cannot begin: {error}."
                 self._service.active, self.lot = None, None
                 log.warning("%s", self.mismatch)
-                self._trail.log(
+                self._audit.log(
                     AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _audited(active), {"why": str(error)})
                 )
                 return False
@@ -93,12 +93,12 @@ class LotManager:
             self._service.active = now
             if now.snapshot != active.snapshot:
                 log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)
-            self._trail.log(
+            self._audit.log(
                 AuditEntry(
                     PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_audited(active)}, _audited(now)
                 )
             )
-            await asyncio.to_thread(self._book.store_active, now, lot)
+            await asyncio.to_thread(self._recipes.store_active, now, lot)
             return True
 
 

@@ -42,7 +42,7 @@ class Metrics:
             deadline_s: of one inspection; centre of the durations' buckets.
             clock: monotonic, s.
         """
-        disable_created_metrics()  # a series more for each counter, which nobody asks for
+        disable_created_metrics()  # an extra series for each counter, which is not needed
         self.registry = CollectorRegistry(auto_describe=False)
         ProcessCollector(registry=self.registry)
         self._clock = clock

@@ -48,22 +48,22 @@ class OperatorCommands:
     """Executes operators' commands.
 
     Args:
-        orders: executes commands that the PLC has too.
+        plc_commands: executes commands that the PLC has too.
         records: gets lots with a grower.
-        trail: gets the commands that `orders` does not audit.
+        audit: gets the commands that `plc_commands` does not audit.
     """
 
     def __init__(
         self,
-        orders: PlcCommands,
+        plc_commands: PlcCommands,
         service: Service,
-        crew: DeviceManager,
+        devices: DeviceManager,
         lots: LotManager,
         records: Records,
-        trail: AuditLogger,
+        audit: AuditLogger,
     ) -> None:
-        self._orders, self._service, self._crew, self._lots = orders, service, crew, lots
-        self._records, self._trail = records, trail
+        self._plc_commands, self._service, self._devices, self._lots = plc_commands, service, devices, lots
+        self._records, self._audit = records, audit
         self._tickets = itertools.count(1)
         self._shown: deque[OrderShown] = deque(maxlen=_REMEMBERED)
         self._tasks: dict[int, asyncio.Task[None]] = {}
@@ -82,7 +82,7 @@ class OperatorCommands:
     @property
     def recoveries(self) -> tuple[RecoveryName, ...]:
         """Return the stops that a person may recover from after a check of the cell."""
-        fault = self._crew.monitors[ARM].fault if ARM in self._crew.monitors else None
+        fault = self._devices.monitors[ARM].fault if ARM in self._devices.monitors else None
         found = _RECOVERIES.get(fault.cause) if isinstance(fault, ArmFault) else None
         return () if found is None else (found,)
 
@@ -91,8 +91,8 @@ class OperatorCommands:
         """Return the commands that would be started now."""
         service, state = self._service, self._service.state
         conditions = {
-            OrderName.CHOOSE_RECIPE: not self._orders.recipe_changing,
-            OrderName.START: not self._orders.reset_refusal() and (state in WAITING or service.stop_wanted),
+            OrderName.CHOOSE_RECIPE: not self._plc_commands.recipe_changing,
+            OrderName.START: not self._plc_commands.reset_refusal() and (state in WAITING or service.stop_wanted),
             OrderName.STOP: not service.stop_wanted and not service.stop_requested and state is not State.LATCHED,
             OrderName.CALL_OFF: state in UNJUDGED,
             OrderName.RECOVER: bool(self.recoveries),
@@ -138,23 +138,23 @@ class OperatorCommands:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
                 return f"{order}: {argument!r} is no number"
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
-            return (await self._orders.execute(command, by)).why
+            return (await self._plc_commands.execute(command, by)).why
         match order:
             case OrderName.RECOVER:
                 return await self._recover(argument, by)
             case OrderName.STOP:
-                why = await self._orders.stop()
+                why = await self._plc_commands.stop()
             case OrderName.START_LOT:
                 why = await self._start_lot(argument, request.grower)
             case _:
                 why = await self._end_lot()
-        self._trail.log_command(by[0], order, argument, why, by[1])
+        self._audit.log_command(by[0], order, argument, why, by[1])
         return why
 
     async def _recover(self, what: str, by: tuple[str, str]) -> str:
         for standing in self.recoveries:
             if standing == what:
-                return (await self._orders.recover(Recover(what=standing), by)).why
+                return (await self._plc_commands.recover(Recover(what=standing), by)).why
         return "there is nothing to recover from any more"
 
     async def _start_lot(self, name: str, grower: str) -> str:
@@ -174,7 +174,7 @@ class OperatorCommands:
         name = self._lots.named
         if not name:
             return "no lot was started at the panel"
-        with contextlib.suppress(RecordsError):  # of a lot without a grower the records were never told
+        with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
         self._lots.set_lot("")
         return ""

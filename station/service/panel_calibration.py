@@ -69,10 +69,10 @@ class PanelCalibration:
     """Requests about the calibration, and runs of the procedures of `station.calibration`.
 
     Args:
-        orders: the mode, which must not change during a run.
+        plc_commands: the mode, which must not change during a run.
         calibrated: the calibration in force.
         records: stores the audit entry and the result together.
-        trail: gets the start and the cancellation of runs.
+        audit: gets the start and the cancellation of runs.
         worker: reads and writes files in its thread.
         refusal: returns why nothing may be moved by hand now.
     """
@@ -80,16 +80,21 @@ class PanelCalibration:
     def __init__(
         self,
         configuration: Configuration,
-        crew: DeviceManager,
-        orders: PlcCommands,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
         calibrated: ActiveCalibration,
         records: Records,
-        trail: AuditLogger,
+        audit: AuditLogger,
         worker: PanelWorker,
         refusal: Callable[[], str],
     ) -> None:
-        self._site, self._crew, self._orders, self._calibrated = configuration, crew, orders, calibrated
-        self._records, self._trail, self._worker, self._refusal = records, trail, worker, refusal
+        self._site, self._devices, self._plc_commands, self._calibrated = (
+            configuration,
+            devices,
+            plc_commands,
+            calibrated,
+        )
+        self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
 
@@ -111,7 +116,7 @@ class PanelCalibration:
 
     async def state(self, _request: GetCalibration) -> CalibrationState:
         """Return the sensor's calibration state."""
-        serial = self._crew.cell.camera.description.serial
+        serial = self._devices.cell.camera.description.serial
 
         def read() -> tuple[Calibration | None, Verification | None]:
             calibration = self._calibrated.calibration
@@ -153,12 +158,12 @@ class PanelCalibration:
 
     async def begin(self, request: BeginBallRun) -> BallRunTold:
         """Start a run; the gripper closes on the ball."""
-        if why := self._why_not(self._crew.cell.camera.description.serial):
+        if why := self._why_not(self._devices.cell.camera.description.serial):
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "begun")
-        self._orders.kept_manual = _NAMES[request.kind]
-        self._crew.use(by_inspection=True)
+        self._plc_commands.kept_manual = _NAMES[request.kind]
+        self._devices.use(by_inspection=True)
         run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
         return _run_view(run)
 
@@ -197,17 +202,17 @@ class PanelCalibration:
         except (StationError, ValueError) as error:
             run.state, run.told = "failed", str(error)
             if isinstance(error, StationError):
-                self._crew.report_fault(error)
+                self._devices.report_fault(error)
         else:
             run.state, run.told = ("failed", words) if words else ("passed", "")
         finally:
             run.request = ""
-            self._orders.kept_manual = ""
-            self._crew.use(by_inspection=False)
+            self._plc_commands.kept_manual = ""
+            self._devices.use(by_inspection=False)
 
     async def _calibrate(self, run: _Run, request: BeginBallRun) -> str:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
-        bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         draft = await CalibrationProcedure(
             bench,
             self._unit(),
@@ -236,7 +241,7 @@ class PanelCalibration:
         golden, presses = await self._worker.do(
             lambda: (self._store.golden(calibration), self._store.presses(calibration))
         )
-        bench = StationRig(self._crew.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         verified = await VerificationProcedure(
             bench,
             recipe,
@@ -272,12 +277,12 @@ class PanelCalibration:
             raise StationError(f"nobody laid the ball within {ANSWERED_S / 60:g} min; begin again") from None
 
     def _unit(self) -> Unit:
-        description = self._crew.cell.camera.description
+        description = self._devices.cell.camera.description
         return Unit(description.serial, description.name, simulated=self._site.camera.driver != "digit")
 
     def _note(self, actor: Actor, what: str) -> None:
         kind = self._run.kind if self._run is not None else "run"
-        self._trail.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
+        self._audit.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
 
     def _calibration_view(self, made: Calibration) -> CalibrationTold:
         return CalibrationTold(

@@ -68,11 +68,11 @@ class PanelMaintenance:
     """Requests of the maintenance page.
 
     Args:
-        orders: the mode, and the PLC interface's report.
-        gate: the dependencies of an inspection, with ages.
+        plc_commands: the mode, and the PLC interface's report.
+        interlock: the dependencies of an inspection, with ages.
         liveness: the progress of tasks.
         calibrated: the scale, and the golden reference.
-        trail: gets every manual motion.
+        audit: gets every manual motion.
         home: folder of the golden reference of a sensor that is not calibrated.
         worker: makes pictures in its thread.
         log: the last lines.
@@ -81,19 +81,19 @@ class PanelMaintenance:
     def __init__(
         self,
         service: Service,
-        crew: DeviceManager,
-        orders: PlcCommands,
-        gate: Interlock,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
         liveness: Liveness,
         calibrated: ActiveCalibration,
-        trail: AuditLogger,
+        audit: AuditLogger,
         home: Path,
         worker: PanelWorker,
         log: LogRing,
         versions: Mapping[str, str],
     ) -> None:
-        self._service, self._crew, self._orders, self._gate = service, crew, orders, gate
-        self._liveness, self._calibrated, self._trail, self._home = liveness, calibrated, trail, home
+        self._service, self._devices, self._plc_commands, self._interlock = service, devices, plc_commands, interlock
+        self._liveness, self._calibrated, self._audit, self._home = liveness, calibrated, audit, home
         self._worker, self._log, self._versions = worker, log, dict(versions)
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
@@ -111,7 +111,7 @@ class PanelMaintenance:
 
     def refusal(self) -> str:
         """Return why nothing may be moved by hand now, with the remedy; empty if it may."""
-        service, facts, mode = self._service, STATES[self._service.state], self._orders.mode
+        service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
         if service.stop_requested:
             return "The station is told to end."
         if facts.refusal is Refusal.BUSY:
@@ -120,25 +120,29 @@ class PanelMaintenance:
             return f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then."
         if service.state not in _JOGGED:
             return facts.sentence
-        if self._orders.kept_manual and not self._moving.locked():
-            return f"{self._orders.kept_manual} is under way: let it end, or call it off."
+        if self._plc_commands.kept_manual and not self._moving.locked():
+            return f"{self._plc_commands.kept_manual} is under way: let it end, or call it off."
         return ""
 
     async def health(self, _request: GetHealth) -> Health:
         """Return the health of all dependencies."""
-        readiness, records, figures = self._gate.readiness(), self._service.registry.records, self._calibrated.figures
+        readiness, records, figures = (
+            self._interlock.readiness(),
+            self._service.registry.records,
+            self._calibrated.figures,
+        )
         status = await self._worker.do(records.status)
         return Health(
             ready=readiness.ready,
             why=readiness.why,
-            mode=self._orders.mode,
+            mode=self._plc_commands.mode,
             state=STATES[self._service.state].sentence,
             jog_refused=self.refusal(),
             parts=tuple(
                 PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
                 for each in readiness.dependencies
             ),
-            devices=self._crew.names,
+            devices=self._devices.names,
             versions=self._versions,
             progress_age_s=self._liveness.ages_s(),
             records={
@@ -152,7 +156,7 @@ class PanelMaintenance:
             records_error=status.error,
             calibration_age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
-            simulated=self._crew.simulated,
+            simulated=self._devices.simulated,
         )
 
     async def jog(self, request: JogGripper) -> Jogged:
@@ -162,7 +166,7 @@ class PanelMaintenance:
             NotNowError: refused in this state.
             GripperError: the fingers did not reach the width.
         """
-        gripper, width_mm = self._crew.cell.gripper, request.width_mm
+        gripper, width_mm = self._devices.cell.gripper, request.width_mm
         if (request.to == "width") != (width_mm is not None):
             raise StationError("to jog the gripper: expected a width where it is to go to one, and none elsewhere")
         self._check(request.actor, "jog", request.to)
@@ -174,13 +178,13 @@ class PanelMaintenance:
             if self._moving.locked():
                 raise NotNowError("the fingers move already: wait for them, or stop them")
             async with self._moving:
-                self._orders.kept_manual = "jogging"
+                self._plc_commands.kept_manual = "jogging"
                 try:
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
                 finally:
-                    self._orders.kept_manual = ""
-        self._crew.monitors[GRIPPER].report_success()
+                    self._plc_commands.kept_manual = ""
+        self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
@@ -188,13 +192,13 @@ class PanelMaintenance:
     async def set_leds(self, request: SetLeds) -> Lit:
         """Set the sensor's light; the next start of the camera sets its own again."""
         self._check(request.actor, "leds", "camera")
-        await self._crew.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
+        await self._devices.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
         self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
         return Lit()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
         """Return the newest image; it is measured only while nothing is inspected."""
-        frame = await self._crew.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
+        frame = await self._devices.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
         active = self._service.active
         why = ""
         if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
@@ -207,10 +211,10 @@ class PanelMaintenance:
     async def registers(self, _request: GetRegisters) -> Registers:
         """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
         asked_s = time.monotonic()
-        self._orders.registers_wanted = True
-        while self._orders.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
+        self._plc_commands.registers_wanted = True
+        while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
             await asyncio.sleep(0.05)
-        told, at_s = self._orders.registers
+        told, at_s = self._plc_commands.registers
         return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
 
     async def log_lines(self, request: ReadLog) -> Log:
@@ -223,7 +227,7 @@ class PanelMaintenance:
             raise NotNowError(why)
 
     def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
-        self._trail.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+        self._audit.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
 
     def _live(self, frame: Frame, segmentation: Segmentation | None, why: str) -> LiveImage:
         image, contact = frame.image, None

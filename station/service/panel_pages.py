@@ -29,11 +29,11 @@ class PanelPages:
     """Handlers of these pages; use them inside `async with`, and close before the devices.
 
     Args:
-        orders: the mode.
-        gate: the dependencies of an inspection.
+        plc_commands: the mode.
+        interlock: the dependencies of an inspection.
         liveness: the progress of tasks.
         calibrated: the scale.
-        trail: gets everything that a person does.
+        audit: gets everything that a person does.
     """
 
     def __init__(
@@ -41,12 +41,12 @@ class PanelPages:
         configuration: Configuration,
         records: Records,
         service: Service,
-        crew: DeviceManager,
-        orders: PlcCommands,
-        gate: Interlock,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
         liveness: Liveness,
         calibrated: ActiveCalibration,
-        trail: AuditLogger,
+        audit: AuditLogger,
         versions: Mapping[str, str],
     ) -> None:
         self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
@@ -54,19 +54,19 @@ class PanelPages:
         recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker, self._jobs)
         maintenance = PanelMaintenance(
             service,
-            crew,
-            orders,
-            gate,
+            devices,
+            plc_commands,
+            interlock,
             liveness,
             calibrated,
-            trail,
+            audit,
             configuration.home,
             self._worker,
             self._log,
             versions,
         )
         self._ball = PanelCalibration(
-            configuration, crew, orders, calibrated, records, trail, self._worker, maintenance.refusal
+            configuration, devices, plc_commands, calibrated, records, audit, self._worker, maintenance.refusal
         )
         self.handlers: dict[type[Message], Handler] = {
             **history.handlers(),

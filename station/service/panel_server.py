@@ -56,34 +56,40 @@ class PanelServer:
     """Channel server for the HMI.
 
     Args:
-        gate: the state, and why the station is not ready.
-        line: the PLC interface's last report.
+        interlock: the state, and why the station is not ready.
+        plc_commands: the PLC interface's last report.
         records: gets lots; read for alarms.
         alarms: alarm commands of people.
-        trail: gets what people do.
+        audit: gets what people do.
         calibrated: whether the verification with the ball is due.
     """
 
     def __init__(
         self,
-        gate: Interlock,
+        interlock: Interlock,
         service: Service,
-        crew: DeviceManager,
+        devices: DeviceManager,
         lots: LotManager,
-        book: ActiveRecipes,
-        line: PlcCommands,
+        recipes: ActiveRecipes,
+        plc_commands: PlcCommands,
         records: Records,
         alarms: AlarmCommands,
-        trail: AuditLogger,
+        audit: AuditLogger,
         calibrated: ActiveCalibration,
     ) -> None:
-        self._gate, self._service, self._crew, self._lots = gate, service, crew, lots
-        self._book, self._line, self._records, self._alarms, self._trail = book, line, records, alarms, trail
+        self._interlock, self._service, self._devices, self._lots = interlock, service, devices, lots
+        self._book, self._plc_commands, self._records, self._alarms, self._audit = (
+            recipes,
+            plc_commands,
+            records,
+            alarms,
+            audit,
+        )
         self._calibrated = calibrated
-        self._orders = OperatorCommands(line, service, crew, lots, records, trail)
-        self._memory = RecentInspections()
+        self._operator_commands = OperatorCommands(plc_commands, service, devices, lots, records, audit)
+        self._inspections = RecentInspections()
         self._heard_s: float | None = None
-        service.registry.on_outcome, service.on_published = self._memory.add, self._memory.set_outcome
+        service.registry.on_outcome, service.on_published = self._inspections.add, self._inspections.set_outcome
         self.handlers: Handlers = {
             AskPanel: self._state,
             AskRecent: self._recent,
@@ -107,11 +113,11 @@ class PanelServer:
         except RecordsError as error:
             log.warning("the last fruit are not shown: %s", error)
             return
-        self._memory.restore(*found)
+        self._inspections.restore(*found)
 
     async def close(self) -> None:
         """Cancel the commands under way."""
-        await self._orders.close()
+        await self._operator_commands.close()
 
     def hmi_fault(self) -> str:
         """Return the fault of the HMI's process; empty for none, and before its first message."""
@@ -120,9 +126,9 @@ class PanelServer:
 
     async def _state(self, _request: AskPanel) -> PanelState:
         self._heard_s = time.monotonic()
-        service, line = self._service, self._gate.state()
+        service, line = self._service, self._interlock.state()
         facts, active = STATES[service.state], service.active
-        told = self._line.last_report
+        told = self._plc_commands.last_report
         return PanelState(
             boot=line.boot,
             utc_ms=utc_ms(),
@@ -142,29 +148,29 @@ class PanelServer:
             plc_names_lots=self._lots.plc_names,
             plc_connected=told is not None and told.plc_connected,
             plc_alive=told is not None and told.plc_alive,
-            line_trouble=self._line.line_fault(),
+            line_trouble=self._plc_commands.line_fault(),
             check_due=self._calibrated.refusal(),
             alarms=self._alarms.active(),
             devices=tuple(
                 DeviceShown(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
-                for name, watch in self._crew.monitors.items()
+                for name, watch in self._devices.monitors.items()
             ),
-            orders=self._orders.recent,
-            may=self._orders.possible,
-            recoveries=self._orders.recoveries,
-            last_sequence=self._memory.last_sequence,
-            lot_counts=self._memory.counts(self._lots.lot),
+            orders=self._operator_commands.recent,
+            may=self._operator_commands.possible,
+            recoveries=self._operator_commands.recoveries,
+            last_sequence=self._inspections.last_sequence,
+            lot_counts=self._inspections.counts(self._lots.lot),
             deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
         )
 
     async def _recent(self, request: AskRecent) -> Recent:
-        return Recent(fruit=self._memory.recent(request.most))
+        return Recent(fruit=self._inspections.recent(request.most))
 
     async def _fruit(self, request: AskFruit) -> Fruit:
-        return self._memory.fruit(request.sequence)
+        return self._inspections.fruit(request.sequence)
 
     async def _picture(self, request: AskPicture) -> Picture:
-        return await self._memory.picture(request.sequence)
+        return await self._inspections.picture(request.sequence)
 
     async def _recipes(self, _request: AskRecipes) -> Recipes:
         found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
@@ -184,11 +190,11 @@ class PanelServer:
         )
 
     async def _order(self, request: PanelOrder) -> OrderShown:
-        return await self._orders.start(request)
+        return await self._operator_commands.start(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
         entry = AuditEntry(request.person.who, request.person.role, f"panel.{request.what}", request.subject)
-        self._trail.log(entry)
+        self._audit.log(entry)
         return Noted()
 
 

@@ -36,30 +36,30 @@ class PlcCommands:
 
     Args:
         lots: gets a chosen recipe.
-        trail: gets every command.
+        audit: gets every command.
         metrics: gets the line's signs of life.
-        kept: stores a person's stop for a restart.
+        state_files: stores a person's stop for a restart.
     """
 
     def __init__(
         self,
         service: Service,
-        crew: DeviceManager,
-        book: ActiveRecipes,
+        devices: DeviceManager,
+        recipes: ActiveRecipes,
         lots: LotManager,
-        trail: AuditLogger,
+        audit: AuditLogger,
         metrics: Metrics,
-        kept: StateFiles,
+        state_files: StateFiles,
     ) -> None:
-        self._service, self._crew, self._book, self._metrics = service, crew, book, metrics
-        self._lots, self._trail, self._kept = lots, trail, kept
+        self._service, self._devices, self._recipes, self._metrics = service, devices, recipes, metrics
+        self._lots, self._audit, self._state_files = lots, audit, state_files
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
         self.kept_manual = ""
-        """What a person does at the panel that needs the mode to stay as it is; empty for nothing."""
+        """Activity at the panel that needs the mode unchanged; empty for none."""
         self.registers_wanted = False
-        """The PLC interface is to tell its registers with the next beat."""
+        """Requests the PLC interface's registers with the next beat."""
         self._registers: tuple[tuple[RegisterTold, ...], float] = ((), 0.0)
         self._line: Line | None = None
         self._line_at_s: float | None = None
@@ -77,7 +77,7 @@ class PlcCommands:
 
     def restore_stop(self) -> None:
         """Restore a person's stop after a restart; it lasts until a reset."""
-        self._service.stop_wanted = self._kept.read(_STOPPED) == b"yes"
+        self._service.stop_wanted = self._state_files.read(_STOPPED) == b"yes"
 
     def set_line(self, line: Line) -> None:
         """Store the PLC interface's beat."""
@@ -133,11 +133,11 @@ class PlcCommands:
         if why:
             log.warning("%s was not done: %s", command.command, why)
         done = CommandDone(done=not why, why=why)
-        self._trail.log(command_entry(command, done, before, by))
+        self._audit.log(command_entry(command, done, before, by))
         if command.command in _ON_ALARMS:
             now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
             changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
-            self._trail.log(*(alarm_entry(*by, change, alarm) for alarm in changed))
+            self._audit.log(*(alarm_entry(*by, change, alarm) for alarm in changed))
         return done
 
     def _value_before(self, command: CommandName) -> dict[str, Any]:
@@ -175,12 +175,12 @@ class PlcCommands:
         return ""
 
     async def _change_recipe(self, number: int) -> str:
-        await asyncio.to_thread(self._book.read)
-        found = self._book.find(number)
+        await asyncio.to_thread(self._recipes.read)
+        found = self._recipes.find(number)
         if found is None:
-            known = ", ".join(map(str, self._book.numbers)) or "none"
-            return f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._book.problems)
-        widest_mm = self._crew.cell.gripper.max_width_mm
+            known = ", ".join(map(str, self._recipes.numbers)) or "none"
+            return f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._recipes.problems)
+        widest_mm = self._devices.cell.gripper.max_width_mm
         if found.recipe.expected_width.smallest_mm >= widest_mm:
             return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
         try:
@@ -206,7 +206,7 @@ class PlcCommands:
         """
         service = self._service
         service.stop_wanted = True
-        kept = await asyncio.to_thread(self._kept.write, _STOPPED, b"yes")
+        kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.conductor.post(Event.STOP, "a person stops the station at the panel")
         reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
@@ -224,11 +224,11 @@ class PlcCommands:
             return CommandDone(done=False, why="an inspection is under way")
         log.info("a person at the cell asks for: %s", request.what)
         try:
-            await self._crew.recover(request.what)
+            await self._devices.recover(request.what)
             why = ""
         except ArmFault as fault:
             why = str(fault)
-        self._trail.log_command(by[0], "recover", request.what, why, by[1])
+        self._audit.log_command(by[0], "recover", request.what, why, by[1])
         return CommandDone(done=not why, why=why)
 
     async def _call_off(self) -> str:
@@ -244,7 +244,7 @@ class PlcCommands:
         """Return why a reset would do nothing now; empty if it would work."""
         if self._service.stop_requested:
             return "the station is told to end"
-        if stop := self._crew.active_stop:
+        if stop := self._devices.active_stop:
             why = str(stop).removesuffix(".")
             return f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
         busy = STATES[self._service.state].refusal is Refusal.BUSY
@@ -255,18 +255,18 @@ class PlcCommands:
         if why_not := self.reset_refusal():
             return why_not
         service.stop_wanted = False
-        await asyncio.to_thread(self._kept.write, _STOPPED, b"no")
+        await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
         if state in {State.IDLE, State.RETREATING_READY}:
             return ""
         service.reset_wanted = True
-        self._crew.confirmed_clear = True
+        self._devices.confirmed_clear = True
         if state is State.LATCHED:
             service.conductor.post(Event.PERSON_CONFIRMED, "reset")
         elif state is State.STOPPED:
             service.conductor.post(Event.RESET)
         else:
             try:
-                await self._crew.restart_program()
+                await self._devices.restart_program()
             except ArmFault as fault:
                 return str(fault)
             if state is State.CARRIED:
@@ -281,5 +281,5 @@ class PlcCommands:
         return ""
 
     def _sentence(self) -> str:
-        faults = list(self._crew.faults.values())
+        faults = list(self._devices.faults.values())
         return str(faults[0]) if faults else STATES[self._service.state].sentence

@@ -31,8 +31,8 @@ class PlcInterfaceServer:
     Args:
         endpoint: bound when the server is made.
         service: the cycle and its outcomes.
-        orders: the PLC's commands, and the line's state.
-        gate: decides whether a trigger is accepted.
+        plc_commands: the PLC's commands, and the line's state.
+        interlock: decides whether a trigger is accepted.
         lots: freezes the recipe at a lot's first trigger.
         alarms: alarm commands of people.
     """
@@ -41,12 +41,12 @@ class PlcInterfaceServer:
         self,
         endpoint: str,
         service: Service,
-        orders: PlcCommands,
-        gate: Interlock,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
         lots: LotManager,
         alarms: AlarmCommands,
     ) -> None:
-        self._service, self._orders, self._gate, self._lots = service, orders, gate, lots
+        self._service, self._plc_commands, self._interlock, self._lots = service, plc_commands, interlock, lots
         self._server = ChannelServer(
             endpoint,
             {
@@ -67,7 +67,7 @@ class PlcInterfaceServer:
         await self._server.serve()
 
     async def _begin(self, request: Begin) -> Begun:
-        refusal, _ = self._gate.refusal()
+        refusal, _ = self._interlock.refusal()
         lot = self._lots.lot_of(request.lot)
         if refusal is None and not await self._lots.begin(lot):
             refusal = Refusal.NOT_READY
@@ -88,11 +88,11 @@ class PlcInterfaceServer:
         return await self._service.registry.open_inspections()
 
     async def _line(self, request: Line) -> StationState:
-        self._orders.set_line(request)
-        return self._gate.state()
+        self._plc_commands.set_line(request)
+        return self._interlock.state()
 
     async def _recover(self, request: Recover) -> CommandDone:
-        return await self._orders.recover(request)
+        return await self._plc_commands.recover(request)
 
     async def _command(self, request: Command) -> CommandDone:
-        return await self._orders.execute(request)
+        return await self._plc_commands.execute(request)

@@ -20,7 +20,7 @@ class Interlock:
 
     Args:
         boot: this start of the station.
-        orders: the mode, and a recipe change under way.
+        plc_commands: the mode, and a recipe change under way.
         lots: why a lot cannot begin.
         liveness: the progress of tasks.
         calibrated: whether the sensor is calibrated, and verified where the site requires it.
@@ -30,16 +30,16 @@ class Interlock:
         self,
         boot: str,
         service: Service,
-        crew: DeviceManager,
-        orders: PlcCommands,
-        book: ActiveRecipes,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        recipes: ActiveRecipes,
         lots: LotManager,
         liveness: Liveness,
         calibrated: ActiveCalibration,
     ) -> None:
         self._boot, self._lots, self._calibrated = boot, lots, calibrated
-        self._service, self._crew, self._orders = service, crew, orders
-        self._book, self._liveness = book, liveness
+        self._service, self._devices, self._plc_commands = service, devices, plc_commands
+        self._recipes, self._liveness = recipes, liveness
 
     def refusal(self) -> tuple[Refusal | None, str]:
         """Return why no trigger is accepted, for the PLC and for a person; None and empty if one is."""
@@ -57,15 +57,15 @@ class Interlock:
         if stuck := self._liveness.stuck():
             names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
             return Refusal.NOT_READY, f"No progress of {names}: restart the station if it stays."
-        if self._orders.recipe_changing:
+        if self._plc_commands.recipe_changing:
             return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
         if service.active is None:
-            numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
+            numbers = ", ".join(map(str, self._recipes.numbers)) or "none: see `station recipes check`"
             why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
             return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
         if why := self._calibrated.refusal():
             return Refusal.NOT_READY, why
-        if self._orders.mode != PRODUCTION:
+        if self._plc_commands.mode != PRODUCTION:
             return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
         return None, ""
 
@@ -80,13 +80,13 @@ class Interlock:
             ready=refusal is None,
             why_not_ready=why,
             packml_state=self._packml(),
-            mode=self._orders.mode,
+            mode=self._plc_commands.mode,
             recipe_number=0 if snapshot is None else snapshot.number,
             recipe_checksum=0 if snapshot is None else snapshot.checksum,
             error_code=service.alarms.alarms.error_code,
             alarms=service.alarms.alarms.word,
-            simulated=self._crew.simulated,
-            registers_wanted=self._orders.registers_wanted,
+            simulated=self._devices.simulated,
+            registers_wanted=self._plc_commands.registers_wanted,
         )
 
     def _packml(self) -> PackmlState | None:
@@ -105,7 +105,7 @@ class Interlock:
                 "" if watch.fault is None else str(watch.fault),
                 "" if watch.fault is None else "see the detail, and `station devices check`",
             )
-            for name, watch in self._crew.monitors.items()
+            for name, watch in self._devices.monitors.items()
         ]
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
@@ -116,12 +116,12 @@ class Interlock:
         return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
 
     def _line(self) -> Dependency:
-        age_s = self._orders.line_age_s
+        age_s = self._plc_commands.line_age_s
         if age_s is None:
             return Dependency(
                 "plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run"
             )
-        if trouble := self._orders.line_fault():
+        if trouble := self._plc_commands.line_fault():
             return Dependency("plc", "fault", age_s, trouble, "see the detail")
         return Dependency("plc", "ok", age_s)
 
@@ -129,7 +129,7 @@ class Interlock:
         if self._service.state not in _DEVICES_DECIDE:
             return ""
         faults = [
-            *self._crew.faults.values(),
+            *self._devices.faults.values(),
             *([self._service.registry.fault] if self._service.registry.fault else []),
         ]
         return str(faults[0]) if faults else ""

@@ -55,7 +55,7 @@ class RecentInspections:
     """Recent inspections in memory; the records have all of them."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[int, _Recent] = OrderedDict()
+        self._by_sequence: OrderedDict[int, _Recent] = OrderedDict()
         self._short: deque[FruitShort] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
         self._turn = asyncio.Lock()
@@ -76,7 +76,7 @@ class RecentInspections:
             lots: count of each outcome, by lot.
         """
         self._short.extend(short)
-        self._kept.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
+        self._by_sequence.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
 
     def add(self, now: Inspection) -> None:
@@ -84,9 +84,9 @@ class RecentInspections:
         if now.standing is None:
             return
         fruit, look = _new_fruit(now, now.standing)
-        self._kept[fruit.short.sequence] = _Recent(fruit, look)
-        while len(self._kept) > MOST_IN_FULL:
-            self._kept.popitem(last=False)
+        self._by_sequence[fruit.short.sequence] = _Recent(fruit, look)
+        while len(self._by_sequence) > MOST_IN_FULL:
+            self._by_sequence.popitem(last=False)
         self._short.append(fruit.short)
         self._lots.setdefault(fruit.short.lot, Counter())[fruit.short.outcome] += 1
         while len(self._lots) > MOST_IN_FULL:
@@ -94,7 +94,7 @@ class RecentInspections:
 
     def set_outcome(self, outcome: Outcome) -> None:
         """Set the outcome that was published to the PLC; it overrides the station's own result."""
-        kept = self._kept.get(outcome.sequence)
+        kept = self._by_sequence.get(outcome.sequence)
         if kept is None or kept.fruit.short.outcome == outcome.outcome:
             return
         before = kept.fruit.short
@@ -145,19 +145,19 @@ class RecentInspections:
         return kept.picture
 
     def _find(self, sequence: int) -> _Recent:
-        kept = self._kept.get(sequence)
+        kept = self._by_sequence.get(sequence)
         if kept is None:
             raise NotRecentError(f"inspection {sequence} is not among the last {MOST_IN_FULL}: look into the history")
         return kept
 
 
 def fruit_view(
-    standing: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
+    published: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
 ) -> Fruit:
     """Make the page's view of a fruit.
 
     Args:
-        standing: as published to the PLC.
+        published: as published to the PLC.
         record: the station's own result.
         deadline_s: longest duration of the inspection.
         picture: step that has a picture.
@@ -166,7 +166,7 @@ def fruit_view(
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
     factor = limit_factor(record.measures)
     return Fruit(
-        short=short_view(standing, recipe.name, [point.area_mm2 for point in points]),
+        short=short_view(published, recipe.name, [point.area_mm2 for point in points]),
         explanation=record.explanation,
         recipe_title=recipe.title,
         revision=revision,
@@ -195,34 +195,34 @@ def fruit_view(
     )
 
 
-def short_view(standing: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
+def short_view(published: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitShort:
     """Make the view of a fruit in a list.
 
     Args:
-        standing: as published to the PLC.
+        published: as published to the PLC.
         recipe: the recipe's name.
         areas_mm2: of the steps since the contact onset.
     """
     return FruitShort(
-        sequence=standing.sequence,
-        outcome=standing.outcome,
-        reasons=tuple(map(str, standing.reasons)),
-        ended_utc_ms=standing.ended_utc_ms,
-        duration_ms=standing.duration_ms,
+        sequence=published.sequence,
+        outcome=published.outcome,
+        reasons=tuple(map(str, published.reasons)),
+        ended_utc_ms=published.ended_utc_ms,
+        duration_ms=published.duration_ms,
         recipe=recipe,
-        lot=standing.lot,
-        area_mm2=standing.area_mm2,
-        closing_mm=standing.closing_mm,
+        lot=published.lot,
+        area_mm2=published.area_mm2,
+        closing_mm=published.closing_mm,
         areas_mm2=tuple(round(area_mm2 or 0.0, 2) for area_mm2 in areas_mm2),
     )
 
 
-def _new_fruit(now: Inspection, standing: Outcome) -> tuple[Fruit, ReadStep | None]:
+def _new_fruit(now: Inspection, published: Outcome) -> tuple[Fruit, ReadStep | None]:
     """Make the view of a new fruit, with the picture of its deciding step."""
     record, revision = now.record(), now.active.snapshot.revision
     step = deciding_step(record)
     look = None if step is None else _step_reader(now.seen[step])
-    return fruit_view(standing, record, now.active.recipe, revision, now.limits.inspection_s, step), look
+    return fruit_view(published, record, now.active.recipe, revision, now.limits.inspection_s, step), look
 
 
 def deciding_step(record: InspectionRecord) -> int | None:

@@ -63,12 +63,12 @@ class GoldenReference:
     the gel or its cleaning, a person removes the file and the next reference replaces it.
 
     Args:
-        kept: state files of the home folder.
+        state_files: state files of the home folder.
         calibrated: returns the calibration's file; None if there is none.
     """
 
-    def __init__(self, kept: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
-        self._kept, self._calibrated = kept, calibrated
+    def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+        self._state_files, self._calibrated = state_files, calibrated
         self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
 
     def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
@@ -99,14 +99,14 @@ class GoldenReference:
             image: shape (height, width, 3), dtype uint8, BGR.
         """
         if self._read()[0] is None:
-            self._kept.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+            self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
 
     def _read(self) -> tuple[bytes | None, str]:
         """Return its file's content, and the instruction to make another one."""
         calibrated = self._calibrated()
-        if calibrated is not None and (data := self._kept.read(str(calibrated))) is not None:
+        if calibrated is not None and (data := self._state_files.read(str(calibrated))) is not None:
             return data, "calibrate"
-        return self._kept.read(GOLDEN), f"remove {GOLDEN} from the home folder"
+        return self._state_files.read(GOLDEN), f"remove {GOLDEN} from the home folder"
 
 
 def check_reference(image: Image, golden: PreparedReference | None, settings: ReferenceSettings) -> ReferenceProperties:

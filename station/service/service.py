@@ -38,7 +38,7 @@ class Service:
     """Performer of the cycle, and server of the line's requests.
 
     Args:
-        crew: the devices; gets the start and end of inspections.
+        devices: the devices; gets the start and end of inspections.
         inspector: carries out what needs the devices.
         alarms: raised and cleared by the cycle.
         liveness: gets the cycle's progress.
@@ -50,7 +50,7 @@ class Service:
         self,
         configuration: Configuration,
         records: Records,
-        crew: DeviceManager,
+        devices: DeviceManager,
         inspector: Inspector,
         alarms: AlarmManager,
         metrics: Metrics,
@@ -60,22 +60,22 @@ class Service:
     ) -> None:
         self._settings, self._calibrated = configuration.service, calibrated
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
-        self._crew, self._inspector = crew, inspector
+        self._devices, self._inspector = devices, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
         self.conductor = Conductor(self)
         self.triggers = RecentTriggers()
-        self.registry = InspectionRegistry(records, self.triggers, crew, versions)
-        self.pacing = Pacing(configuration, crew.cell)
+        self.registry = InspectionRegistry(records, self.triggers, devices, versions)
+        self.pacing = Pacing(configuration, devices.cell)
         self.active: ActiveRecipe | None = None
         """The recipe that the next fruit is inspected with."""
         self.reset_wanted = self._settings.automatic_reset
         """Whether a stopped station makes itself ready."""
         self.stop_requested = False
-        """The process is told to end."""
+        """The end of the process was requested."""
         self.stop_wanted = False
         """A person has stopped the station, until the next reset."""
         self.on_published: Callable[[Outcome], None] = lambda _: None
-        """Told of what the PLC was told, once."""
+        """Called once with every outcome that the PLC was given."""
         self._pending: PendingTrigger | None = None
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
@@ -88,7 +88,7 @@ class Service:
         """Return the cycle's state."""
         return self.conductor.state
 
-    # What the line asks.
+    # Requests of the line.
 
     async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> Begun:
         """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
@@ -109,7 +109,7 @@ class Service:
                 lot,
                 utc_ms(),
                 self.active.snapshot,
-                self._crew.simulated,
+                self._devices.simulated,
                 request.fruit_length_mm_x10,
                 request.size_class,
             )
@@ -138,7 +138,7 @@ class Service:
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
 
-    # What the cycle asks: see `Performer`.
+    # Actions of the cycle: see `Performer`.
 
     def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
         """Carry out an action of the cycle."""
@@ -161,7 +161,7 @@ class Service:
             case Action.REFUSE_TRIGGER:
                 self._refuse(because)
                 return None
-            case Action.READ_DEVICES:  # the watches read for ever, and `tick` tells when all are well
+            case Action.READ_DEVICES:  # the monitors read for ever, and `tick` posts the event when all are healthy
                 return None
             case _:
                 pass
@@ -184,7 +184,7 @@ class Service:
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
-        await self._crew.halt()
+        await self._devices.halt()
 
     def raise_alarm(self, told: Raise, why: str) -> None:
         """Raise an alarm of the cycle."""
@@ -192,7 +192,7 @@ class Service:
 
     def failed(self, fault: StationError) -> None:
         """Report a fault to the device's monitor before the cycle reads the devices' state."""
-        self._crew.report_fault(fault)
+        self._devices.report_fault(fault)
 
     def refused(self, state: State, event: Event) -> None:
         """Count an event that the table does not list; a trigger among them is answered."""
@@ -206,7 +206,7 @@ class Service:
         if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
-        self._crew.use(by_inspection=inspecting_now)
+        self._devices.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
@@ -219,7 +219,7 @@ class Service:
         """Feed the watchdogs, and give the cycle the events of elapsed time."""
         self._liveness.progress(CYCLE)
         if not self._liveness.stuck():
-            self._crew.renew_health(_LEASE_S)
+            self._devices.renew_health(_LEASE_S)
         self._report_late()
         if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._told_late is None:
             self._told_late = self.state
@@ -239,13 +239,13 @@ class Service:
     async def _check(self) -> Event:
         if self.stop_requested or self.stop_wanted:
             return Event.STOP
-        for fault in (*self._crew.faults.values(), self.registry.fault):
+        for fault in (*self._devices.faults.values(), self.registry.fault):
             if fault is not None:
                 raise fault
         return Event.READY
 
     async def _recover_arm(self) -> Event:
-        await self._crew.restart_program()
+        await self._devices.restart_program()
         return Event.RECOVERED
 
     async def _record_trigger(self) -> Event | None:
@@ -314,5 +314,5 @@ class Service:
             self.conductor.post(found.event, why)
 
     async def _close_refused(self) -> None:
-        with contextlib.suppress(RecordsError):  # which the ledger keeps, and the next clearing tries again
+        with contextlib.suppress(RecordsError):  # the registry still has it, and the next clearing tries again
             await self.registry.close_unfinished()

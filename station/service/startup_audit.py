@@ -15,21 +15,21 @@ _HIDDEN = ("password", "secret", "token", "pin")
 
 
 def start_entries(
-    boot: str, configuration: Configuration, kept: StateFiles, versions: Mapping[str, str], broken: str
+    boot: str, configuration: Configuration, state_files: StateFiles, versions: Mapping[str, str], broken: str
 ) -> tuple[AuditEntry, ...]:
     """Make the entries of a start, with the settings that changed since the previous start.
 
     Args:
         boot: name of this start.
         configuration: in force.
-        kept: stores the configuration of the last start.
+        state_files: stores the configuration of the last start.
         versions: of the programs.
         broken: error of the configuration's file; its last good form is in force then.
     """
     values = dict(_flat(configuration.model_dump(mode="json"), ""))
     text = json.dumps(values, sort_keys=True)
-    before = json.loads(kept.read(_LAST) or b"null")
-    kept.write(_LAST, text.encode())
+    before = json.loads(state_files.read(_LAST) or b"null")
+    state_files.write(_LAST, text.encode())
     sha256 = hashlib.sha256(text.encode()).hexdigest()
     told = {"boot": boot, "configuration_sha256": sha256, **versions} | ({"broken": broken} if broken else {})
     start = AuditEntry(STATION, STATION, "service.started", "station", "", None, told)
@@ -45,7 +45,7 @@ def end_entry(boot: str, *, requested: bool) -> AuditEntry:
 
     Args:
         boot: name of the start.
-        asked: the end was requested, and is not caused by a failure.
+        requested: the end was requested, and is not caused by a failure.
     """
     return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})
 

@@ -1,6 +1,6 @@
 """Gauge study with fruit: the same fruit laid in, gripped and judged repeatedly on the twin.
 
-An operator stands for all that differs when another person sets the cell up on another day: another sensor unit,
+An operator represents all that differs when another person sets the cell up on another day: another sensor unit,
 another zero of the gripper, another habit of laying fruit in, and each fruit laid in anew. A repeat grips the same
 fruit in its place.
 """

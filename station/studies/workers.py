@@ -83,7 +83,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
         address: of the scheduler, such as `tcp://10.0.0.5:8786`.
 
     Raises:
-        BadInputError: Dask is not installed here, or nobody answers at the address.
+        BadInputError: Dask is not installed here, or the address does not answer.
         StationError: the cluster failed while it measured.
     """
     try:

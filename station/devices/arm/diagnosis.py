@@ -31,13 +31,13 @@ def from_state(snapshot: Snapshot) -> ArmFault | None:
     return None
 
 
-def diagnose(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healthy: bool) -> ArmFault:
+def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: str, *, was_healthy: bool) -> ArmFault:
     """Return the cause why a command was not done or no program plays.
 
     Args:
         snapshot: the controller's state.
         facts: of its dashboard server.
-        words: ur-rtde's output, if any.
+        output: ur-rtde's output, if any.
         was_healthy: the station's health lease was renewed without a gap.
     """
     fault = from_state(snapshot)
@@ -46,10 +46,10 @@ def diagnose(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healt
     if not facts.remote:
         return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
     if snapshot.runtime_state == PLAYING:
-        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {words}".rstrip())
+        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {output}".rstrip())
     if not was_healthy:
         return ArmFault(ArmCause.WATCHDOG, "the controller's watchdog stopped the program: the station was not healthy")
-    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {words}".rstrip())
+    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {output}".rstrip())
 
 
 def from_output(words: str) -> ArmFault | None:

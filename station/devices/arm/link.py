@@ -210,7 +210,7 @@ class ArmLink:
             self._set(None)
 
     async def _free_to_move(self, process: ArmProcess) -> Snapshot:
-        # The RTDE state may lag a little behind what the dashboard server has just said.
+        # The RTDE state may lag a little behind the dashboard server's reply.
         deadline_s = time.monotonic() + SETTLE_S
         while True:
             snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
@@ -228,7 +228,7 @@ class ArmLink:
                     await self._step()
                 except ArmFault as fault:
                     await self._lose(fault)
-                except Exception as error:  # the link outlives whatever else goes wrong with it
+                except Exception as error:  # the link outlives any other failure
                     log.exception("the arm's link")
                     await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
             await asyncio.sleep(self._pause_s())
@@ -269,7 +269,7 @@ class ArmLink:
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):
-            pass  # whether anybody is there at all is asked before a start is spent on it
+            pass  # check that a controller answers before a start is spent on it
         now_s = time.monotonic()
         while self._starts_s and now_s - self._starts_s[0] > self._settings.restart_window_s:
             self._starts_s.popleft()
@@ -300,7 +300,7 @@ class ArmLink:
             self._store_or_raise(await self._explain(outcome.words))
         else:
             # The lease that the process knew may have run out while the connection was made: renew it before the
-            # watchdog that has just been set up looks for a kick. Whether it answers is the next beat's matter.
+            # watchdog that has just been set up expects a kick. The next beat checks whether it answers.
             with contextlib.suppress(ArmFault):
                 await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
@@ -314,15 +314,15 @@ class ArmLink:
         snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
         return diagnose(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
-    async def explain(self, words: str) -> ArmFault:
+    async def explain(self, output: str) -> ArmFault:
         """Return the cause why a command was not done; it becomes the link's fault.
 
         Args:
-            words: ur-rtde's output.
+            output: ur-rtde's output.
         """
         async with self._lock:
             try:
-                fault = await self._explain(words)
+                fault = await self._explain(output)
                 self._store_or_raise(fault)
             except ArmFault as lost:
                 fault = lost

@@ -60,7 +60,7 @@ class UrRtdeProcess:
         """Open the receiving connection; this holds the interpreter's lock until it is open."""
         try:
             self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         return Outcome(done=True)
 
@@ -68,7 +68,7 @@ class UrRtdeProcess:
         """Open the commanding connection; this holds the interpreter's lock until it is open."""
         try:
             control = RTDEControlInterface(self._host, self._frequency_hz)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         self._control = control
         self._set_up = request
@@ -202,7 +202,7 @@ class UrRtdeProcess:
     async def _on_arm(self, call: Callable[[], bool]) -> Outcome:
         try:
             done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         return Outcome(done=bool(done))
 

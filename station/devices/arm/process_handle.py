@@ -77,7 +77,7 @@ class ArmProcess:
     async def _start(endpoint: str, host: str, frequency_hz: float) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(
             sys.executable,
-            "-P",  # a folder named `station` where the caller stands is not this package
+            "-P",  # a folder named `station` in the working directory is not this package
             "-m",
             "station.devices.arm.process",
             endpoint,

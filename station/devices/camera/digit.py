@@ -230,7 +230,7 @@ class DigitCamera:
                 self._capture(loop)
             except CameraError as error:
                 self._feed.trouble = str(error)
-            except Exception as error:  # noqa: BLE001 (whatever OpenCV throws, the sensor is looked for again)
+            except Exception as error:  # noqa: BLE001 (after any error of OpenCV the sensor is searched again)
                 self._feed.trouble = f"reading it failed: {error}"
             self._stopping.wait(_RETRY_S)
 

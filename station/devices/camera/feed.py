@@ -26,7 +26,7 @@ class FrameFeed:
         self._sequence = 0
         self._given: Frame | None = None
         self.trouble = "it has sent nothing yet"
-        """What the driver has had to struggle with since the last frame; said where no frame comes."""
+        """The driver's faults since the last frame; part of the message if no frame comes."""
 
     def publish(
         self, image: Image, captured_s: float, width_mm: float | None = None, sequence: int | None = None

@@ -29,7 +29,7 @@ _AMPERE_PER_COUNT = 0.01
 
 _Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
-# Every failure is told by an error of the gripper. Unhandled, pymodbus' own lines would go to stderr; a program that
+# Every failure becomes a gripper error. Unhandled, pymodbus' own lines would go to stderr; a program that
 # sets up logging still gets them.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
