@@ -19,7 +19,7 @@ from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
 from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
-from station.calibration.rig import Place, Progress, Rig, Tell, Unit
+from station.calibration.rig import OnProgress, Place, Progress, Rig, Unit
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
@@ -93,7 +93,7 @@ class CalibrationProcedure:
         places: Sequence[Place],
         operator: str,
         program: str,
-        on_progress: Tell,
+        on_progress: OnProgress,
     ) -> None:
         self._rig, self._unit, self._recipe, self._settings = rig, unit, recipe, settings
         self._places = [Place(0.0, 0.0), *places]

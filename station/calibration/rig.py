@@ -67,5 +67,5 @@ class Progress(NamedTuple):
     detail: str
 
 
-Tell = Callable[[Progress], None]
+OnProgress = Callable[[Progress], None]
 """Called with every progress."""

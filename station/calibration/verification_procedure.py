@@ -11,7 +11,7 @@ from station.calibration.checks import verification_checks
 from station.calibration.gel import REMEDIES, Finding, GelFault
 from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
-from station.calibration.rig import Progress, Rig, Tell
+from station.calibration.rig import OnProgress, Progress, Rig
 from station.calibration.store import press_name
 from station.errors import StationError
 from station.settings.calibration import CalibrationSettings
@@ -60,7 +60,7 @@ class VerificationProcedure:
         golden: Image,
         presses: Sequence[Image],
         operator: str,
-        on_progress: Tell,
+        on_progress: OnProgress,
     ) -> None:
         self._rig, self._recipe, self._settings = rig, recipe, settings
         self._calibration, self._golden, self._presses = calibration, golden, presses

@@ -64,7 +64,7 @@ class Publisher:
     def __init__(self, folder: Path, station: str, destination: Destination, longest_pause_s: float) -> None:
         self.destination = destination
         self._folder, self._station, self._longest_pause_s = folder, station, longest_pause_s
-        self._told = 0
+        self._published = 0
         self._position: int | None = None
         self._waiting: int | None = None
         self._oldest_utc_ms: int | None = None
@@ -93,7 +93,7 @@ class Publisher:
         """Return the destination's status."""
         return DestinationStatus(
             connected=self._connected,
-            told=self._told,
+            told=self._published,
             refused=self.destination.refused,
             waiting=self._waiting,
             oldest_utc_ms=self._oldest_utc_ms,
@@ -119,7 +119,7 @@ class Publisher:
             if batch.up_to > position:
                 await session.publish(batch)
                 position = batch.up_to
-                self._told += len(batch.events)
+                self._published += len(batch.events)
                 self._waiting, self._position = batch.last - position, position
             yield batch
             if batch.last == position:

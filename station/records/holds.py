@@ -35,9 +35,9 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
         RecordsError: there is no such inspection or lot, or no reason is given.
     """
     _given(reason)
-    standing = _active(connection, thing)
-    if standing is not None:
-        return standing
+    active = _active(connection, thing)
+    if active is not None:
+        return active
     table = inspections.c
     condition = table.sequence == thing if isinstance(thing, int) else table.lot == thing
     if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
@@ -59,15 +59,15 @@ def release(connection: Connection, thing: int | str, reason: str, by: str) -> H
         RecordsError: it is not held, or no reason is given.
     """
     _given(reason)
-    standing = _active(connection, thing)
-    if standing is None:
+    active = _active(connection, thing)
+    if active is None:
         raise RecordsError(f"{_named(thing)} is not on hold", "`station records holds` shows what is")
     connection.execute(
         update(holds)
         .where(_is(thing), holds.c.released_utc_ms.is_(None))
         .values(released_utc_ms=utc_ms(), released_by=by, release_reason=reason)
     )
-    return standing
+    return active
 
 
 def read_holds(connection: Connection) -> list[Hold]:

@@ -84,24 +84,24 @@ class ActiveRecipes:
     def read(self) -> None:
         """Read files and history again. Blocks for some milliseconds a file."""
         self._signature = self._store.signature()
-        kept, begun = self._stored_controls(), True
+        stored, begun = self._stored_controls(), True
         try:
-            self._store.begin({name: control.recipe for name, control in kept.items()})
+            self._store.begin({name: control.recipe for name, control in stored.items()})
         except (RecordsError, RecipeStoreError, SettingsError) as error:
             begun = False
             log.warning("the recipes' history was not continued: %s", error)
         try:
-            standings, broken = self._store.read()
+            states, broken = self._store.read()
         except RecordsError as error:
-            standings, broken = (), (f"the recipes in force are those kept in {_CONTROLS}: {error}",)
-        controls = {each.name: each.control for each in standings if each.control is not None}
+            states, broken = (), (f"the recipes in force are those kept in {_CONTROLS}: {error}",)
+        controls = {each.name: each.control for each in states if each.control is not None}
         if not begun and not controls:
             self.problems = broken
-            self._take(kept.values())
+            self._take(stored.values())
             return
-        self._audit_files(standings)
-        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in standings if each.note)]))
-        gone = {each.name for each in standings if each.file_state is FileState.MISSING}
+        self._audit_files(states)
+        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in states if each.note)]))
+        gone = {each.name for each in states if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
         self._store_controls(controls)
 
@@ -176,21 +176,21 @@ class ActiveRecipes:
     def _take(self, controls: Iterable[Control]) -> None:
         self._controls = {control.recipe.plc_number: control for control in controls}
 
-    def _audit_files(self, standings: Iterable[RecipeState]) -> None:
+    def _audit_files(self, states: Iterable[RecipeState]) -> None:
         """Audit what was done to files without the commands, once for each content."""
-        for standing in standings:
-            file, control, submitted = standing.file, standing.control, standing.submitted
-            sha256 = str(standing.file_state) if file is None else content_sha256(file.recipe)
-            quiet = standing.file_state is FileState.APPROVED or (file is None and control is None)
-            if quiet or (standing.name, sha256) in self._noticed:
+        for state in states:
+            file, control, submitted = state.file, state.control, state.submitted
+            sha256 = str(state.file_state) if file is None else content_sha256(file.recipe)
+            quiet = state.file_state is FileState.APPROVED or (file is None and control is None)
+            if quiet or (state.name, sha256) in self._noticed:
                 continue
-            self._noticed.add((standing.name, sha256))
+            self._noticed.add((state.name, sha256))
             if file is not None and submitted is not None and submitted.recipe == file.recipe:
                 continue
-            changes = format_differences(control.recipe, file.recipe) if control and file else str(standing.file_state)
-            told = {"state": str(standing.file_state), "sha256": sha256, "changes": changes}
+            changes = format_differences(control.recipe, file.recipe) if control and file else str(state.file_state)
+            told = {"state": str(state.file_state), "sha256": sha256, "changes": changes}
             entry = AuditEntry(
-                STATION, STATION, "recipe.file_noticed", f"recipe {standing.name}", standing.note[:900], None, told
+                STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", state.note[:900], None, told
             )
             self.noticed.append(entry)
 

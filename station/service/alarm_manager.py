@@ -91,7 +91,7 @@ class AlarmManager:
         self._alarms = Alarms()
         self._metrics = metrics
         self._present: set[AlarmId] = set()
-        self._told: dict[str, AlarmId | None] = {}
+        self._device_alarms: dict[str, AlarmId | None] = {}
         """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
         self._unsaved: list[AlarmEntry] = []
         self._changed = asyncio.Event()
@@ -136,9 +136,9 @@ class AlarmManager:
             fault: None if the device is healthy.
         """
         told = None if fault is None else alarm_of(device, fault)
-        before, self._told[device] = self._told.get(device), told
+        before, self._device_alarms[device] = self._device_alarms.get(device), told
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
-            if alarm not in self._told.values():
+            if alarm not in self._device_alarms.values():
                 self.clear(alarm)
         if told is not None:
             self.raise_(told, str(fault))

@@ -29,7 +29,7 @@ class AuditLogger:
     def __init__(self, records: Records) -> None:
         self._records = records
         self._waiting: list[AuditEntry] = []
-        self._told = asyncio.Event()
+        self._queued = asyncio.Event()
         self._writing = asyncio.Lock()
 
     def log(self, *entries: AuditEntry) -> None:
@@ -41,7 +41,7 @@ class AuditLogger:
         self._waiting += entries
         if len(self._waiting) > MOST_WAITING:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
-        self._told.set()
+        self._queued.set()
 
     def log_command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
         """Queue the entry of a command that was carried out or refused.
@@ -60,11 +60,11 @@ class AuditLogger:
     async def run(self) -> None:
         """Write the queue until cancelled."""
         while True:
-            await self._told.wait()
-            self._told.clear()
+            await self._queued.wait()
+            self._queued.clear()
             if not await self._write():
                 await asyncio.sleep(RETRY_S)
-                self._told.set()
+                self._queued.set()
 
     async def flush(self) -> None:
         """Write the queue once; what cannot be written is logged."""

@@ -59,20 +59,20 @@ class DeviceManager:
         )
         self.confirmed_clear = False
         """A person has confirmed that nothing is between the jaws; valid for one activation."""
-        self._bad_frames, self._stale_looks = 0, 0
+        self._bad_frames, self._stale_checks = 0, 0
         self._not_activated: StationError | None = None
-        looks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
+        checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
         if arm is not None:
-            looks[ARM] = self._check_arm
+            checks[ARM] = self._check_arm
         self.monitors = {
             name: DeviceMonitor(
                 name,
-                look,
+                check,
                 _ARM_PAUSE_S if name == ARM else configuration.service.retry_longest_s,
                 lambda fault, name=name: on_change(name, fault),
                 lambda name=name: on_progress(name),
             )
-            for name, look in looks.items()
+            for name, check in checks.items()
         }
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -266,8 +266,8 @@ class DeviceManager:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
         fault = (await self._arm.state()).fault
         stale = fault is not None and fault.cause is ArmCause.STALE
-        self._stale_looks = self._stale_looks + 1 if stale else 0
-        if fault is not None and not 0 < self._stale_looks < _STALE_CHECKS:
+        self._stale_checks = self._stale_checks + 1 if stale else 0
+        if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:
             raise fault
 
 

@@ -14,7 +14,7 @@ MEETING_S = 15.0
 
 log = logging.getLogger(__name__)
 
-Look = Callable[[], Awaitable[None]]
+Check = Callable[[], Awaitable[None]]
 """Checks the device; raises its fault. It returns in time, whatever the device does."""
 
 
@@ -36,7 +36,7 @@ class DeviceMonitor:
     def __init__(
         self,
         name: str,
-        check: Look,
+        check: Check,
         longest_pause_s: float,
         on_change: Callable[[StationError | None], None],
         on_progress: Callable[[], None],

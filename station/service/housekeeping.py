@@ -79,7 +79,7 @@ class Housekeeping:
         self._hmi_fault = hmi_fault
         self._book_at_s, self._outbox = time.monotonic(), outbox
         self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
-        self._told_ready_s = 0.0
+        self._logged_ready_s = 0.0
         self._alarms_at_s = 0.0
         self._clock_offset_s = time.time() - time.monotonic()
         self._pause_s, self._again_s = PERIOD_S, 0.0
@@ -112,8 +112,12 @@ class Housekeeping:
         service = self._service
         await self._try_recovery()
         entered_s = service.conductor.entered_s
-        if service.registry.fault is None and self._told_ready_s < entered_s and self._devices.healthy_since(entered_s):
-            self._told_ready_s = time.monotonic()
+        if (
+            service.registry.fault is None
+            and self._logged_ready_s < entered_s
+            and self._devices.healthy_since(entered_s)
+        ):
+            self._logged_ready_s = time.monotonic()
             service.conductor.post(Event.READY)
 
     async def _try_recovery(self) -> None:
@@ -175,7 +179,7 @@ class Housekeeping:
 
     def _count_restarts(self) -> None:
         many: list[str] = []
-        for name, program in restarts.told().items():
+        for name, program in restarts.logged().items():
             for _ in range(program.total - self._restarts_counted.get(name, 0)):
                 self._metrics.restarted(name)
             self._restarts_counted[name] = program.total

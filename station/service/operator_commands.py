@@ -65,7 +65,7 @@ class OperatorCommands:
         self._plc_commands, self._service, self._devices, self._lots = plc_commands, service, devices, lots
         self._records, self._audit = records, audit
         self._tickets = itertools.count(1)
-        self._shown: deque[OrderShown] = deque(maxlen=_REMEMBERED)
+        self._recent: deque[OrderShown] = deque(maxlen=_REMEMBERED)
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
     async def close(self) -> None:
@@ -77,7 +77,7 @@ class OperatorCommands:
     @property
     def recent(self) -> tuple[OrderShown, ...]:
         """Return the last commands, newest first."""
-        return tuple(reversed(self._shown))
+        return tuple(reversed(self._recent))
 
     @property
     def recoveries(self) -> tuple[RecoveryName, ...]:
@@ -105,7 +105,7 @@ class OperatorCommands:
     async def start(self, request: PanelOrder) -> OrderShown:
         """Start a command, and wait a moment for its end."""
         same = next((each for each in self.recent if _under_way(each, request)), None)
-        shown = same or OrderShown(
+        entry = same or OrderShown(
             ticket=next(self._tickets),
             order=request.order,
             argument=request.argument,
@@ -116,21 +116,21 @@ class OperatorCommands:
             ended_utc_ms=None,
         )
         if same is None:
-            self._shown.append(shown)
-            task = asyncio.create_task(self._follow(shown, request), name=f"order {request.order}")
-            self._tasks[shown.ticket] = task
-            task.add_done_callback(lambda _: self._tasks.pop(shown.ticket, None))
-        if (running := self._tasks.get(shown.ticket)) is not None:
+            self._recent.append(entry)
+            task = asyncio.create_task(self._follow(entry, request), name=f"order {request.order}")
+            self._tasks[entry.ticket] = task
+            task.add_done_callback(lambda _: self._tasks.pop(entry.ticket, None))
+        if (running := self._tasks.get(entry.ticket)) is not None:
             await asyncio.wait({running}, timeout=AT_ONCE_S)
-        return next((each for each in self._shown if each.ticket == shown.ticket), shown)
+        return next((each for each in self._recent if each.ticket == entry.ticket), entry)
 
-    async def _follow(self, shown: OrderShown, request: PanelOrder) -> None:
+    async def _follow(self, entry: OrderShown, request: PanelOrder) -> None:
         try:
             why = await self._execute(request)
         except StationError as error:
             why = str(error)
-        ended = shown.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
-        self._shown = deque((ended if each.ticket == shown.ticket else each for each in self._shown), _REMEMBERED)
+        ended = entry.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
+        self._recent = deque((ended if each.ticket == entry.ticket else each for each in self._recent), _REMEMBERED)
 
     async def _execute(self, request: PanelOrder) -> str:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
@@ -180,5 +180,5 @@ class OperatorCommands:
         return ""
 
 
-def _under_way(shown: OrderShown, request: PanelOrder) -> bool:
-    return shown.state == "executing" and (shown.order, shown.argument) == (request.order, request.argument)
+def _under_way(entry: OrderShown, request: PanelOrder) -> bool:
+    return entry.state == "executing" and (entry.order, entry.argument) == (request.order, request.argument)

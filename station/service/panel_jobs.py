@@ -22,7 +22,7 @@ from station.errors import StationError
 
 FOLDER = "panel_jobs"
 LONGEST_S = 1800.0
-KEPT = 8
+STORED_JOBS = 8
 """Number of the newest jobs whose files are stored."""
 MOST_WAITING = 4
 _STOP_S = 5.0
@@ -229,7 +229,7 @@ class PanelJobs:
 
     def _forget(self) -> None:
         over = [job for job in self._jobs.values() if not job.open]
-        for job in over[: max(0, len(self._jobs) - KEPT)]:
+        for job in over[: max(0, len(self._jobs) - STORED_JOBS)]:
             shutil.rmtree(job.folder, ignore_errors=True)
             del self._jobs[job.id]
 

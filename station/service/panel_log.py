@@ -6,7 +6,7 @@ from typing import Any, Self
 
 from station.channel.panel_maintenance_queries import LogLine
 
-KEPT = 1000
+STORED_LINES = 1000
 _LONGEST = 1000
 
 
@@ -15,8 +15,8 @@ class LogRing(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: deque[LogLine] = deque(maxlen=KEPT)
-        self._numbers: deque[int] = deque(maxlen=KEPT)
+        self._lines: deque[LogLine] = deque(maxlen=STORED_LINES)
+        self._numbers: deque[int] = deque(maxlen=STORED_LINES)
 
     def __enter__(self) -> Self:
         logging.getLogger().addHandler(self)

@@ -128,7 +128,7 @@ class PanelServer:
         self._heard_s = time.monotonic()
         service, line = self._service, self._interlock.state()
         facts, active = STATES[service.state], service.active
-        told = self._plc_commands.last_report
+        report = self._plc_commands.last_report
         return PanelState(
             boot=line.boot,
             utc_ms=utc_ms(),
@@ -146,8 +146,8 @@ class PanelServer:
             lot=self._lots.lot,
             named_lot=self._lots.named,
             plc_names_lots=self._lots.plc_names,
-            plc_connected=told is not None and told.plc_connected,
-            plc_alive=told is not None and told.plc_alive,
+            plc_connected=report is not None and report.plc_connected,
+            plc_alive=report is not None and report.plc_alive,
             line_trouble=self._plc_commands.line_fault(),
             check_due=self._calibrated.refusal(),
             alarms=self._alarms.active(),

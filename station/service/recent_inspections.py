@@ -94,12 +94,12 @@ class RecentInspections:
 
     def set_outcome(self, outcome: Outcome) -> None:
         """Set the outcome that was published to the PLC; it overrides the station's own result."""
-        kept = self._by_sequence.get(outcome.sequence)
-        if kept is None or kept.fruit.short.outcome == outcome.outcome:
+        entry = self._by_sequence.get(outcome.sequence)
+        if entry is None or entry.fruit.short.outcome == outcome.outcome:
             return
-        before = kept.fruit.short
+        before = entry.fruit.short
         now = before.model_copy(update={"outcome": outcome.outcome, "reasons": tuple(map(str, outcome.reasons))})
-        kept.fruit = kept.fruit.model_copy(update={"short": now})
+        entry.fruit = entry.fruit.model_copy(update={"short": now})
         self._short = deque((now if each.sequence == now.sequence else each for each in self._short), MOST_IN_SHORT)
         if (counted := self._lots.get(before.lot)) is not None:
             counted.subtract([before.outcome])
@@ -136,19 +136,19 @@ class RecentInspections:
         Raises:
             NotRecentError: it is not among them, or has no image.
         """
-        kept = self._find(sequence)
+        entry = self._find(sequence)
         async with self._turn:
-            if kept.picture is None and kept.look is not None:
-                kept.picture, kept.look = await asyncio.to_thread(_picture, kept.look), None
-        if kept.picture is None:
+            if entry.picture is None and entry.look is not None:
+                entry.picture, entry.look = await asyncio.to_thread(_picture, entry.look), None
+        if entry.picture is None:
             raise NotRecentError(f"no picture was taken of inspection {sequence}")
-        return kept.picture
+        return entry.picture
 
     def _find(self, sequence: int) -> _Recent:
-        kept = self._by_sequence.get(sequence)
-        if kept is None:
+        entry = self._by_sequence.get(sequence)
+        if entry is None:
             raise NotRecentError(f"inspection {sequence} is not among the last {MOST_IN_FULL}: look into the history")
-        return kept
+        return entry
 
 
 def fruit_view(

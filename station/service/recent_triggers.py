@@ -36,8 +36,8 @@ class RecentTriggers:
         """
         assert now.sequence is not None  # noqa: S101 (it is durable)
         self._last = (request, now.sequence)
-        for told in self._inspections.values():
-            told.forget_pictures()
+        for earlier in self._inspections.values():
+            earlier.forget_pictures()
         self._inspections[now.sequence] = now
         self._outcomes[now.sequence] = asyncio.get_running_loop().create_future()
         while len(self._outcomes) > _REMEMBERED:

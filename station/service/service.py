@@ -80,7 +80,7 @@ class Service:
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
         self._background: set[asyncio.Task[None]] = set()
-        self._told_late: State | None = None
+        self._late_in: State | None = None
         self._outcomes = OutcomeMonitor(alarms)
 
     @property
@@ -202,7 +202,7 @@ class Service:
 
     def entered(self, state: State, after: State, took_s: float) -> None:
         """Store the phase's time, and do what depends on the new state."""
-        self._told_late = None
+        self._late_in = None
         if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
@@ -221,8 +221,8 @@ class Service:
         if not self._liveness.stuck():
             self._devices.renew_health(_LEASE_S)
         self._report_late()
-        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._told_late is None:
-            self._told_late = self.state
+        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+            self._late_in = self.state
             self.conductor.post(Event.STOP, "the station is told to end")
 
     def device_changed(self, fault: StationError | None) -> None:
@@ -304,11 +304,11 @@ class Service:
         return Begun(refusal=refusal)
 
     def _report_late(self) -> None:
-        if self._now is None or self._told_late is self.state:
+        if self._now is None or self._late_in is self.state:
             return
         found = late_now(self._now, self.state, self.conductor.in_state_s)
         if found is not None:
-            self._told_late = self.state
+            self._late_in = self.state
             what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
             why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
             self.conductor.post(found.event, why)

@@ -90,28 +90,28 @@ class Station:
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
         kept, alarms = StateFiles(configuration.home), AlarmManager(metrics)
-        calibrated = ActiveCalibration(configuration, lambda: crew.cell.camera.description.serial)
+        calibrated = ActiveCalibration(configuration, lambda: devices.cell.camera.description.serial)
         eye = VisionWorker(GoldenReference(kept, calibrated.golden), settings.reference)
         stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
-        trail = AuditLogger(records)
-        stack.push_async_callback(self._note_end, trail)
+        audit = AuditLogger(records)
+        stack.push_async_callback(self._note_end, audit)
         _register_scrapes(metrics, configuration, records, calibrated)
 
         def device_changed(name: str, fault: StationError | None) -> None:
-            alarms.set_device_fault(name, crew.monitors[name].reported_fault)
+            alarms.set_device_fault(name, devices.monitors[name].reported_fault)
             service.device_changed(fault)
 
         def progress(name: str) -> None:
             liveness.progress(name)
-            if crew.monitors[name].fault is None:
+            if devices.monitors[name].fault is None:
                 metrics.heard(name)
 
-        crew = DeviceManager(configuration, device_changed, progress)
-        inspector = Inspector(crew, eye, settings, configuration.arm, alarms, metrics, calibrated)
+        devices = DeviceManager(configuration, device_changed, progress)
+        inspector = Inspector(devices, eye, settings, configuration.arm, alarms, metrics, calibrated)
         self.service = service = Service(
-            configuration, records, crew, inspector, alarms, metrics, liveness, versions, calibrated
+            configuration, records, devices, inspector, alarms, metrics, liveness, versions, calibrated
         )
         try:
             await records.reopen()
@@ -120,21 +120,21 @@ class Station:
             service.registry.fault = error
         self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
-        lots = LotManager(service, book, trail)
+        lots = LotManager(service, book, audit)
         await asyncio.to_thread(lots.restore)
-        trail.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
-        orders = PlcCommands(service, crew, book, lots, trail, metrics, kept)
+        audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
+        orders = PlcCommands(service, devices, book, lots, audit, metrics, kept)
         orders.restore_stop()
-        gate = Interlock(self.boot, service, crew, orders, book, lots, liveness, calibrated)
-        alarm_orders = AlarmCommands(alarms, trail)
-        panel = PanelServer(gate, service, crew, lots, book, orders, records, alarm_orders, trail, calibrated)
+        interlock = Interlock(self.boot, service, devices, orders, book, lots, liveness, calibrated)
+        alarm_orders = AlarmCommands(alarms, audit)
+        panel = PanelServer(interlock, service, devices, lots, book, orders, records, alarm_orders, audit, calibrated)
         upkeep = Housekeeping(
             service,
-            crew,
-            gate,
+            devices,
+            interlock,
             orders,
             book,
-            trail,
+            audit,
             metrics,
             liveness,
             calibrated,
@@ -148,49 +148,51 @@ class Station:
             _with_folder(line_endpoint(configuration.handshake, configuration.home)),
             service,
             orders,
-            gate,
+            interlock,
             lots,
             alarm_orders,
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
-        rooms = PanelPages(configuration, records, service, crew, orders, gate, liveness, calibrated, trail, versions)
-        await self._serve(stack, panel, rooms)
+        pages = PanelPages(
+            configuration, records, service, devices, orders, interlock, liveness, calibrated, audit, versions
+        )
+        await self._serve(stack, panel, pages)
         health = HealthServer(
-            configuration.metrics.host, configuration.metrics.port, metrics, liveness, gate.readiness, versions
+            configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
         )
         port = await health.start()
         stack.push_async_callback(health.close)
-        await self._open_devices(stack, crew, rooms)
+        await self._open_devices(stack, devices, pages)
         tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.store_changes(records), "alarms' records")
-        self._begin(stack, trail.run(), "audit trail")
-        self._watch_progress(stack, liveness, (*crew.monitors, CYCLE, UPKEEP))
+        self._begin(stack, audit.run(), "audit trail")
+        self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, UPKEEP))
         return tuple(tasks), port
 
     @staticmethod
-    async def _open_devices(stack: contextlib.AsyncExitStack, crew: DeviceManager, rooms: PanelPages) -> None:
+    async def _open_devices(stack: contextlib.AsyncExitStack, devices: DeviceManager, pages: PanelPages) -> None:
         """Open the devices; manual motions from the panel end before the devices are closed."""
-        stack.push_async_callback(crew.close)
-        await stack.enter_async_context(rooms)
-        await crew.open()
+        stack.push_async_callback(devices.close)
+        await stack.enter_async_context(pages)
+        await devices.open()
 
-    async def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, rooms: PanelPages) -> None:
+    async def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
         await panel.restore()
         stack.push_async_callback(panel.close)
         endpoint = _with_folder(panel_endpoint(self._configuration.hmi, self._configuration.home))
-        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **rooms.handlers}).serve(), "panel server")
+        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **pages.handlers}).serve(), "panel server")
 
     def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
         for name in names:
             liveness.watch(name, self._configuration.service.progress_s)
         self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
 
-    async def _note_end(self, trail: AuditLogger) -> None:
+    async def _note_end(self, audit: AuditLogger) -> None:
         """Write the last audit entry of this start, if it can be written in time."""
-        trail.log(end_entry(self.boot, requested=self._stop.is_set()))
+        audit.log(end_entry(self.boot, requested=self._stop.is_set()))
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(FLUSH_S):
-                await trail.flush()
+                await audit.flush()
 
     async def _until_stop(self, needed: tuple[asyncio.Task[None], ...]) -> None:
         """Wait for the request to end; a required task that ends by a bug ends the process."""

@@ -86,13 +86,13 @@ class VisionWorker:
             self._method = self._tracker = None
             self._follows = False
             image = median_image([frame.image for frame in frames])
-            looks = check_reference(image, self._golden.prepared(segmentation), self._settings)
+            properties = check_reference(image, self._golden.prepared(segmentation), self._settings)
             self._golden.store_first(image)
             self._method, self._least_confidence = (
                 make_method([image], segmentation),
                 segmentation.robust.least_confidence,
             )
-            return image, looks
+            return image, properties
 
         return await self._do(take)
 

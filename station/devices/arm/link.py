@@ -43,7 +43,7 @@ class ArmLink:
         self._healthy_until_s = 0.0
         self._was_healthy = True
         self._lock = asyncio.Lock()
-        self._keeping: asyncio.Task[None] | None = None
+        self._maintaining: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         self.fault_since_s = 0.0
         """When the fault was seen, on the machine's monotonic clock."""
@@ -76,17 +76,17 @@ class ArmLink:
 
     async def open(self) -> None:
         """Start to maintain the link."""
-        if self._keeping is None:
+        if self._maintaining is None:
             self.renew_health(FIRST_LEASE_S)
             self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet"), None
-            self._keeping = asyncio.create_task(self._keep(), name="the arm's link")
+            self._maintaining = asyncio.create_task(self._keep(), name="the arm's link")
 
     async def close(self) -> None:
         """End the process. Idempotent."""
-        if self._keeping is not None:
-            self._keeping.cancel()
-            await asyncio.gather(self._keeping, return_exceptions=True)
-            self._keeping = None
+        if self._maintaining is not None:
+            self._maintaining.cancel()
+            await asyncio.gather(self._maintaining, return_exceptions=True)
+            self._maintaining = None
         async with self._lock:
             await self._drop()
         self._set(ArmFault(ArmCause.CLOSED, "the arm was closed"))
