@@ -1,1 +1,1 @@
-"""What-if: stored inspections judged by another recipe, and limits proposed from marked fruit."""
+"""Draft evaluation (what-if): stored inspections judged by another recipe, and limits proposed from marked fruit."""

@@ -1,4 +1,4 @@
-"""What-if report: one HTML file with its pictures inside, readable without network and station."""
+"""Report of a what-if: one HTML file with its pictures inside, readable without network and station."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""What-if runner: many inspections judged again on all cores, or on a Dask cluster."""
+"""Runner of a what-if: many inspections judged again on all cores, or on a Dask cluster."""
 
 import importlib
 import multiprocessing
