@@ -156,7 +156,7 @@ class _Video:
         self._path = path
         self._capture = cv2.VideoCapture(str(path))
         self.announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        """What the header says; an estimate in some formats, 0 in a broken file."""
+        """Frame count in the header; an estimate in some formats, 0 in a broken file."""
         self.count = self._count()
         self._next = 0
 

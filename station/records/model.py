@@ -197,4 +197,4 @@ class FullRecord:
     acknowledged_utc_ms: int | None
     images: tuple[StoredImage, ...]
     images_state: str
-    """`kept`, `not wanted`, or why there are none."""
+    """`kept`, `not wanted`, or the reason why none are stored."""

@@ -72,7 +72,7 @@ class Records:
     def __init__(self, folder: Path, settings: RecordsSettings, boot: str) -> None:
         self.folder = folder
         self.notices: tuple[Notice, ...] = ()
-        """What the last `open` or `reopen` found."""
+        """Findings of the last `open` or `reopen`."""
         self.lost: tuple[int, ...] = ()
         """The inspections that it ended with `station_lost`."""
         self._settings = settings

@@ -103,7 +103,7 @@ hours = Table(
     Column("hour", Integer, nullable=False),
     Index("ix_hours_hour", "hour"),
 )
-"""Where the UTC hour of the begin (ms // 3,600,000) changes from one number to the next: a span goes on to the number
+"""Changes of the UTC hour of the begin (ms // 3,600,000) from one number to the next: a span goes on to the number
 before the next row's. So a time is found by number also where the clock stepped."""
 
 lots = Table(

@@ -34,7 +34,7 @@ SENTENCES: dict[Reason, str] = {
 
 
 def sparkline(values: Sequence[float | None]) -> str:
-    """A curve in one line of bars, from 0 to its largest value; a dot where there is no value.
+    """Draw a curve in one line of bars, from 0 to its largest value; a dot for a missing value.
 
     Args:
         values: as areas in mm², in the order of the steps.

@@ -24,7 +24,7 @@ class CalibrationInUse(NamedTuple):
 
 
 class CalibrationFigures(NamedTuple):
-    """Calibration figures for the metrics; None where there is no value."""
+    """Calibration figures for the metrics; None for a missing value."""
 
     age_s: float | None
     verification_age_s: float | None

@@ -26,11 +26,11 @@ class LotManager:
         self.lot: str | None = None
         """The lot under way; None before the first fruit of one."""
         self.named = ""
-        """The lot that a person has started at the panel, for fruit of which the PLC names none."""
+        """The lot that a person started at the panel, for fruit without a lot of the PLC."""
         self.plc_names = False
         """Whether the PLC named a lot with its last trigger."""
         self.mismatch = ""
-        """Why the last lot could not begin: PLC number, name and content of the recipe do not belong together."""
+        """Reason why the last lot could not begin: number, name and content of the recipe do not match."""
 
     def restore(self) -> None:
         """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""

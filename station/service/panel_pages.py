@@ -75,7 +75,7 @@ class PanelPages:
             **maintenance.handlers(),
             **self._ball.handlers(),
         }
-        """What answers each request."""
+        """Handler of each request."""
         self._open = contextlib.AsyncExitStack()
 
     async def __aenter__(self) -> Self:

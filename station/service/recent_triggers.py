@@ -87,7 +87,7 @@ class PendingTrigger:
     def __init__(self, request: Begin, inspection: Inspection) -> None:
         self.request, self.inspection = request, inspection
         self.recording: asyncio.Future[int] | None = None
-        """Makes it durable; where it is cancelled, the record is taken back."""
+        """Task that makes it durable; when it is cancelled, the record is withdrawn."""
         self._answer: asyncio.Future[Begun] = asyncio.get_running_loop().create_future()
 
     @property

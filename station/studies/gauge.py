@@ -119,7 +119,7 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
 
 
 def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]:
-    """The analysis of variance, with the interaction pooled where it is not significant."""
+    """Compute the analysis of variance, with the interaction pooled if it is not significant."""
     parts, operators, repeats = table.shape
     mean = table.mean()
     of_parts, of_operators = table.mean(axis=(1, 2)), table.mean(axis=(0, 2))

@@ -40,7 +40,7 @@ class UrArm:
         self._stopped = asyncio.Event()
         self._last_target: PoseName | None = None
         self._beside_rad: Six | None = None
-        """Where the arm was last sent beside the nest."""
+        """Last target beside the nest."""
         self._reachable: set[tuple[int, PoseName]] = set()
 
     async def __aenter__(self) -> Self:

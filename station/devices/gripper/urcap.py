@@ -26,7 +26,7 @@ _CONNECT_TIMEOUT_S = 2.0
 
 
 class UrcapLink:
-    """One connection to the URCap, kept open."""
+    """One persistent connection to the URCap."""
 
     def __init__(self, settings: UrcapSettings, answer_timeout_s: float) -> None:
         self._settings = settings
