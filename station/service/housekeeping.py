@@ -179,7 +179,7 @@ class Housekeeping:
 
     def _count_restarts(self) -> None:
         many: list[str] = []
-        for name, program in restarts.logged().items():
+        for name, program in restarts.told().items():
             for _ in range(program.total - self._restarts_counted.get(name, 0)):
                 self._metrics.restarted(name)
             self._restarts_counted[name] = program.total
