@@ -16,14 +16,14 @@ import cv2
 import numpy as np
 
 from station.calibration import figures
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import Calibrating, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
 from station.calibration.errors import RefusedError
-from station.calibration.verifying import Verifying
+from station.calibration.rig import Place, Unit
+from station.calibration.verification_procedure import VerificationProcedure
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.segmentation import Segmentation
-from station.studies.drawn_ball import DrawnBall
+from station.studies.simulated_rig import SimulatedRig
 from station.twin.digit.sensor import Image
 from station.vision.methods import make_method, median_image
 from station.vision.scale import TYPICAL_MM_PER_PX
@@ -41,7 +41,7 @@ UNIT = Unit("D00000", "drawn DIGIT", simulated=True)
 Step = tuple[float, Image]
 
 
-async def press(ball: DrawnBall) -> tuple[list[Image], list[Step]]:
+async def press(ball: SimulatedRig) -> tuple[list[Image], list[Step]]:
     """The paper's widths: the untouched gel's frames, then each width's mean image."""
     references = list(await ball.untouched(5))
     steps = []
@@ -57,7 +57,7 @@ def repeats() -> str:
     methods = {"robust": robust, "paper": robust.model_copy(update={"method": "paper"})}
     rising, ratios = dict.fromkeys(methods, 0), {name: [] for name in methods}
     for seed in range(REPEATS):
-        ball = DrawnBall(seed, unit=None if seed == 0 else seed, frames_per_step=3)
+        ball = SimulatedRig(seed, unit=None if seed == 0 else seed, frames_per_step=3)
         references, steps = asyncio.run(press(ball))
         for name, segmentation in methods.items():
             areas = measured(references, steps, segmentation)
@@ -83,17 +83,17 @@ def measured(references: Sequence[Image], steps: Sequence[Step], segmentation: S
     return [method.measure(image).area_px for _, image in steps]
 
 
-def calibrated(ball: DrawnBall, recipe: Recipe, places: Sequence[Place]) -> Draft:
+def calibrated(ball: SimulatedRig, recipe: Recipe, places: Sequence[Place]) -> Draft:
     """One calibration."""
     settings = CalibrationSettings()
-    return asyncio.run(Calibrating(ball, UNIT, recipe, settings, places, "bench", "0", lambda _: None).run())
+    return asyncio.run(CalibrationProcedure(ball, UNIT, recipe, settings, places, "bench", "0", lambda _: None).run())
 
 
 def scales(recipe: Recipe) -> tuple[str, list[Draft]]:
     """The scale found beside the true one and the usual one."""
     rows, drafts = [], []
     for seed, true_mm in enumerate(SCALES_MM):
-        ball = DrawnBall(seed, unit=seed, mm_per_px=true_mm, spill_mm=SPILL_MM, frames_per_step=3)
+        ball = SimulatedRig(seed, unit=seed, mm_per_px=true_mm, spill_mm=SPILL_MM, frames_per_step=3)
         try:
             draft = calibrated(ball, recipe, PLACES)
         except RefusedError as error:
@@ -119,8 +119,8 @@ def shifts(recipe: Recipe, draft: Draft, true_mm: float) -> str:
     calibration = draft.calibration
     passed, ratios, contrasts, onsets = 0, [], [], []
     for seed in range(SHIFTS):
-        ball = DrawnBall(100 + seed, unit=0, mm_per_px=true_mm, frames_per_step=3)
-        procedure = Verifying(ball, recipe, settings, calibration, golden, presses, "bench", lambda _: None)
+        ball = SimulatedRig(100 + seed, unit=0, mm_per_px=true_mm, frames_per_step=3)
+        procedure = VerificationProcedure(ball, recipe, settings, calibration, golden, presses, "bench", lambda _: None)
         verification = asyncio.run(procedure.run()).verification
         passed += verification.passed
         ratios.append(abs((verification.area_ratio or 0.0) - 1.0))

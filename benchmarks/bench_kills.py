@@ -26,9 +26,9 @@ import numpy as np
 from sqlalchemy import select as select_rows
 
 from station.records.audit import GENESIS, AuditEntry, row_of
-from station.records.checking import check_records
 from station.records.database import FILE_NAME, reading
 from station.records.images import FOLDER_NAME
+from station.records.integrity_check import check_records
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.records.schema import audit

@@ -20,9 +20,9 @@ from typing import Literal
 from archive.many import fill
 from archive.postgres import PORT, Server, programs, throwaway
 
-from station.outbox.feed import read_batch, text_of
+from station.outbox.feed import json_text, read_batch
 from station.outbox.postgresql import Postgresql
-from station.outbox.telling import Teller
+from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxPostgresqlSettings
 
 STATIONS = 3
@@ -70,7 +70,7 @@ async def tell(server: Server, home: Path, rows: int) -> tuple[float, dict[str, 
     names = [f"station-{number}" for number in range(STATIONS)]
     for name in names:
         fill(home / name, 1, each // 2, steps=4)
-    tellers = [Teller(home / name, name, Postgresql(settings, name), longest_pause_s=1.0) for name in names]
+    tellers = [Publisher(home / name, name, Postgresql(settings, name), longest_pause_s=1.0) for name in names]
     began_s = time.perf_counter()
     running = [asyncio.create_task(teller.run()) for teller in tellers]
     try:
@@ -110,7 +110,7 @@ def bare(server: Server, folder: Path, rows: int) -> float:
         while position < rows:
             batch = read_batch(folder, "bare", position)
             with connection.transaction():
-                told = [(event.entry, text_of(event.data)) for event in batch.events]
+                told = [(event.entry, json_text(event.data)) for event in batch.events]
                 cursor.executemany("INSERT INTO bare VALUES (%s, %s) ON CONFLICT DO NOTHING", told)
             position = batch.up_to
     return time.perf_counter() - began_s
@@ -125,7 +125,7 @@ def undisturbed(server: Server, folder: Path, rows: int) -> float:
             position = 0
             while position < rows:
                 batch = read_batch(folder, "alone", position)
-                await session.tell(batch)
+                await session.publish(batch)
                 position = batch.up_to
 
     began_s = time.perf_counter()

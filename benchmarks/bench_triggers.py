@@ -26,7 +26,7 @@ from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.records.database import reading, records_folder
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program

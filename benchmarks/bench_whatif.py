@@ -17,9 +17,9 @@ import numpy as np
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.records.database import reading
-from station.records.direct import writing
+from station.records.direct_transaction import direct_transaction
 from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
-from station.records.writing import conclude, insert_trigger
+from station.records.write_requests import conclude, insert_trigger
 from station.settings.recipe import find_recipe
 from station.settings.recipe_model import Recipe
 from station.whatif.runner import batches, run
@@ -49,7 +49,7 @@ def fill(folder: Path, recipe: Recipe, number: int) -> None:
     random, snapshot = np.random.default_rng(1), RecipeSnapshot.of(recipe.model_dump(mode="json"), "1")
     presses = [pressed(recipe, random) for _ in range(min(number, 500))]
     for start in range(0, number, BATCH):
-        with writing(folder) as connection:
+        with direct_transaction(folder) as connection:
             for sequence in range(start + 1, min(start + BATCH, number) + 1):
                 press = presses[sequence % len(presses)]
                 insert_trigger(connection, sequence, Trigger(1, 0, "A", 1, snapshot, simulated=True), "bench")

@@ -1,4 +1,4 @@
-"""The command `station`: a table of commands, each loaded only when it is asked for."""
+"""Command `station`: a table of commands, each imported only when it is used."""
 
 import errno
 import importlib
@@ -13,7 +13,7 @@ from station.errors import StationError
 
 
 class Entry(NamedTuple):
-    """Where a command lives, as `module:attribute`, and its one line in `station --help`."""
+    """Place of a command, as `module:attribute`, and its one line in `station --help`."""
 
     target: str
     summary: str
@@ -23,19 +23,19 @@ COMMANDS = {
     "alarms": Entry("station.commands.alarms:alarms", "See, acknowledge and shelve the station's alarms."),
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "api-token": Entry("hmi.api_command:api_token", "Make and withdraw tokens for the HTTP API."),
-    "audit": Entry("station.commands.audit:audit", "Ask who changed or commanded what, and check the trail."),
+    "audit": Entry("station.commands.audit:audit", "Show who changed or commanded what, and verify the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
-    "config": Entry("station.commands.config:config", "Look at the configuration, check it, bring it up to date."),
+    "config": Entry("station.commands.config:config", "Show, check and migrate the configuration."),
     "demo": Entry("station.commands.demo:demo", "Run the station against a simulated world and line."),
-    "devices": Entry("station.commands.devices:devices", "Look at the station's devices."),
-    "grip": Entry("station.commands.grip:grip", "Grip one fruit and keep its frames and widths."),
+    "devices": Entry("station.commands.devices:devices", "Check the station's devices."),
+    "grip": Entry("station.commands.grip:grip", "Grip one fruit and write its frames and widths."),
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
     "hmi": Entry("hmi.command:hmi", "Serve the operators' pages."),
     "line": Entry("plc_interface.plc_simulator.command:line", "Play the line's PLC against the station."),
-    "outbox": Entry("station.commands.outbox:outbox", "Tell other systems of inspections, or how far they are told."),
+    "outbox": Entry("station.commands.outbox:outbox", "Publish inspections to other systems, or show the delay."),
     "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
-    "recipes": Entry("station.commands.recipes:recipes", "Look after recipes, their revisions and approvals."),
-    "records": Entry("station.commands.records:records", "Ask what was inspected, and why it ended as it did."),
+    "recipes": Entry("station.commands.recipes:recipes", "Manage recipes, their revisions and approvals."),
+    "records": Entry("station.commands.records:records", "Query inspections and their explanations."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
@@ -50,32 +50,18 @@ class LazyGroup(click.Group):
     """A group that imports a command's module only to run it or to show its help."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Give the names in the table's order.
-
-        Args:
-            ctx: unused, click's.
-        """
+        """Return the names in the table's order."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import and give the command, or None where the table has no such name.
-
-        Args:
-            ctx: unused, click's.
-            cmd_name: the name typed by the user.
-        """
+        """Import and return the command, or None if the table has no such name."""
         if cmd_name not in COMMANDS:
             return None
         module, attribute = COMMANDS[cmd_name].target.split(":")
         return getattr(importlib.import_module(module), attribute)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands without importing any of them.
-
-        Args:
-            ctx: unused, click's.
-            formatter: what the list is written to.
-        """
+        """Write the list of commands without importing any of them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, entry.summary) for name, entry in COMMANDS.items()])
 

@@ -1,8 +1,8 @@
-"""What every room raises when something is wrong in a way that a person can mend."""
+"""Base classes of errors that a person can repair."""
 
 
 class StationError(Exception):
-    """A failure with a message that names the place, what was expected and what to do.
+    """A failure with a message: place, expected value, remedy.
 
     The command line shows the message alone and ends with exit code 1.
     """
@@ -11,7 +11,7 @@ class StationError(Exception):
 
 
 class BadInputError(StationError):
-    """Something from outside (a file, an argument, a setting) is not what it has to be.
+    """Invalid input from outside: a file, an argument, a setting.
 
     The command line shows the message alone and ends with exit code 2.
     """

@@ -1,4 +1,4 @@
-"""What the processes log: JSON lines for machines, or lines for a person at a terminal."""
+"""Logging of the processes: JSON lines for machines, or text lines for a person at a terminal."""
 
 import logging
 import re
@@ -13,7 +13,7 @@ _SECRET = re.compile(
     r"password|passwd|secret|token|api_?key|private_?key|credential|authorization|\bpin\b", re.IGNORECASE
 )
 HIDDEN = "(hidden)"
-# What a fieldbus library has to say, the PLC interface says in its own words.
+# The PLC interface logs a fieldbus library's events itself.
 _LIBRARIES = {
     "alembic": logging.WARNING,
     "uvicorn": logging.WARNING,
@@ -90,7 +90,7 @@ def configure_logging(
 
 
 def inspecting(sequence: int) -> AbstractContextManager[None]:
-    """Put the inspection's sequence into every line logged inside, also by tasks begun inside."""
+    """Put the inspection's sequence into every line logged inside, also by tasks started inside."""
     return structlog.contextvars.bound_contextvars(sequence=sequence)
 
 

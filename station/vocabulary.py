@@ -1,4 +1,4 @@
-"""Words that the domain and the wire share, as the line's PLC and the records know them."""
+"""Names shared by the domain, the wire and the records: reasons, refusals, PackML states."""
 
 from enum import StrEnum
 from typing import Literal
@@ -7,7 +7,7 @@ OutcomeName = Literal["PASS", "FAIL", "NO_RESULT"]
 
 
 class Reason(StrEnum):
-    """Why an outcome is not PASS. The order is the bits' order in the register map, bit 0 first."""
+    """Reason of an outcome that is not PASS. The order is the bits' order in the register map, bit 0 first."""
 
     AREA_OVER_LIMIT = "area_over_limit"
     GROWTH_OVER_LIMIT = "growth_over_limit"
@@ -29,7 +29,7 @@ class Reason(StrEnum):
     CAMERA_FAULT = "camera_fault"
     RECORDS_FAULT = "records_fault"
     STATION_LOST = "station_lost"
-    """The station stopped answering, or was restarted, before the outcome was the PLC's."""
+    """The station stopped answering, or was restarted, before the PLC had the outcome."""
     INTERNAL_FAULT = "internal_fault"
     NEAR_LIMIT = "near_limit"
     """The area or its growth is nearer to a limit than the measurement is certain."""
@@ -38,7 +38,7 @@ class Reason(StrEnum):
 
 
 class Refusal(StrEnum):
-    """Why a trigger was not accepted. The order is the codes' order in the register map, from 1."""
+    """Reason of a refused trigger. The order is the codes' order in the register map, from 1."""
 
     NOT_ENABLED = "not_enabled"
     NOT_READY = "not_ready"
@@ -55,7 +55,7 @@ class Refusal(StrEnum):
 
 
 class PackmlState(StrEnum):
-    """ISA-TR88.00.02-2022, table 1, in the order of their numbers, from 1."""
+    """PackML states of ISA-TR88.00.02-2022, table 1, in the order of their numbers, from 1."""
 
     CLEARING = "clearing"
     STOPPED = "stopped"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from station.records.database import FILE_NAME, migrate, open_engine, plain
-from station.records.finding import HOUR_MS
+from station.records.search_index import HOUR_MS
 from station.vocabulary import Reason
 
 FIRST_UTC_MS = 1_767_225_600_000

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from station.inspection.evidence import AT_MM
 from station.records.database import reading
 from station.records.errors import RecordsError
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 
 from .clock import CannotDoError
 from .rig import Rig

@@ -1,1 +1,1 @@
-"""Images from files in; results, masks, curves, plots and a report out."""
+"""Offline analysis of image files: results, masks, curves, plots and a report."""

@@ -1,4 +1,4 @@
-"""One run of `station analyze`: images in, the folder of results out."""
+"""Analysis run of `station analyze`: images in, the folder of results out."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ _LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is to be measured, how, and where the results go."""
+    """Images, method and result folder of an analysis."""
 
     sources: Sequence[Source]
     references: Sequence[Decoded]
@@ -41,39 +41,39 @@ class Request:
     segmentation: Segmentation
     recipe: str | None
     widths_mm: dict[str, float] | None
-    """The measured width by the image's name, or None where no table was given."""
+    """The measured width by the image's name, or None without a table."""
     out: Path
     stages: bool
     jobs: int
     calibration: Calibration | None = None
-    """Of the unit that took the images; None where it is not known."""
+    """Of the unit that took the images; None if unknown."""
     sequence: bool = False
     """The images are the steps of one press, in the order given."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Summary:
-    """What the report needs of one image, small enough to keep for all of them."""
+    """Report data of one image, small enough to keep for all images."""
 
     row: ReportRow
     contact: Contact
-    """Without its mask, which is on the disk, and without what is for the next step."""
+    """Without its mask, which is on the disk, and without the data for the next step."""
     caption: str
     thumbnail: Image
     reading: Reading | None
-    """None without widths, and where the area is unknown."""
+    """None without widths, and if the area is unknown."""
     stages: dict[str, Image]
-    """Their thumbnails by name; empty where they were not asked for."""
+    """Their thumbnails by name; empty if not requested."""
     quality: DenoisingQuality | None
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a run."""
+    """Result of a run."""
 
     measured: int
     touched: int
-    """In how many of them anything touches the gel."""
+    """Number of images with a contact."""
     refused: Sequence[Refused]
 
 
@@ -81,12 +81,12 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     """Measure all images and write tables, masks, pictures and the report.
 
     Args:
-        request: what, how and where.
+        request: images, method, folder.
         on_done: called after each image.
 
     Raises:
-        BadInputError: the widths do not fit the images, or the folder cannot be written; what is measured by then
-            is kept.
+        BadInputError: the widths do not fit the images, or the folder cannot be written; results measured by then
+            are kept.
     """
     _check_widths(request)
     references = [decoded.image for decoded in request.references]
@@ -105,7 +105,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             stages=request.stages,
         ):
             if isinstance(item, Refused):
-                output.leave_out(item)
+                output.skip(item)
                 found[item.number] = item
             else:
                 output.add(item, scale.area_mm2(item.contact.area_px)[0])
@@ -121,7 +121,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
 
 
 def _order(request: Request) -> list[Run]:
-    """The presses; `paper` measures every image by itself, as printed, so its images need no order."""
+    """Return the presses; `paper` measures every image by itself, as printed, so its images need no order."""
     if request.segmentation.method == "paper":
         return singles(request.sources)
     return runs(request.sources, request.widths_mm, sequence=request.sequence)
@@ -216,7 +216,7 @@ def _write_summaries(
 def _write_curve(
     output: OutputFolder, request: Request, measured: Sequence[_Summary]
 ) -> tuple[str | None, list[ReportRow]]:
-    """Write the curve where there are widths, and put the closings into the report's rows."""
+    """Write the curve if there are widths, and add the closings to the report's rows."""
     from station.analysis.plots import curve_svg  # noqa: PLC0415 (matplotlib takes a second to load; few runs draw)
 
     rows = [item.row for item in measured]
@@ -248,7 +248,7 @@ def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
 
 
 def _scale(calibration: Calibration | None, height_px: int, width_px: int) -> Scale:
-    """The scale of images of the whole field, by the unit's calibration or as is typical."""
+    """Return the scale of images of the whole field, by the unit's calibration or the typical one."""
     if calibration is None:
         return Scale.typical(height_px, width_px)
     smaller = max(calibration.height_px, calibration.width_px) / max(height_px, width_px)
@@ -265,7 +265,7 @@ def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[s
         ("Method", request.segmentation.method),
         ("Parameters", ", ".join(f"{name} {value}" for name, value in parameters.model_dump().items())),
         ("Recipe", request.recipe or "none: the method's defaults"),
-        ("Measured as", _presses_in_words(order)),
+        ("Measured as", _describe_presses(order)),
         (
             "Reference",
             "; ".join([request.reference_name + (f", median of {count} images" if count > 1 else ""), *converted]),
@@ -275,7 +275,7 @@ def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[s
     ]
 
 
-def _presses_in_words(order: Sequence[Run]) -> str:
+def _describe_presses(order: Sequence[Run]) -> str:
     steps = [len(run.numbers) for run in order if run.followed]
     alone = sum(not run.followed for run in order)
     pressed = f"{len(steps)} {'press' if len(steps) == 1 else 'presses'} of {', '.join(map(str, steps))} images"
@@ -294,7 +294,7 @@ def _mean_quality(qualities: Sequence[tuple[str, DenoisingQuality]]) -> str | No
 def _pages(
     name: str, columns: Sequence[tuple[str, Sequence[Image]]], sheets: int, row_names: Sequence[str] = ()
 ) -> Iterator[tuple[str, Image]]:
-    """Pictures of so many sheets each, with their files' names: NAME.png, then NAME_2.png and so on."""
+    """Split pictures into files of so many sheets each: NAME.png, then NAME_2.png and so on."""
     for page, start in enumerate(range(0, len(columns), sheets * _COLUMNS), start=1):
         part = columns[start : start + sheets * _COLUMNS]
         rows = [sheet(part[first : first + _COLUMNS], row_names) for first in range(0, len(part), _COLUMNS)]

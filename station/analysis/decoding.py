@@ -1,4 +1,4 @@
-"""One image file in, one colour image out: checked before a pixel is believed."""
+"""Image decoding: one checked image file in, one colour image out."""
 
 import os
 import warnings
@@ -23,23 +23,19 @@ _MODES = {"P": "palette", "PA": "palette", "CMYK": "CMYK", "LAB": "CIELAB"}
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A colour image and what had to be converted to get it."""
+    """Colour image, with the conversions that it needed."""
 
     image: Image
     conversions: tuple[str, ...]
 
 
-def shown(name: Path | str) -> str:
-    """A name as it can be written: bytes of it that are no UTF-8 are escaped.
-
-    Args:
-        name: a path or a part of one.
-    """
+def printable_name(name: Path | str) -> str:
+    """Return a printable name: bytes that are no UTF-8 are escaped."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def decode_file(path: Path) -> Decoded:
-    """Read an image file as stored, without turning it by its EXIF data.
+    """Read an image file as stored, without rotation by its EXIF data.
 
     Args:
         path: a JPEG, PNG, BMP, TIFF, WebP or PPM file.
@@ -50,51 +46,55 @@ def decode_file(path: Path) -> Decoded:
     try:
         size_bytes = path.stat().st_size
         if not path.is_file():
-            raise BadInputError(f"{shown(path)}: expected an image file, found something else")
+            raise BadInputError(f"{printable_name(path)}: expected an image file, found something else")
         if size_bytes > LARGEST_FILE_BYTES:
             raise BadInputError(
-                f"{shown(path)}: expected an image of at most {LARGEST_FILE_BYTES} bytes, found {size_bytes}"
+                f"{printable_name(path)}: expected an image of at most {LARGEST_FILE_BYTES} bytes, found {size_bytes}"
             )
         data = path.read_bytes()
     except OSError as error:
-        raise BadInputError(f"{shown(path)}: cannot be read: {error.strerror}") from error
+        raise BadInputError(f"{printable_name(path)}: cannot be read: {error.strerror}") from error
     conversions = _checked(path, data)
     raw = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if raw is None:
-        raise BadInputError(f"{shown(path)}: cannot be decoded; export it again as PNG or JPEG")
+        raise BadInputError(f"{printable_name(path)}: cannot be decoded; export it again as PNG or JPEG")
     decoded = to_colour(path, np.asarray(raw))
     return Decoded(decoded.image, (*conversions, *decoded.conversions))
 
 
 def _checked(path: Path, data: bytes) -> list[str]:
-    """Refuse what is no image, absurd in size or cut short; say what OpenCV will convert without a word.
+    """Refuse a file that is no image, of absurd size or truncated; report conversions that OpenCV does silently.
 
-    OpenCV alone fills the missing part of a truncated JPEG with grey and says nothing.
+    OpenCV alone fills the missing part of a truncated JPEG with grey, without an error.
     """
     if not data:
-        raise BadInputError(f"{shown(path)}: the file is empty; copy it again")
+        raise BadInputError(f"{printable_name(path)}: the file is empty; copy it again")
     try:
         with warnings.catch_warnings(action="ignore"), PIL.Image.open(BytesIO(data), formats=FORMATS) as picture:
             width, height = picture.size
             if width * height > LARGEST_IMAGE_PX:
-                raise BadInputError(f"{shown(path)}: {width}x{height} is more than {LARGEST_IMAGE_PX} pixels")
+                raise BadInputError(f"{printable_name(path)}: {width}x{height} is more than {LARGEST_IMAGE_PX} pixels")
             if min(width, height) < SMALLEST_SIDE_PX:
-                raise BadInputError(f"{shown(path)}: {width}x{height} is smaller than {SMALLEST_SIDE_PX} pixels a side")
+                raise BadInputError(
+                    f"{printable_name(path)}: {width}x{height} is smaller than {SMALLEST_SIDE_PX} pixels a side"
+                )
             picture.load()
             conversions = [f"{_MODES[picture.mode]} turned into colour"] if picture.mode in _MODES else []
             if getattr(picture, "n_frames", 1) > 1:
                 conversions.append("only the first page of several")
     except PIL.UnidentifiedImageError as error:
-        raise BadInputError(f"{shown(path)}: not an image; expected one of {', '.join(FORMATS)}") from error
+        raise BadInputError(f"{printable_name(path)}: not an image; expected one of {', '.join(FORMATS)}") from error
     except PIL.Image.DecompressionBombError as error:
-        raise BadInputError(f"{shown(path)}: more than {LARGEST_IMAGE_PX} pixels") from error
+        raise BadInputError(f"{printable_name(path)}: more than {LARGEST_IMAGE_PX} pixels") from error
     except (OSError, SyntaxError, ValueError) as error:
-        raise BadInputError(f"{shown(path)}: damaged or cut short ({error}); copy it again from the source") from error
+        raise BadInputError(
+            f"{printable_name(path)}: damaged or cut short ({error}); copy it again from the source"
+        ) from error
     return conversions
 
 
 def to_colour(path: Path, raw: np.ndarray) -> Decoded:
-    """Make BGR with 8 bits of whatever was stored, and say what was done.
+    """Convert any stored format to 8-bit BGR, and return the conversions.
 
     Args:
         path: for the message.
@@ -108,7 +108,9 @@ def to_colour(path: Path, raw: np.ndarray) -> Decoded:
         raw = (raw // 257).astype(np.uint8)
         conversions.append("16 bits scaled to 8")
     if raw.dtype != np.uint8:
-        raise BadInputError(f"{shown(path)}: expected 8 or 16 bits a channel, found {raw.dtype}; export it as PNG")
+        raise BadInputError(
+            f"{printable_name(path)}: expected 8 or 16 bits a channel, found {raw.dtype}; export it as PNG"
+        )
     channels = 1 if raw.ndim == 2 else raw.shape[2]
     if channels in {2, 4}:
         raw = raw[:, :, : channels - 1]

@@ -1,4 +1,4 @@
-"""Many images through one method: those of one press in order, the others on several threads."""
+"""Measurement of many images by one method: those of one press in order, the others on several threads."""
 
 import threading
 from collections import deque
@@ -22,7 +22,7 @@ MakeMethod = Callable[[], Method]
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One image with what was found in it."""
+    """One image with its measurement."""
 
     source: Source
     number: int
@@ -31,7 +31,7 @@ class Measured:
     contact: Contact
     conversions: tuple[str, ...]
     stages: dict[str, npt.NDArray[np.uint8]] = field(default_factory=dict)
-    """The stages' pictures by name, in order; empty where they were not asked for."""
+    """The stages' pictures by name, in order; empty if not requested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ class _Press:
     """Measures the images of one press, one after the other, all in one thread.
 
     Args:
-        get_method: gives the method of the thread that measures.
+        get_method: returns the method of the measuring thread.
         least_confidence: the recipe's.
-        stages: whether the stages' pictures are wanted.
+        stages: return the stages' pictures.
     """
 
     def __init__(self, get_method: MakeMethod, least_confidence: float, *, stages: bool) -> None:
@@ -86,20 +86,20 @@ def measure_all(
     jobs: int,
     stages: bool,
 ) -> Iterator[Measured | Refused]:
-    """Measure every source and give the results in the order of measuring.
+    """Measure every source and yield the results in the order of measurement.
 
-    Threads are enough: OpenCV releases the interpreter. Images by themselves are measured on several threads, those of
-    a press on one of their own while the next are decoded. An image of a press that cannot be measured is passed over.
-    At most two images a thread are held at once.
+    Threads are enough: OpenCV releases the interpreter. Single images are measured on several threads, those of a press
+    on one thread while the next are decoded. An image of a press that cannot be measured is skipped. At most two images
+    per thread are in memory at once.
 
     Args:
-        sources: what to measure; decoded here, one after the other, since a video can only be read forwards.
+        sources: decoded here, one after the other, because a video can only be read forwards.
         order: every source once; a video's frames forwards.
         shape: the reference's shape (height, width, 3).
         make_method: makes a method for one thread's use.
         least_confidence: the recipe's; below it a contact is flagged.
         jobs: number of threads, 1 or more.
-        stages: whether the stages' pictures are wanted.
+        stages: return the stages' pictures.
     """
     local = threading.local()
 

@@ -1,4 +1,4 @@
-"""The files of one analysis: written as results come, so that what is measured is never lost."""
+"""Output folder of an analysis, written as results come, so that a finished measurement is never lost."""
 
 import contextlib
 import csv
@@ -39,11 +39,11 @@ _OWN_NAMES = (
     "report.html",
 )
 CONVERTED = "converted"
-"""The flag of an image that was not stored as 8-bit colour."""
+"""Flag of an image that was not stored as 8-bit colour."""
 
 
 class OutputFolder:
-    """The folder `DIR` of `station analyze`. It holds one analysis and refuses to mix two."""
+    """Folder `DIR` of `station analyze`. It contains one analysis and refuses a second one."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -54,10 +54,10 @@ class OutputFolder:
         self._next = 0
 
     def __enter__(self) -> Self:
-        """Make the folder and try to write in it.
+        """Make the folder and check that it is writable.
 
         Raises:
-            BadInputError: it holds an earlier result, is a file, or cannot be written.
+            BadInputError: it contains an earlier result, is a file, or cannot be written.
         """
         try:
             earlier = [name for name in _OWN_NAMES if (self.folder / name).exists()]
@@ -74,7 +74,7 @@ class OutputFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the table; leave no empty folder where nothing could be measured."""
+        """Close the table; remove the folder if nothing could be measured and it is empty."""
         with contextlib.suppress(BadInputError):  # ended early: the rows that are left follow without those before them
             for number in sorted(self._waiting):
                 self._append(self._waiting.pop(number))
@@ -112,11 +112,8 @@ class OutputFolder:
         )
         self._in_turn(measured.number, row)
 
-    def leave_out(self, refused: Refused) -> None:
-        """Wait for no row of an image that could not be measured.
-
-        Args:
-            refused: the image.
+    def skip(self, refused: Refused) -> None:
+        """Skip the row of an image that could not be measured.
 
         Raises:
             BadInputError: as in `add`, for the rows that waited for it.
@@ -155,7 +152,7 @@ class OutputFolder:
             self.write_picture(f"stages/{measured.source.stem}_{number}_{name}.png", picture)
 
     def write_errors(self, refused: Iterable[Refused]) -> None:
-        """Write which images could not be measured, and why.
+        """Write the images that could not be measured, with the reasons.
 
         Args:
             refused: in the order given by the user.
@@ -170,7 +167,7 @@ class OutputFolder:
         Args:
             images: the images' names in the curve's order.
             curve: as many points as images.
-            wrong: the frames whose area in mm² does not fit the others; what was expected stands in their rows.
+            wrong: the frames whose area in mm² does not fit the others; their rows contain the expected area.
         """
         expected = {frame.index: _expectation(frame) for frame in wrong}
         rows = [
@@ -187,7 +184,7 @@ class OutputFolder:
         self._write_table("curve.csv", CURVE_COLUMNS, rows)
 
     def write_details(self, contacts: Sequence[tuple[str, Contact]]) -> None:
-        """Write what the method says of its own measurement; see `Contact` for the meaning.
+        """Write the method's own values of its measurement; see `Contact` for the meaning.
 
         Args:
             contacts: the image's name with its contact.
@@ -203,7 +200,7 @@ class OutputFolder:
         self._write_table("details.csv", DETAIL_COLUMNS, rows)
 
     def write_denoising(self, qualities: Sequence[tuple[str, DenoisingQuality]]) -> None:
-        """Write the figures of the denoising, as the paper's Table 2 has them.
+        """Write the figures of the denoising, as in the paper's Table 2.
 
         Args:
             qualities: the image's name with its figures.
@@ -225,7 +222,6 @@ class OutputFolder:
 
         Args:
             name: path below the folder.
-            data: the whole content.
 
         Raises:
             BadInputError: the disk is full or the folder has become unwritable.
@@ -274,10 +270,6 @@ def _append_whole(file: FileIO, data: bytes) -> None:
 
 
 def flag_names(measured: Measured) -> list[str]:
-    """What a reader of the area has to know, in a fixed order.
-
-    Args:
-        measured: the image and its contact.
-    """
+    """Return the flags of an area, in a fixed order."""
     names = [flag.value for flag in Flag if flag in measured.contact.flags]
     return [*names, CONVERTED] if measured.conversions else names

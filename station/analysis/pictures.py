@@ -1,4 +1,4 @@
-"""What people look at: the image with its contact drawn in, and sheets of many."""
+"""Result pictures: the image with its contact's outline, and sheets of many images."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ _WIDEST_SHARE = 3
 
 
 def outlined(image: Image, mask: Mask) -> Image:
-    """The image with the mask's outline drawn in, on a dark line so that it shows on any ground.
+    """Draw the mask's outline into the image, on a dark line so that it is visible on any background.
 
     Args:
         image: shape (height, width, 3), dtype uint8.
@@ -33,11 +33,10 @@ def outlined(image: Image, mask: Mask) -> Image:
 
 
 def thumbnail(picture: npt.NDArray[np.uint8], height_px: int) -> Image:
-    """Shrink to a height, or less where it would become more than three times as wide, and make colour of grey.
+    """Shrink to a height, or less if the width would be more than three times the height, and convert grey to colour.
 
     Args:
         picture: shape (height, width) or (height, width, 3), dtype uint8.
-        height_px: the wanted height.
     """
     scale = min(height_px / picture.shape[0], _WIDEST_SHARE * height_px / picture.shape[1])
     size = max(1, round(scale * picture.shape[1])), max(1, round(scale * picture.shape[0]))
@@ -46,10 +45,10 @@ def thumbnail(picture: npt.NDArray[np.uint8], height_px: int) -> Image:
 
 
 def sheet(columns: Sequence[tuple[str, Sequence[Image]]], row_names: Sequence[str] = ()) -> Image:
-    """Columns of pictures beside each other, each with its caption below and the rows named at the left.
+    """Arrange columns of pictures, each with its caption below, with the rows' names at the left.
 
     Args:
-        columns: caption (its lines parted by a line feed) and the pictures from top to bottom, all of one size.
+        columns: caption (lines separated by a line feed) and the pictures from top to bottom, all of one size.
         row_names: one for each row, or none.
     """
     height_px, width_px = columns[0][1][0].shape[:2]
@@ -80,11 +79,7 @@ def sheet(columns: Sequence[tuple[str, Sequence[Image]]], row_names: Sequence[st
 
 
 def stacked(sheets: Sequence[Image]) -> Image:
-    """Sheets below each other, the narrower ones filled up at the right.
-
-    Args:
-        sheets: one or more pictures.
-    """
+    """Stack sheets vertically; the narrower ones are padded at the right."""
     widest_px = max(picture.shape[1] for picture in sheets)
     return np.vstack(
         [

@@ -1,4 +1,4 @@
-"""The area curve as a plot."""
+"""Plot of the area curve."""
 
 from collections.abc import Sequence
 from io import StringIO
@@ -19,14 +19,14 @@ def curve_svg(
     changed_mm2: Sequence[float | None],
     lower_bounds: Sequence[int],
 ) -> str:
-    """Draw area over closing in the manner of the paper's Fig. 14, beside the area of the image that has changed.
+    """Plot area over closing in the manner of the paper's Fig. 14, with the changed area of each image.
 
     Args:
         curve: a curve with at least one point.
         wrong: the points that do not fit the others; they are marked, not moved.
-        title: what was pressed and how it was measured.
-        changed_mm2: how much of each point's image has changed; None where the method does not say.
-        lower_bounds: the places of the points whose contact is at least as large as their area.
+        title: the pressed object and the method.
+        changed_mm2: changed area of each point's image; None if the method does not measure it.
+        lower_bounds: indices of the points whose contact is at least as large as their area.
 
     Returns:
         An SVG document that is the same for the same input.

@@ -1,4 +1,4 @@
-"""Measuring order: which images are steps of one press, and the order in which they are measured."""
+"""Measuring order: the presses among the images, and the order of their steps."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
@@ -13,20 +13,21 @@ class Run(NamedTuple):
     numbers: tuple[int, ...]
     """Of the images in the order given by the user, from 0."""
     followed: bool
-    """They are the steps of one press: each is measured with the contact of the one before. Else it is one image."""
+    """True for the steps of one press: each is measured with the contact of the one before. False for one image."""
 
 
 def runs(sources: Sequence[Source], widths_mm: Mapping[str, float] | None, *, sequence: bool) -> list[Run]:
     """Find the presses among images.
 
-    A video, a folder, and the files that were named one by one are a press each. Without widths the order given is the
-    order in time. With widths it is the order of falling width, unless the images come from a video, the user says that
-    they are a sequence, or a width comes back: then the order given is kept, and a press ends where the width rises.
+    A video, a folder, and the files that were named one by one are one press each. Without widths the order given is
+    the order in time. With widths it is the order of falling width, unless the images come from a video, the user
+    states that they are a sequence, or a width repeats: then the given order is used, and a press ends where the width
+    rises.
 
     Args:
         sources: in the order given by the user.
         widths_mm: the measured width by the image's name, for every image that is not refused; None without a table.
-        sequence: the user says that the images are in the order in time.
+        sequence: the user states that the images are in the order in time.
 
     Returns:
         Every image once, in the order of measuring.
@@ -49,11 +50,7 @@ def runs(sources: Sequence[Source], widths_mm: Mapping[str, float] | None, *, se
 
 
 def singles(sources: Sequence[Source]) -> list[Run]:
-    """Every image by itself, in the order given.
-
-    Args:
-        sources: in that order.
-    """
+    """Return every image by itself, in the given order."""
     return [Run((number,), followed=False) for number in range(len(sources))]
 
 
@@ -69,9 +66,9 @@ def _by_width(numbers: Sequence[int], widths_mm: Mapping[int, float], *, in_time
 
 
 def _comes_back(widths_mm: Sequence[float]) -> bool:
-    """Whether a width, to a tenth of a millimetre, comes again after a narrower one: the jaws have opened in between.
+    """Check whether a width, to 0.1 mm, repeats after a narrower one: the jaws have opened in between.
 
-    In a press whose images are merely named in another order it does not, as the jaws only close.
+    It does not in a press whose images are only named in another order, because the jaws only close.
     """
     rounded = [round(width, 1) for width in widths_mm]
     places: dict[float, list[int]] = {}

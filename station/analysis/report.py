@@ -1,4 +1,4 @@
-"""The report that people read: one HTML file with its pictures inside."""
+"""Analysis report: one HTML file with its pictures inside."""
 
 import base64
 from collections.abc import Sequence
@@ -21,14 +21,14 @@ class ReportRow:
     picture: str
     """A data URI."""
     mask: str
-    """The mask's path beside the report."""
+    """The mask's path, relative to the report."""
     contact: bool
     area_px: int
     area_mm2: float
     lower_bound: bool
     """The contact is at least this large."""
     changed_area_mm2: float | None
-    """How much of the image has changed; None where the method does not say."""
+    """Changed area of the image; None if the method does not measure it."""
     width_mm: float | None
     closing_mm: float | None
     confidence: float | None
@@ -38,28 +38,24 @@ class ReportRow:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """All that the report shows."""
+    """Content of the report."""
 
     title: str
     facts: Sequence[tuple[str, str]]
-    """Names and values of how it was measured."""
+    """Names and values of the measurement's settings."""
     rows: Sequence[ReportRow]
     errors: Sequence[tuple[str, str]]
     curve_svg: str | None
     no_onset: bool
-    """There are widths, and no contact was found: there is no curve."""
+    """True if there are widths, and no contact was found: there is no curve."""
     stages: Sequence[tuple[str, str]]
     """The stages' sheets: the file beside the report, and a data URI."""
     quality: str | None
-    """The mean of the denoising's figures in words."""
+    """The mean of the denoising's figures in a sentence."""
 
 
 def render(report: Report) -> str:
-    """Make an HTML document that needs no network and no other file to be read.
-
-    Args:
-        report: what to show.
-    """
+    """Make an HTML document that needs no network and no other file."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("station.analysis", "templates"),
         autoescape=True,
@@ -72,7 +68,7 @@ def render(report: Report) -> str:
 
 
 def data_uri(picture: Image) -> str:
-    """A picture as a JPEG inside the document.
+    """Return a picture as the data URI of a JPEG.
 
     Args:
         picture: shape (height, width, 3), dtype uint8.

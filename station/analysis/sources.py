@@ -1,4 +1,4 @@
-"""What the user names on the command line, as an ordered list of images that are decoded when needed."""
+"""Image sources: the user's files, folders and videos as an ordered list of images, decoded when needed."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from natsort import natsorted, ns
 
-from station.analysis.decoding import SUFFIXES, Decoded, decode_file, shown
+from station.analysis.decoding import SUFFIXES, Decoded, decode_file, printable_name
 from station.errors import BadInputError
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg"})
@@ -19,37 +19,37 @@ _LONGEST_STEM_BYTES = 200
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One image that can be asked for."""
+    """One image, decoded on demand."""
 
     name: str
     """The file's name, or the video's name with the frame's number."""
     stem: str
-    """The name that its mask and stages get."""
+    """Name of its mask and stages."""
     load: Callable[[], Decoded]
     """Decodes it; raises BadInputError."""
     refused: bool = False
-    """It is known already that it cannot be loaded."""
+    """Known not to be loadable."""
     place: int = -1
-    """The number of its folder or video among those named; -1 for a file that was named by itself."""
+    """Index of its folder or video among those named; -1 for a file that was named by itself."""
     from_video: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """The sources found, and the other files that were passed over in folders."""
+    """The sources found, and the other files of the folders, which are skipped."""
 
     sources: tuple[Source, ...]
     passed_over: tuple[Path, ...]
 
 
 def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listing:
-    """Find the images under the places: files in the order given, a folder's files in natural order.
+    """Find the images of the places: files in the given order, a folder's files in natural order.
 
-    A folder's files that are no images by their suffix, and the reference itself, are passed over.
+    A folder's files without an image's suffix, and the reference itself, are skipped.
 
     Args:
         places: image files, folders or videos.
-        reference: a file that is not to be measured, where it lies in one of the folders.
+        reference: a file that is not measured, also inside one of the folders.
 
     Returns:
         A place that has no images, or cannot be listed, is a source that fails when it is loaded.
@@ -77,10 +77,10 @@ def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listi
 
 
 def load_references(place: Path) -> list[Decoded]:
-    """Load the untouched gel: one image, or the images of a folder or video of it.
+    """Load the untouched gel: one image, or the images of a folder or video.
 
     Args:
-        place: an image file, a folder or a video; of many frames the first 32 are used.
+        place: an image file, a folder or a video; only the first 32 frames are used.
 
     Raises:
         BadInputError: one of them cannot be read, or they differ in size.
@@ -95,7 +95,7 @@ def _list_place(place: Path, reference: Path | None) -> Listing:
     try:
         return _found_at(place, reference)
     except OSError as error:  # a name too long, or a folder above it that may not be searched
-        raise BadInputError(f"{shown(place)}: cannot be read: {error.strerror}") from error
+        raise BadInputError(f"{printable_name(place)}: cannot be read: {error.strerror}") from error
 
 
 def _found_at(place: Path, reference: Path | None) -> Listing:
@@ -103,13 +103,15 @@ def _found_at(place: Path, reference: Path | None) -> Listing:
         files = natsorted((path for path in place.iterdir() if path.is_file()), alg=ns.PATH)
         chosen = [path for path in files if path.suffix.lower() in SUFFIXES and not _same(path, reference)]
         if not chosen:
-            raise BadInputError(f"{shown(place)}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}")
+            raise BadInputError(
+                f"{printable_name(place)}: the folder has no images; expected {', '.join(sorted(SUFFIXES))}"
+            )
         passed_over = tuple(path for path in files if path not in chosen)
         return Listing(tuple(_file_source(path) for path in chosen), passed_over)
     if place.suffix.lower() in VIDEO_SUFFIXES:
         return Listing(tuple(_video_sources(place)), ())
     if not place.exists():
-        raise BadInputError(f"{shown(place)}: there is no such file")
+        raise BadInputError(f"{printable_name(place)}: there is no such file")
     return Listing((_file_source(place),), ())
 
 
@@ -118,53 +120,57 @@ def _same(path: Path, other: Path | None) -> bool:
 
 
 def _file_source(path: Path) -> Source:
-    stem = shown(path.stem)
+    stem = printable_name(path.stem)
     if len(stem.encode()) > _LONGEST_STEM_BYTES:
-        return _refused_source(path, BadInputError(f"{shown(path)}: the name is too long for its mask's; rename it"))
-    return Source(shown(path.name), stem, lambda: decode_file(path))
+        return _refused_source(
+            path, BadInputError(f"{printable_name(path)}: the name is too long for its mask's; rename it")
+        )
+    return Source(printable_name(path.name), stem, lambda: decode_file(path))
 
 
 def _refused_source(place: Path, error: BadInputError) -> Source:
     def load() -> Decoded:
         raise error
 
-    return Source(shown(place.name), shown(place), load, refused=True)
+    return Source(printable_name(place.name), printable_name(place), load, refused=True)
 
 
 def _video_sources(path: Path) -> Iterator[Source]:
-    """List a video's frames; each is decoded in turn, since seeking in a compressed video is not exact."""
+    """List a video's frames; they are decoded in order, because seeking in a compressed video is not exact."""
     if not path.is_file():
-        raise BadInputError(f"{shown(path)}: there is no such file")
+        raise BadInputError(f"{printable_name(path)}: there is no such file")
     frames = _Video(path)
     if frames.announced > frames.count:
         whole = f"{frames.count} of {frames.announced} frames could be decoded; it is cut short or damaged"
-        yield _refused_source(path, BadInputError(f"{shown(path)}: {whole}"))
+        yield _refused_source(path, BadInputError(f"{printable_name(path)}: {whole}"))
     for index in range(frames.count):
-        name = f"{shown(path.stem)}_{index:05d}"
+        name = f"{printable_name(path.stem)}_{index:05d}"
         yield Source(name, name, lambda index=index: frames.frame(index), from_video=True)
 
 
 class _Video:
-    """A video read forwards, one frame at a time."""
+    """Video read forwards, one frame at a time."""
 
     def __init__(self, path: Path) -> None:
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what FFmpeg says of a bad file names no remedy
         self._path = path
         self._capture = cv2.VideoCapture(str(path))
         self.announced = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        """What the header says; an estimate in some formats, 0 in a broken file."""
+        """Frame count in the header; an estimate in some formats, 0 in a broken file."""
         self.count = self._count()
         self._next = 0
 
     def _count(self) -> int:
-        """Count by decoding."""
+        """Count the frames by decoding."""
         capture = cv2.VideoCapture(str(self._path))
         count = 0
         while capture.grab():
             count += 1
         capture.release()
         if count == 0:
-            raise BadInputError(f"{shown(self._path)}: no frame of this video can be decoded; export it as MP4 or AVI")
+            raise BadInputError(
+                f"{printable_name(self._path)}: no frame of this video can be decoded; export it as MP4 or AVI"
+            )
         return count
 
     def frame(self, index: int) -> Decoded:
@@ -173,7 +179,7 @@ class _Video:
             self._next += 1
         good, image = self._capture.read()
         if not good:
-            raise BadInputError(f"{shown(self._path)}: frame {index} cannot be decoded")
+            raise BadInputError(f"{printable_name(self._path)}: frame {index} cannot be decoded")
         self._next += 1
         if self._next == self.count:
             self._capture.release()
@@ -181,7 +187,7 @@ class _Video:
 
 
 def _refuse_equal_stems(sources: Iterable[Source]) -> None:
-    """Two images of one stem would write one mask."""
+    """Refuse two images of one stem: they would write one mask."""
     seen: dict[str, str] = {}
     for source in sources:
         if source.stem in seen:

@@ -1,4 +1,4 @@
-"""Stage pictures of a press: a method that keeps them while a press tracker measures with it."""
+"""Stage pictures of a press: a method that stores them while a press tracker measures with it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,11 +7,7 @@ from station.vision.contact import Contact, Image, Method, StageSink
 
 
 class StagedMethod:
-    """A measurement method that keeps the stage pictures of the last image. Not safe for several threads at once.
-
-    Args:
-        method: measures.
-    """
+    """Measurement method that stores the stage pictures of the last image. Not safe for several threads at once."""
 
     def __init__(self, method: Method) -> None:
         self.stages, self._method = method.stages, method

@@ -1,4 +1,4 @@
-"""The table of gripper widths that goes with a folder of images."""
+"""Width table: the gripper widths of a folder of images."""
 
 import csv
 import math

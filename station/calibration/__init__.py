@@ -1,1 +1,1 @@
-"""What one sensor on one gripper makes of a ball of known size: calibrated, stored, and verified at each shift."""
+"""Sensor calibration with a ball of known size, and its verification at each shift."""

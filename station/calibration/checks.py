@@ -1,4 +1,4 @@
-"""What a calibration and a verification are judged by, each with what to do where it is not so."""
+"""Acceptance checks of calibration and verification, each with its remedy."""
 
 from collections.abc import Sequence
 from itertools import dropwhile
@@ -12,7 +12,7 @@ from station.settings.recipe import Recipe
 from station.vision.scale import TYPICAL_UNCERTAINTY
 
 ROUNDEST = 1.15
-"""A ball's contact has axes that differ by no more."""
+"""Largest ratio of a ball contact's axes."""
 _LEAST_STEPS = 5
 _LEAST_CONFIDENCE = 0.5
 _SCALES_MM = (0.022, 0.034)
@@ -27,15 +27,15 @@ def calibration_checks(
     noise: Noise,
     scale: MeasuredScale | None,
 ) -> list[Check]:
-    """What a calibration has to be.
+    """Check a calibration against its limits.
 
     Args:
         settings: ball and limits.
         recipe: the ball's.
         steps: all of them, as measured.
-        onset_mm: where the contact begins.
+        onset_mm: width of the contact onset.
         noise: of the untouched gel.
-        scale: None where the ball lay in one place only.
+        scale: None if the ball was pressed at one place only.
     """
     plan = recipe.steps
     met_mm = settings.ball_mm + settings.holder_mm
@@ -111,13 +111,13 @@ def verification_checks(
     onset_mm: float | None,
     pixel_levels: Levels,
 ) -> list[Check]:
-    """What the ball has to show against the calibration.
+    """Check a verification against the calibration.
 
     Args:
         settings: the tolerances.
         calibration: the unit's.
         curve: the widths pressed now, in order of closing.
-        onset_mm: where the contact begins; None where nothing was touched.
+        onset_mm: width of the contact onset; None if nothing was touched.
         pixel_levels: noise of the untouched gel.
     """
     area = figures.area_ratio(curve, calibration.curve)

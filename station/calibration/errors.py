@@ -1,17 +1,17 @@
-"""Why no calibration or verification came of it."""
+"""Calibration errors."""
 
 from station.errors import BadInputError, StationError
 
 
 class CalibrationError(StationError):
-    """It cannot be made, stored or found; the message says why and what to do."""
+    """A calibration cannot be made, stored or found; the message gives the reason and the remedy."""
 
 
 class RefusedError(CalibrationError):
-    """What was measured is no calibration; the one before stands.
+    """The result is no valid calibration; the one before stays in force.
 
     Args:
-        reasons: in sentences, each with what to do.
+        reasons: in sentences, each with the remedy.
     """
 
     def __init__(self, *reasons: str) -> None:
@@ -20,4 +20,4 @@ class RefusedError(CalibrationError):
 
 
 class UnknownCalibrationError(BadInputError):
-    """There is none of that name or unit."""
+    """There is no calibration of that name or unit."""

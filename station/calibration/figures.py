@@ -1,4 +1,4 @@
-"""The numbers of a calibration, from frames, steps and places."""
+"""Calibration figures, computed from frames, steps and places."""
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
@@ -12,18 +12,18 @@ from station.vision.contact import Contact, Image
 
 FIELD_ROWS, FIELD_COLUMNS = 16, 12
 QUIET_GATE = 0.8
-"""What the gate's statistic may reach with nothing touching, after the unit's factor."""
+"""Largest value of the gate's statistic with nothing touching, after the unit's factor."""
 _CENTROID_PX = 1.0
 """Two standard deviations of a centroid in repeats on the twin."""
 _STEP_MM = 0.5
 
 
 def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
-    """What frames of the untouched gel differ by.
+    """Measure the noise of frames of the untouched gel.
 
     Args:
         frames: three or more of one shape (height, width, 3), dtype uint8.
-        untouched: what the method makes of frames with nothing touching.
+        untouched: the method's results on frames with nothing touching.
     """
     gate = max((contact.gate or 0.0 for contact in untouched), default=0.0)
     return Noise(
@@ -35,7 +35,7 @@ def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
 
 
 def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
-    """Standard deviation of each pixel from frame to frame, without what changes the whole frame.
+    """Return the standard deviation of each pixel from frame to frame, without changes of the whole frame.
 
     Args:
         frames: three or more of one shape (height, width, 3), dtype uint8.
@@ -55,11 +55,11 @@ def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
 
 
 def field_map(reference: Image, frames: Sequence[Image]) -> FieldMap:
-    """Light and noise over the field. One ball at a few places tells nothing of the scale in between.
+    """Map light and noise over the field. One ball at a few places gives no scale in between.
 
     Args:
         reference: shape (height, width, 3), dtype uint8.
-        frames: the frames behind it.
+        frames: from which the reference was made.
     """
     size = (FIELD_COLUMNS, FIELD_ROWS)
     light = cv2.resize(reference.astype(np.float32), size, interpolation=cv2.INTER_AREA).reshape(-1, 3)
@@ -82,13 +82,13 @@ class MeasuredScale(NamedTuple):
 
 
 def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale:
-    """The scale from how far the ball's contact moves in the image when the ball is moved a known way.
+    """Compute the scale from the motion of the ball's contact in the image over a known distance.
 
-    Distances are compared, so that it does not matter how the places' axes lie in the image.
+    Distances are compared, so the direction of the places' axes in the image does not matter.
 
     Args:
-        places: two or more, no two in one place.
-        tolerance_mm: how well a distance between two places is known.
+        places: two or more, all different.
+        tolerance_mm: of a distance between two places.
     """
     ways_mm, ways_px = [], []
     for one, other in combinations(places, 2):
@@ -105,7 +105,7 @@ def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale
 
 
 def falls(curve: Sequence[PressPoint]) -> tuple[PressPoint, PressPoint] | None:
-    """The first two neighbours between which the area does not rise; None where it rises all the way.
+    """Return the first two neighbours between which the area does not rise; None if it rises throughout.
 
     Args:
         curve: in order of closing, from the first contact on.
@@ -114,29 +114,29 @@ def falls(curve: Sequence[PressPoint]) -> tuple[PressPoint, PressPoint] | None:
 
 
 def judged(curve: Sequence[PressPoint], onset_mm: float, closing_mm: float) -> list[PressPoint]:
-    """The steps from the first contact on by which a ball is judged, in order of closing.
+    """Return the steps from the contact onset on by which a ball is judged, in order of closing.
 
     Args:
         curve: in any order.
-        onset_mm: where the contact begins.
-        closing_mm: how far from there a ball's area is to be relied on; beyond it the border cuts it away.
+        onset_mm: width of the contact onset.
+        closing_mm: limit up to which the ball's area is reliable; beyond it the border cuts the contact.
     """
     within = [point for point in curve if onset_mm - closing_mm - _STEP_MM <= point.width_mm <= onset_mm]
     return sorted((point for point in within if not point.cut), key=lambda point: -point.width_mm)
 
 
 def area_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
-    """A ball's areas over those of an earlier curve at the same widths, median; None where none can be compared.
+    """Return the median ratio of a ball's areas to an earlier curve's at the same widths; None without common ones.
 
     Args:
         curve: the new one.
-        golden: the earlier one; in between its points it is interpolated.
+        golden: the earlier one; interpolated between its points.
     """
     return _ratio(curve, golden, "area_px")
 
 
 def contrast_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
-    """Likewise of the contrast.
+    """Return the same ratio of the contrast.
 
     Args:
         curve: the new one.
@@ -159,7 +159,7 @@ def _ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint], what: str)
 
 
 def roundness(contact: Contact) -> float:
-    """The longer over the shorter axis of a contact; 1 for a ball's, 0 where there is none."""
+    """Return the ratio of a contact's longer to its shorter axis; 1 for a ball's, 0 without a contact."""
     moments = cv2.moments(contact.mask, binaryImage=True)
     if not moments["m00"]:
         return 0.0

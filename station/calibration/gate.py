@@ -1,4 +1,4 @@
-"""A recipe's contact gate on a unit that is noisier than most."""
+"""Contact gate of a recipe, raised on a unit that is noisier than most."""
 
 from station.settings.segmentation import Segmentation
 
@@ -6,7 +6,7 @@ _MOST_RATIO, _MOST_BEND = 20.0, 10.0
 
 
 def gated(segmentation: Segmentation, factor: float) -> Segmentation:
-    """The segmentation with the robust method's gate raised; both limits of the gate grow alike.
+    """Raise the robust method's gate in a segmentation; both limits of the gate grow alike.
 
     Args:
         segmentation: a recipe's.

@@ -1,7 +1,7 @@
-"""The gel's and the light's health, told from a picture of the untouched gel: tear, dirt, LED loss, fog.
+"""Gel check: tear, dirt, LED loss and fog in a picture of the untouched gel.
 
-With an earlier picture of the same gel, what is new is looked for. Without one only what no sound gel shows: real
-units have dust, bubbles and dark corners of their own, so small blemishes are let pass. Limits were found on real
+With an earlier picture of the same gel, only new blemishes count. Without one, only blemishes that no sound gel has:
+real units have dust, bubbles and dark corners of their own, so small ones are accepted. Limits were found on real
 no-contact images (`docs/verification.md`) and the twin.
 """
 
@@ -17,7 +17,7 @@ from station.vision.contact import Image, Mask
 
 _LONG_SIDE_PX = 640
 _FINE_PX, _COARSE_PX = 1.5, 12.0
-"""Between these two blurs lies what a tear or a crumb shows and drifting light does not."""
+"""The difference of these two blurs shows a tear or debris and not the drift of the light."""
 _BLEMISH_LEVELS, _NEW_BLEMISH_LEVELS = 20.0, 12.0
 _JOINED_PX = 7
 _SMALLEST_PX, _SMALLEST_NEW_PX = 40, 150
@@ -31,8 +31,8 @@ _LED_COLOURS = ("blue", "green", "red")
 _MARK = (0, 0, 255)
 
 
-class Ill(StrEnum):
-    """What may be wrong with gel and light."""
+class GelFault(StrEnum):
+    """Faults of gel and light."""
 
     TEAR = "tear"
     DIRT = "dirt"
@@ -42,42 +42,42 @@ class Ill(StrEnum):
 
 
 REMEDIES = {
-    Ill.TEAR: "change the gel, then calibrate",
-    Ill.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
-    Ill.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
-    Ill.FOG: "clean the sensor's lens and gel, then try again",
-    Ill.WEAR: "change the gel, then calibrate",
+    GelFault.TEAR: "change the gel, then calibrate",
+    GelFault.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
+    GelFault.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
+    GelFault.FOG: "clean the sensor's lens and gel, then try again",
+    GelFault.WEAR: "change the gel, then calibrate",
 }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """One thing that is wrong, in a sentence and a picture."""
+    """One fault, as a sentence and a picture."""
 
-    ill: Ill
+    ill: GelFault
     sentence: str
     picture: Image
 
 
 def examine(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
-    """Look for tear, dirt, LED loss and fog.
+    """Detect tear, dirt, LED loss and fog.
 
     Args:
         image: the untouched gel, shape (height, width, 3), dtype uint8, BGR.
-        golden: the same gel when it was sound, of the same shape; None where there is none.
-        least_light: of each colour against the golden picture.
+        golden: the same gel when it was sound, of the same shape; None if there is none.
+        least_light: smallest ratio of each colour to the golden picture.
     """
     lost = _lost_light(image, golden, least_light)
     if lost:
         return lost
     if golden is not None and (fog := sharpness(image) / sharpness(golden)) < least_light:
         text = f"the untouched gel shows {fog:.0%} of the detail it had: fogged or smeared"
-        return [Finding(Ill.FOG, text, side_by_side(golden, image))]
+        return [Finding(GelFault.FOG, text, side_by_side(golden, image))]
     return _blemishes(image, golden)
 
 
 def light(image: Image) -> Levels:
-    """The mean of each colour.
+    """Return the mean of each colour.
 
     Args:
         image: shape (height, width, 3), dtype uint8, BGR.
@@ -87,7 +87,7 @@ def light(image: Image) -> Levels:
 
 
 def sharpness(image: Image) -> float:
-    """Root mean square of the structure of the light between two scales, above the pixels' noise; grey levels.
+    """Return the root mean square of the light's structure between two scales, above the pixels' noise; grey levels.
 
     Args:
         image: shape (height, width, 3), dtype uint8.
@@ -97,18 +97,18 @@ def sharpness(image: Image) -> float:
 
 
 def side_by_side(before: Image, now: Image) -> Image:
-    """Two pictures beside each other, the earlier one left, named.
+    """Join two named pictures, the earlier one left.
 
     Args:
         before: shape (height, width, 3), dtype uint8.
-        now: likewise.
+        now: same shape.
     """
     gap = np.full((before.shape[0], 12, 3), 255, np.uint8)
     return np.hstack([_named(before, "then"), gap, _named(now, "now")])
 
 
 def _named(image: Image, name: str) -> Image:
-    """A picture with a word in its corner."""
+    """Write a word into a picture's corner."""
     size = image.shape[1] / 480
     place = (round(14 * size), round(38 * size))
     white, font = (255, 255, 255), cv2.FONT_HERSHEY_SIMPLEX
@@ -126,7 +126,7 @@ def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[
     words = ", ".join(f"{colour} {share:.0%}" for share, colour in lost)
     what = "is dead or not connected" if min(lost)[0] < _DEAD_LED else "has grown dim"
     text = f"light of {words} of {'the other colours' if golden is None else 'what it was'}: an LED {what}"
-    return [Finding(Ill.LED, text, image if golden is None else side_by_side(golden, image))]
+    return [Finding(GelFault.LED, text, image if golden is None else side_by_side(golden, image))]
 
 
 def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
@@ -135,18 +135,18 @@ def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
     findings: list[Finding] = []
     if torn.any():
         text = "a long thin line runs across the gel: it is torn or cut"
-        findings.append(Finding(Ill.TEAR, text, _marked(image, torn)))
+        findings.append(Finding(GelFault.TEAR, text, _marked(image, torn)))
     share = float(np.mean(found > 0))
     if share > (_MOST_BLEMISHED if golden is None else 0.0):
         number = cv2.connectedComponents(found)[0] - 1
         what = "places" if golden is None else "new places"
         text = f"{number} {what} on the gel, {share:.1%} of the field, look like dirt or damage"
-        findings.append(Finding(Ill.DIRT, text, _marked(image, found)))
+        findings.append(Finding(GelFault.DIRT, text, _marked(image, found)))
     return findings
 
 
 def _regions(image: Image, golden: Image | None, scale: float) -> tuple[Mask, Mask]:
-    """Compact blemishes, and long thin ones, each 0 or 255."""
+    """Return masks of compact blemishes, and of long thin ones, each 0 or 255."""
     levels = image.astype(np.float32) if golden is None else image.astype(np.float32) - golden
     fine, coarse = (np.asarray(cv2.GaussianBlur(levels, (0, 0), sigma * scale)) for sigma in (_FINE_PX, _COARSE_PX))
     strength = np.abs(fine - coarse).max(axis=2)
@@ -168,7 +168,7 @@ def _regions(image: Image, golden: Image | None, scale: float) -> tuple[Mask, Ma
 
 
 def outlined(image: Image, mask: Mask, colour: tuple[int, int, int] = (255, 255, 255)) -> Image:
-    """A picture with the outline of a mask.
+    """Draw the outline of a mask into a picture.
 
     Args:
         image: shape (height, width, 3), dtype uint8.
@@ -180,5 +180,5 @@ def outlined(image: Image, mask: Mask, colour: tuple[int, int, int] = (255, 255,
 
 
 def _marked(image: Image, places: npt.NDArray[np.uint8]) -> Image:
-    """The picture with an outline around places."""
+    """Draw an outline around places."""
     return outlined(image, np.asarray(cv2.dilate(places, np.ones((9, 9), np.uint8)), np.uint8), _MARK)

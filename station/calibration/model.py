@@ -1,4 +1,4 @@
-"""What is kept of a calibration and of a verification; read back, every field is checked."""
+"""Stored records of calibrations and verifications; every field is checked when they are read."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Literal
@@ -8,27 +8,27 @@ from pydantic import BaseModel, ConfigDict, Field
 Serial = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """A unit's serial number; it names a folder."""
 Stamp = Annotated[str, Field(pattern=r"^\d{8}T\d{6}Z$")]
-"""A calibration's or verification's name: when it was made, UTC."""
+"""A calibration's or verification's name: its time, UTC."""
 Levels = tuple[float, float, float]
 """Grey levels of blue, green and red."""
 Positive = Annotated[float, Field(gt=0.0)]
 
 
 class Stored(BaseModel):
-    """A record that never changes; unknown fields are another version's."""
+    """A record that never changes; a record with unknown fields is another version's."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Check(Stored):
-    """One thing that was looked at."""
+    """One checked property."""
 
     name: str
     passed: bool
     found: str
     expected: str
     remedy: str = ""
-    """What to do where it has not passed."""
+    """Remedy if it has not passed."""
     picture: str | None = None
     """The file beside the record that shows it."""
 
@@ -42,7 +42,7 @@ class PressPoint(Stored):
     cut: bool
     """The image's border cuts the contact: the area is a lower bound."""
     contrast_levels: Annotated[float, Field(ge=0.0)]
-    """How much the ball changes the image, grey levels; 0 where nothing touches."""
+    """Change of the image by the ball, grey levels; 0 if nothing touches."""
 
 
 class PlacePoint(Stored):
@@ -68,14 +68,14 @@ class FieldMap(Stored):
 
 
 class Noise(Stored):
-    """What the untouched gel's frames differ by."""
+    """Noise between frames of the untouched gel."""
 
     pixel_levels: Levels
     """Standard deviation of a pixel from frame to frame."""
     gate: float
-    """The largest value of the contact gate's statistic with nothing touching; at 1 a contact would be looked for."""
+    """The largest value of the contact gate's statistic with nothing touching; at 1 the gate opens."""
     gate_factor: Annotated[float, Field(ge=1.0)]
-    """What this unit's gate is multiplied by, so that noise stays below it."""
+    """Factor that raises this unit's gate above its noise."""
     drift_levels: float
     """The largest drift of the light against the reference, root mean square."""
 
@@ -87,11 +87,11 @@ class Calibration(Stored):
     id: Stamp
     serial: Serial
     unit: str
-    """As the camera names itself."""
+    """The camera's name."""
     operator: str
     simulated: bool
     program: str
-    """The version that made it."""
+    """The program version that made it."""
     ball_mm: Positive
     holder_mm: float
     width_px: Annotated[int, Field(ge=1)]
@@ -100,13 +100,13 @@ class Calibration(Stored):
     scale_uncertainty: Positive
     """Relative, of a length, about two standard deviations; an area's is twice that."""
     scale_measured: bool
-    """From places of the ball a known way apart; else the usual scale of such sensors."""
+    """From places of the ball at known distances; else the usual scale of such sensors."""
     places: tuple[PlacePoint, ...]
     curve: tuple[PressPoint, ...]
     onset_mm: float
     """The width at which the contact begins, to one count of the gripper."""
     zero_mm: float
-    """The onset minus ball and holder: what the gripper's zero is off by, about."""
+    """The onset minus ball and holder: about the error of the gripper's zero."""
     noise: Noise
     light_levels: Levels
     sharpness_levels: float
@@ -115,22 +115,22 @@ class Calibration(Stored):
 
     @property
     def made_at(self) -> datetime:
-        """When, UTC."""
+        """Return its time, UTC."""
         return time_of(self.id)
 
     @property
     def area_uncertainty(self) -> float:
-        """Relative, of an area in mm²."""
+        """Return the relative uncertainty of an area in mm²."""
         return 2 * self.scale_uncertainty
 
-    def in_words(self) -> str:
-        """One line for records and reports."""
+    def summary(self) -> str:
+        """Describe it in one line, for records and reports."""
         how = "measured" if self.scale_measured else "usual"
         return f"{self.id}: {self.mm_per_px:.5f} mm/px ± {self.scale_uncertainty:.1%}, {how}"
 
 
 class Verification(Stored):
-    """One check of a unit against its calibration."""
+    """One verification of a unit against its calibration."""
 
     schema_version: Literal[1] = 1
     id: Stamp
@@ -139,24 +139,24 @@ class Verification(Stored):
     operator: str
     passed: bool
     area_ratio: float | None
-    """The ball's area over the calibration's at the same widths, median; None where nothing was touched."""
+    """Median ratio of the ball's area to the calibration's at the same widths; None if nothing was touched."""
     onset_mm: float | None
     checks: tuple[Check, ...]
     curve: tuple[PressPoint, ...]
 
     @property
     def made_at(self) -> datetime:
-        """When, UTC."""
+        """Return its time, UTC."""
         return time_of(self.id)
 
     @property
     def drift(self) -> float | None:
-        """The relative change of the ball's area since the calibration."""
+        """Return the relative change of the ball's area since the calibration."""
         return None if self.area_ratio is None else self.area_ratio - 1.0
 
 
 class Refusal(Stored):
-    """What was measured and is no calibration."""
+    """Measurements that are no valid calibration."""
 
     schema_version: Literal[1] = 1
     id: Stamp
@@ -164,20 +164,20 @@ class Refusal(Stored):
     unit: str
     operator: str
     reasons: tuple[str, ...]
-    """In sentences, each with what to do."""
+    """In sentences, each with the remedy."""
     checks: tuple[Check, ...]
-    """Empty where it did not come to them."""
+    """Empty if the run ended before the checks."""
     curve: tuple[PressPoint, ...]
-    """As far as it came."""
+    """The steps until the run ended."""
 
     @property
     def made_at(self) -> datetime:
-        """When, UTC."""
+        """Return its time, UTC."""
         return time_of(self.id)
 
 
 def stamp(at: datetime) -> str:
-    """A record's name from its time.
+    """Return a record's name from its time.
 
     Args:
         at: with its time zone.
@@ -186,9 +186,5 @@ def stamp(at: datetime) -> str:
 
 
 def time_of(name: str) -> datetime:
-    """The time that a record's name tells, UTC.
-
-    Args:
-        name: from `stamp`.
-    """
+    """Return the time in a record's name, UTC."""
     return datetime.strptime(name, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)

@@ -1,4 +1,4 @@
-"""A calibration's and a verification's numbers as pictures."""
+"""Plots of a calibration's and a verification's figures."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -14,10 +14,10 @@ _DOUBTFUL = 0.5
 
 
 def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None) -> bytes:
-    """The ball's area over the gripper's width, as the paper plots it; a verification's beside it.
+    """Plot the ball's area over the gripper's width, as the paper does, with a verification's curve for comparison.
 
     Args:
-        calibration: its curve is drawn.
+        calibration: the curve drawn first.
         now: a verification's curve; None for none.
 
     Returns:
@@ -39,10 +39,7 @@ def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None)
 
 
 def field_plot(field: FieldMap) -> bytes:
-    """Light and noise over the field.
-
-    Args:
-        field: the map.
+    """Plot light and noise over the field.
 
     Returns:
         A PNG file.
@@ -64,7 +61,7 @@ def field_plot(field: FieldMap) -> bytes:
 
 
 def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px: float) -> None:  # noqa: ANN001 (matplotlib's)
-    """Sure points are joined; doubtful ones, and a contact that was lost again, stand alone."""
+    """Join certain points; draw uncertain ones, and a contact that was lost again, as single points."""
     first = next((index for index, point in enumerate(curve) if point.area_px), len(curve))
     sure, doubted = [], []
     for index, point in enumerate(curve):

@@ -1,4 +1,4 @@
-"""A ball pressed step by step, and measured: what calibration and verification have in common."""
+"""Ball press: presses the ball step by step and measures it, for calibration and verification."""
 
 import asyncio
 from collections.abc import Sequence
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from station.calibration.bench import Bench, Pressed
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
+from station.calibration.rig import Pressed, Rig
 from station.settings.recipe import Recipe
 from station.vision.contact import Contact, Flag, Image, Method
 from station.vision.methods import make_method, median_image
@@ -20,12 +20,12 @@ FINEST_STEP_MM = 0.4
 _CONTRAST_BLUR_PX = 2.0
 _CONTRAST_PERCENTILE = 90.0
 _ROOM = 1.2
-"""Of a contact's radius: the gel changes most just inside and outside its edge."""
+"""Share of a contact's radius: the gel changes most just inside and outside its edge."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """One width, as it was measured."""
+    """One width step as it was measured."""
 
     width_mm: float
     image: Image
@@ -35,7 +35,7 @@ class Step:
 
     @property
     def point(self) -> PressPoint:
-        """What is kept of it."""
+        """Return the part that is stored."""
         return PressPoint(
             width_mm=round(self.width_mm, 3),
             area_px=self.contact.area_px,
@@ -46,27 +46,17 @@ class Step:
 
 
 class BallPress:
-    """Presses and measures by a recipe.
+    """Presses and measures by a recipe."""
 
-    Args:
-        bench: gripper, camera, ball.
-        recipe: the ball's.
-        gate_factor: of the unit's calibration.
-    """
-
-    def __init__(self, bench: Bench, recipe: Recipe, gate_factor: float = 1.0) -> None:
-        self._bench, self._recipe = bench, recipe
+    def __init__(self, rig: Rig, recipe: Recipe, gate_factor: float = 1.0) -> None:
+        self._rig, self._recipe = rig, recipe
         self._segmentation = gated(recipe.segmentation, gate_factor)
         self._method: Method | None = None
         self.reference: Image | None = None
 
     async def take_reference(self, number: int) -> Sequence[Image]:
-        """Take frames of the untouched gel, and measure against their median from now on.
-
-        Args:
-            number: how many.
-        """
-        frames = await self._bench.untouched(number)
+        """Take frames of the untouched gel, and measure against their median from now on."""
+        frames = await self._rig.untouched(number)
         self.reference = await asyncio.to_thread(median_image, frames)
         self._method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
         return frames
@@ -83,12 +73,8 @@ class BallPress:
         return await asyncio.to_thread(measure_step, self._method, frames, least)
 
     async def step(self, width_mm: float) -> Step:
-        """Go to a width and measure there.
-
-        Args:
-            width_mm: the width to ask for.
-        """
-        pressed: Pressed = await self._bench.press_to(width_mm)
+        """Move to a width and measure there."""
+        pressed: Pressed = await self._rig.press_to(width_mm)
         contact = await self.measure(pressed.frames)
         image = mean_image(pressed.frames)
         assert self.reference is not None  # noqa: S101 (measured against it just now)
@@ -96,10 +82,10 @@ class BallPress:
         return Step(pressed.width_mm, image, contact, strength)
 
     async def fine_onset(self, untouched_mm: float, touched_mm: float) -> float:
-        """The width of the first contact, to a count of the gripper.
+        """Search the contact onset, to a count of the gripper.
 
         Args:
-            untouched_mm: a width at which nothing touches.
+            untouched_mm: a width without contact.
             touched_mm: a smaller one with contact.
         """
         width_mm = untouched_mm - FINEST_STEP_MM
@@ -112,11 +98,11 @@ class BallPress:
 
 
 def contrast(image: Image, reference: Image, contact: Contact) -> float:
-    """How much a contact changes the image, grey levels: what a worn gel loses first.
+    """Return the change of the image by a contact, grey levels: a worn gel loses it first.
 
     Args:
         image: shape (height, width, 3), dtype uint8.
-        reference: likewise.
+        reference: same shape.
         contact: found in the image; without one the contrast is 0.
     """
     if not contact.found or contact.centroid_px is None:

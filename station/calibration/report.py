@@ -1,26 +1,22 @@
-"""A calibration's or a verification's page, and the files that are stored with it."""
+"""Report of a calibration or a verification, and the files that are stored with it."""
 
 import base64
 
 import cv2
 import jinja2
 
-from station.calibration.calibrating import Draft, Evidence
+from station.calibration.calibration_procedure import Draft, Evidence
 from station.calibration.model import Calibration, Refusal
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE, press_name
-from station.calibration.verifying import Verified, outlined
+from station.calibration.verification_procedure import VerificationResult, outlined
 from station.vision.contact import Image
 
 _TILE_PX = 220
 
 
 def calibration_files(draft: Draft) -> dict[str, bytes]:
-    """The pictures and the page of a calibration, by file name.
-
-    Args:
-        draft: good.
-    """
+    """Return the pictures and the page of a calibration, by file name."""
     calibration = draft.calibration
     area, field = area_plot(calibration), field_plot(calibration.field)
     presses = {press_name(number): png(step.image) for number, step in enumerate(draft.steps)}
@@ -42,13 +38,8 @@ def calibration_files(draft: Draft) -> dict[str, bytes]:
     return {REFERENCE: png(draft.reference), "area.png": area, "field.png": field, **presses, PAGE: page}
 
 
-def verification_files(verified: Verified, calibration: Calibration) -> dict[str, bytes]:
-    """The pictures and the page of a verification, by file name.
-
-    Args:
-        verified: passed or not.
-        calibration: what it was compared with.
-    """
+def verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
+    """Return the pictures and the page of a verification, by file name."""
     verification = verified.verification
     area = area_plot(calibration, verification.curve)
     pictures = {name: png(picture) for name, picture in verified.pictures.items()}
@@ -65,7 +56,7 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
         verdict=verification.passed,
         facts=[
             ("Unit", calibration.unit),
-            ("Calibration", calibration.in_words()),
+            ("Calibration", calibration.summary()),
             ("Operator", verification.operator or "not told"),
             ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
         ],
@@ -77,12 +68,7 @@ def verification_files(verified: Verified, calibration: Calibration) -> dict[str
 
 
 def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
-    """The pictures and the page of what is no calibration, by file name.
-
-    Args:
-        refusal: why.
-        evidence: what was seen.
-    """
+    """Return the pictures and the page of a refused calibration, by file name."""
     reference = evidence.reference
     pictures = {} if reference is None else {REFERENCE: png(reference)}
     pictures |= {press_name(number): png(step.image) for number, step in enumerate(evidence.steps)}
@@ -107,7 +93,7 @@ def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
 
 
 def png(picture: Image) -> bytes:
-    """A picture as a PNG file.
+    """Encode a picture as a PNG file.
 
     Args:
         picture: shape (height, width, 3), dtype uint8.

@@ -1,7 +1,7 @@
-"""Calibrations and verifications on the disk: each a folder of its own, there whole or not at all, and never changed.
+"""Calibration store: each calibration and verification is a folder, written atomically and never changed.
 
-`calibrations/SERIAL/ID/`, `verifications/SERIAL/ID/` and, for a person to see why, `refused_calibrations/SERIAL/ID/` in
-the home folder, with the record, its pictures and a page.
+`calibrations/SERIAL/ID/`, `verifications/SERIAL/ID/` and, to show a person the reasons,
+`refused_calibrations/SERIAL/ID/` in the home folder, with the record, its pictures and a page.
 """
 
 import contextlib
@@ -31,118 +31,77 @@ RecordT = TypeVar("RecordT", bound=Stored)
 
 
 class CalibrationStore:
-    """What was calibrated and verified on one station.
-
-    Args:
-        home: the station's home folder.
-    """
+    """Calibrations and verifications of one station."""
 
     def __init__(self, home: Path) -> None:
         self._home = home
 
     def add_calibration(self, calibration: Calibration, files: Mapping[str, bytes]) -> Path:
-        """Keep a calibration; from now on it is the unit's.
+        """Store a calibration; from now on it is the unit's.
 
         Args:
-            calibration: good.
-            files: its pictures and page, by their names.
+            files: pictures and page, by name.
 
         Returns:
             Its folder.
 
         Raises:
-            CalibrationError: it could not be written, and nothing is left of it.
+            CalibrationError: it could not be written; nothing is left of it.
         """
         return self._add(CALIBRATIONS, calibration.serial, calibration.id, calibration, files)
 
     def add_verification(self, verification: Verification, files: Mapping[str, bytes]) -> Path:
-        """Keep a verification, as `add_calibration`.
-
-        Args:
-            verification: passed or not.
-            files: its pictures and page.
-        """
+        """Store a verification, as `add_calibration`."""
         return self._add(VERIFICATIONS, verification.serial, verification.id, verification, files)
 
     def add_refusal(self, refusal: Refusal, files: Mapping[str, bytes]) -> Path:
-        """Keep what was no calibration, for a person to look at, as `add_calibration`. It is never used.
-
-        Args:
-            refusal: why.
-            files: its pictures and page.
-        """
+        """Store a refused calibration for a person to inspect, as `add_calibration`. It is never used."""
         return self._add(REFUSALS, refusal.serial, refusal.id, refusal, files)
 
     def serials(self) -> tuple[str, ...]:
-        """The units that were ever calibrated."""
+        """Return the units that were ever calibrated."""
         return tuple(sorted(path.name for path in _folders(self._home / CALIBRATIONS)))
 
     def calibrations(self, serial: str) -> tuple[Calibration, ...]:
-        """A unit's calibrations that can be read, the newest first.
-
-        Args:
-            serial: the unit's.
-        """
+        """Return a unit's readable calibrations, the newest first."""
         return tuple(self._all(CALIBRATIONS, serial, Calibration))
 
     def current(self, serial: str) -> Calibration | None:
-        """The unit's newest calibration that can be read; None where there is none.
-
-        Args:
-            serial: the unit's.
-        """
+        """Return the unit's newest readable calibration; None if there is none."""
         return next(self._all(CALIBRATIONS, serial, Calibration), None)
 
     def verifications(self, serial: str) -> tuple[Verification, ...]:
-        """A unit's verifications that can be read, the newest first.
-
-        Args:
-            serial: the unit's.
-        """
+        """Return a unit's readable verifications, the newest first."""
         return tuple(self._all(VERIFICATIONS, serial, Verification))
 
     def last_verification(self, calibration: Calibration) -> Verification | None:
-        """The newest verification against a calibration; None where there is none.
-
-        Args:
-            calibration: the unit's.
-        """
+        """Return the newest verification against a calibration; None if there is none."""
         of_unit = self._all(VERIFICATIONS, calibration.serial, Verification)
         return next((one for one in of_unit if one.calibration == calibration.id), None)
 
     def golden(self, calibration: Calibration) -> Image:
-        """A calibration's picture of the untouched gel.
-
-        Args:
-            calibration: one of these.
+        """Read a calibration's picture of the untouched gel.
 
         Raises:
-            CalibrationError: it is gone or no picture.
+            CalibrationError: it is missing or no picture.
         """
         return _picture(self.folder(calibration) / REFERENCE)
 
     def presses(self, calibration: Calibration) -> list[Image]:
-        """A calibration's pictures of the ball, in the order of its curve.
-
-        Args:
-            calibration: one of these.
+        """Read a calibration's pictures of the ball, in the order of its curve.
 
         Raises:
-            CalibrationError: one is gone or no picture.
+            CalibrationError: one is missing or no picture.
         """
         return [_picture(self.folder(calibration) / press_name(number)) for number in range(len(calibration.curve))]
 
     def folder(self, record: Calibration | Verification) -> Path:
-        """Where a record and its page lie.
-
-        Args:
-            record: one of these.
-        """
+        """Return the folder of a record and its page."""
         kind = CALIBRATIONS if isinstance(record, Calibration) else VERIFICATIONS
         return self._home / kind / record.serial / record.id
 
     def find(self, name: str, serial: str | None = None) -> Calibration:
-        """A calibration by its name.
+        """Find a calibration by its name.
 
         Args:
             name: as `list` shows it.
@@ -190,7 +149,7 @@ class CalibrationStore:
 
 
 def press_name(number: int) -> str:
-    """The file of a step's picture.
+    """Return the file name of a step's picture.
 
     Args:
         number: of the step, from 0.

@@ -1,1 +1,1 @@
-"""The commands of the station's command line: arguments in, one call into a room, results out."""
+"""Command line adapters: each passes its arguments to a package and prints the results."""

@@ -1,4 +1,4 @@
-"""`station alarms`: what a running station's alarms say, and what a person does with them."""
+"""`station alarms`: list, acknowledge and shelve a running station's alarms."""
 
 import asyncio
 from datetime import UTC, datetime
@@ -21,7 +21,7 @@ from station.channel.panel import (
 from station.commands.records_options import by_option, config_option
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
-from station.records.wording import printable
+from station.records.texts import printable
 from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
 
@@ -34,18 +34,18 @@ _alarm = click.argument("alarm", metavar="ALARM")
 
 @click.group()
 def alarms() -> None:
-    """See, acknowledge and shelve the alarms of the running station; docs/alarms.md explains each ALARM."""
+    """List, acknowledge and shelve the alarms of the running station; docs/alarms.md explains each ALARM."""
 
 
 @alarms.command("list")
 @config_option
 def listed(config: Path | None) -> None:
-    """List the alarms that stand, most urgent first, with what to do; those that are shelved come last."""
+    """List the active alarms, most urgent first, with what to do; shelved ones come last."""
     found = asyncio.run(_ask(config, ListAlarms(), AlarmList)).alarms
     if not found:
         click.echo("no alarm stands")
     for each in sorted(found, key=lambda each: each.shelved_until_utc_ms is not None):
-        click.echo(printable(_told(each)))
+        click.echo(printable(_format(each)))
 
 
 @alarms.command()
@@ -53,7 +53,7 @@ def listed(config: Path | None) -> None:
 @by_option
 @config_option
 def acknowledge(alarm: str, by: str, config: Path | None) -> None:
-    """Say that somebody has seen ALARM. Doing so again changes nothing."""
+    """Acknowledge ALARM. Repeating it changes nothing."""
     _order(config, AcknowledgeAlarm(alarm=alarm, who=by, role=_ROLE))
     click.echo(f"{alarm} is acknowledged")
 
@@ -71,7 +71,7 @@ def acknowledge(alarm: str, by: str, config: Path | None) -> None:
 @by_option
 @config_option
 def shelve(alarm: str, minutes: int, reason: str, by: str, config: Path | None) -> None:
-    """Hide ALARM for a time, from the list and from the PLC. One that a person has to reset is never hidden."""
+    """Hide ALARM for a time, from the list and from the PLC. An alarm that needs a person's reset is never hidden."""
     _order(config, ShelveAlarm(alarm=alarm, who=by, role=_ROLE, reason=reason, for_s=60.0 * minutes))
     click.echo(f"{alarm} is shelved for {minutes} min")
 
@@ -81,7 +81,7 @@ def shelve(alarm: str, minutes: int, reason: str, by: str, config: Path | None) 
 @by_option
 @config_option
 def unshelve(alarm: str, by: str, config: Path | None) -> None:
-    """Show ALARM again before its time is over. Doing so again changes nothing."""
+    """Show ALARM again before its time is over. Repeating it changes nothing."""
     _order(config, UnshelveAlarm(alarm=alarm, who=by, role=_ROLE))
     click.echo(f"{alarm} is not shelved")
 
@@ -101,7 +101,7 @@ async def _ask(config: Path | None, request: Message, reply: type[ReplyT]) -> Re
             raise StationError(f"{error}; alarms are a running station's: see whether one runs") from error
 
 
-def _told(each: ListedAlarm) -> str:
+def _format(each: ListedAlarm) -> str:
     times = "" if each.raised <= 1 else f", {each.raised} times"
     head = f"{each.alarm} ({each.priority}, {each.state}) since {_time(each.since_utc_ms)}{times}"
     if each.shelved_until_utc_ms is not None:

@@ -56,7 +56,7 @@ def analyze_command(
     """Measure the deformed area in tactile images: files, folders or videos.
 
     Writes results.csv, masks/, contact_sheet.png and report.html into the folder given with --out. An image that
-    cannot be measured is listed in errors.csv; the others' results are kept, and the exit code is 2.
+    cannot be measured is listed in errors.csv; the others' results are written, and the exit code is 2.
 
     A video, and images with --widths or --sequence, are steps of a press: each is measured with the step before.
     Each video and each folder is a press of its own. Other images are measured each by itself.

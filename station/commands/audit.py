@@ -1,4 +1,4 @@
-"""`station audit`: who changed or commanded what, and whether the trail of it is whole."""
+"""`station audit`: show and verify the audit trail."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import click
 from station.errors import BadInputError
 from station.records.audit_check import check_audit
 from station.records.audit_head import Head, read_head
-from station.records.audit_report import read_audit, told
+from station.records.audit_report import format_rows, read_audit
 from station.records.database import reading, records_folder
 from station.settings.configuration import load_configuration
 
@@ -21,7 +21,7 @@ _config = click.option(
 
 @click.group()
 def audit() -> None:
-    """Ask who changed or commanded what, and whether the trail is whole."""
+    """Show who changed or commanded what, and verify that the trail is complete."""
 
 
 @audit.command()
@@ -30,9 +30,9 @@ def audit() -> None:
 @click.option("--subject", default="", metavar="TEXT", help="Only rows with this text in their subject.")
 @_config
 def show(last: int, action: str, subject: str, config: Path | None) -> None:
-    """Show the last rows, oldest first: what was done, to what, by whom, when, why, and what was before."""
+    """Show the last rows, oldest first: action, object, person, time, reason, and the value before."""
     with reading(records_folder(load_configuration(config).home)) as connection:
-        click.echo(told(read_audit(connection, last, action, subject)))
+        click.echo(format_rows(read_audit(connection, last, action, subject)))
 
 
 @audit.command()
@@ -45,10 +45,10 @@ def show(last: int, action: str, subject: str, config: Path | None) -> None:
 @_config
 @click.pass_context
 def verify(context: click.Context, anchors: tuple[str, ...], since: int, config: Path | None) -> None:
-    """Check that no row was changed, removed or put between; exit code 1 where one was.
+    """Check that no row was changed, removed or inserted; exit code 1 if one was.
 
-    Rows cut off at the end are found by the head that is kept beside the database, and by any ROW:HASH that this
-    command has printed before and somebody has noted elsewhere.
+    Rows cut off at the end are found by the head that is stored beside the database, and by any ROW:HASH that this
+    command printed before and a person stored elsewhere.
     """
     folder, known = records_folder(load_configuration(config).home), [_anchor(text) for text in anchors]
     with reading(folder) as connection:

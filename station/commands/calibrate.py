@@ -1,4 +1,4 @@
-"""`station calibrate`: what this sensor on this gripper makes of a ball of known size."""
+"""`station calibrate`: calibrate the sensor on its gripper with a ball of known size."""
 
 import asyncio
 import getpass
@@ -9,14 +9,14 @@ from pathlib import Path
 
 import click
 
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import Calibrating, Draft, Evidence
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft, Evidence
 from station.calibration.errors import CalibrationError, RefusedError
 from station.calibration.model import Check, Refusal, stamp
 from station.calibration.report import refusal_files
+from station.calibration.rig import Place, Unit
 from station.calibration.store import PAGE, CalibrationStore
-from station.commands.ball import at_the_bench, cancelled_by_signals, show
-from station.commands.calibration_storing import store_calibration
+from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
+from station.commands.calibration_storage import store_calibration
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError
 from station.settings.configuration import Configuration, load_configuration
@@ -25,18 +25,12 @@ _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FIL
 
 
 class _PlaceType(click.ParamType):
-    """A place of the ball, `x,y` in mm."""
+    """Place of the ball, `x,y` in mm."""
 
     name = "x,y"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Place:
-        """Read a place.
-
-        Args:
-            value: as typed.
-            param: click's.
-            ctx: click's.
-        """
+        """Read a place."""
         if isinstance(value, Place):
             return value
         try:
@@ -72,21 +66,21 @@ def calibrate(
 ) -> None:
     """Calibrate the sensor with the rubber ball, and store the result. The gripper closes on the ball.
 
-    The station must not run meanwhile. A result that is no good is no calibration: the reasons are told, and where its
-    pictures lie. Called off with Ctrl-C, nothing is stored.
+    The station must not run meanwhile. A result that fails a check is not stored as a calibration: the reasons are
+    printed, and the folder of its pictures. Cancelled with Ctrl-C, nothing is stored.
     """
     if context.invoked_subcommand is not None:
         return
     site = load_configuration(config)
     draft = _run(site, operator, places, bench=bench, yes=yes)
     folder = store_calibration(site, operator, draft)
-    _tell(draft.calibration.checks)
-    click.echo(f"calibration {draft.calibration.in_words()}")
+    _print_progress(draft.calibration.checks)
+    click.echo(f"calibration {draft.calibration.summary()}")
     click.echo(f"stored; look at {folder / PAGE}")
 
 
-def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:
-    """Keep the pictures by which a person sees why."""
+def _store_refusal(site: Configuration, unit: Unit, operator: str, refused: RefusedError, evidence: Evidence) -> Path:
+    """Store the pictures that show a person the reasons."""
     refusal = Refusal(
         id=stamp(datetime.now(UTC)),
         serial=unit.serial,
@@ -102,9 +96,9 @@ def _keep_refusal(site: Configuration, unit: Unit, operator: str, refused: Refus
 def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench: bool, yes: bool) -> Draft:
     async def run() -> Draft:
         cancelled_by_signals()
-        async with at_the_bench(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
+        async with open_rig(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
             try:
-                procedure = Calibrating(
+                procedure = CalibrationProcedure(
                     ball_bench,
                     unit,
                     recipe,
@@ -119,7 +113,7 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
             try:
                 return await procedure.run()
             except RefusedError as refused:
-                folder = _keep_refusal(site, unit, operator, refused, procedure.evidence)
+                folder = _store_refusal(site, unit, operator, refused, procedure.evidence)
                 raise CalibrationError(f"{refused}; look at {folder / PAGE}") from refused
 
     logging.basicConfig(format="station: %(message)s")
@@ -129,7 +123,7 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
         raise click.Abort from None
 
 
-def _tell(checks: tuple[Check, ...]) -> None:
+def _print_progress(checks: tuple[Check, ...]) -> None:
     for check in checks:
         click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:12}{check.found}")
 
@@ -137,9 +131,9 @@ def _tell(checks: tuple[Check, ...]) -> None:
 @calibrate.command("simulated")
 @_CONFIG
 def simulated_command(config: Path | None) -> None:
-    """Calibrate the twin's sensor where it never was, in a few seconds: on a drawn ball at three places.
+    """Calibrate the twin's sensor if it never was, in a few seconds: on a drawn ball at three places.
 
-    No device is asked, so that the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
+    No device is used, so the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
     """
     site = load_configuration(config)
     if site.camera.driver != "twin":
@@ -148,7 +142,7 @@ def simulated_command(config: Path | None) -> None:
             "station calibrate"
         )
     made = calibrate_simulated_unit(site, getpass.getuser())
-    click.echo(f"calibration {made.in_words()}" if made else "it is calibrated already; see station calibrate list")
+    click.echo(f"calibration {made.summary()}" if made else "it is calibrated already; see station calibrate list")
 
 
 @calibrate.command("list")
@@ -165,20 +159,20 @@ def list_command(config: Path | None) -> None:
         click.echo("nothing is calibrated yet; see station calibrate --help")
     for serial, calibration, verified in rows:
         state = "" if verified is None else f", verified {verified.id}: {'PASS' if verified.passed else 'FAIL'}"
-        click.echo(f"{serial:16}{calibration.in_words()}, by {calibration.operator}{state}")
+        click.echo(f"{serial:16}{calibration.summary()}, by {calibration.operator}{state}")
 
 
 @calibrate.command("show")
 @click.argument("name", metavar="ID")
 @_CONFIG
 def show_command(name: str, config: Path | None) -> None:
-    """Show one calibration: its numbers, its checks, and where its page lies."""
+    """Show one calibration: its numbers, its checks, and the path of its page."""
     store = CalibrationStore(load_configuration(config).home)
     calibration = store.find(name)
     click.echo(f"{calibration.serial}, {calibration.unit}, by {calibration.operator}")
-    click.echo(calibration.in_words())
+    click.echo(calibration.summary())
     click.echo(f"onset {calibration.onset_mm:.2f} mm, the gripper's zero is off by {calibration.zero_mm:+.2f} mm")
-    _tell(calibration.checks)
+    _print_progress(calibration.checks)
     for verification in store.verifications(calibration.serial):
         if verification.calibration == calibration.id:
             verdict = "PASS" if verification.passed else "FAIL"

@@ -1,4 +1,4 @@
-"""`station config`: look at the configuration, check it, and bring an earlier program's up to date."""
+"""`station config`: show, check and migrate the configuration."""
 
 import ipaddress
 import os
@@ -41,13 +41,13 @@ def _zones(context: click.Context, option: click.Parameter, given: tuple[str, ..
 
 @click.group()
 def config() -> None:
-    """Look at the configuration, check it, and bring an earlier program's up to date."""
+    """Show the configuration, check it, and migrate an earlier program's."""
 
 
 @config.command()
 @_config
 def check(config: Path | None) -> None:
-    """Check the configuration with its environment variables, and say all that is wrong."""
+    """Check the configuration with its environment variables, and report all errors."""
     site = load_configuration(config)
     click.echo(f"OK: home {site.home}, camera {site.camera.driver}, arm {site.arm.host}, gripper {site.gripper.driver}")
 
@@ -55,7 +55,7 @@ def check(config: Path | None) -> None:
 @config.command()
 @_config
 def show(config: Path | None) -> None:
-    """Show what is in force, as JSON: defaults, overridden by the file, overridden by the environment."""
+    """Show the configuration in force, as JSON: defaults, overridden by the file, overridden by the environment."""
     click.echo(load_configuration(config).model_dump_json(indent=2))
 
 
@@ -63,9 +63,9 @@ def show(config: Path | None) -> None:
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--write", is_flag=True, help="Change FILE; without it, only what would be changed is said.")
 def migrate(file: Path, *, write: bool) -> None:
-    """Bring FILE, a station.yaml of an earlier program, into this program's words. Doing so again changes nothing.
+    """Migrate FILE, a station.yaml of an earlier program, to this program's terms. Repeating it changes nothing.
 
-    Comments stay. The file is replaced whole or not at all, and keeps its owner and rights.
+    Comments stay. The file is replaced atomically, with its owner and permissions.
     """
     changed = migrated(_text(file), str(file))
     for change in changed.changes:
@@ -86,12 +86,12 @@ def migrate(file: Path, *, write: bool) -> None:
     "--maintenance", metavar="ADDRESS", multiple=True, callback=_networks, help="From where SSH, time and names come."
 )
 def firewall(config: Path | None, zones: dict[Zone, tuple[str, ...]], maintenance: tuple[str, ...]) -> None:
-    """Write rules of nftables that open what this configuration uses, for the zones named, and nothing else."""
+    """Write nftables rules that open what this configuration uses, for the given zones, and nothing else."""
     click.echo(rules(load_configuration(config), zones, maintenance), nl=False)
 
 
 def _text(file: Path) -> str:
-    """A file's text, at most as long as the station reads."""
+    """Read a file's text, at most as long as the station reads."""
     try:
         with file.open("rb") as source:
             content = source.read(LARGEST_FILE_BYTES + 1)

@@ -1,4 +1,4 @@
-"""`station demo`: the whole station against the simulated world, fruit after fruit, on the real protocols."""
+"""`station demo`: the whole station with the simulated world and line, on the real protocols."""
 
 import asyncio
 import os
@@ -19,8 +19,8 @@ from station.commands.run import addresses
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
-from station.records.reading import read_inspection
-from station.records.wording import sparkline
+from station.records.queries import read_inspection
+from station.records.texts import sparkline
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
@@ -29,7 +29,7 @@ from station.supervision.supervisor import Supervisor
 FRUITS = ("strawberry", "raspberry", "blueberry")
 _LOT = "DEMO"
 _FAULT_EVERY = 4
-# A desk's machine is no real-time controller, and no arm can come to harm here by a state that is a little old.
+# A desktop computer is no real-time controller, and a slightly old state can harm no arm here.
 _PATIENCE = {"stale_after_s": 0.5, "link_lost_after_s": 2.0}
 
 
@@ -61,11 +61,11 @@ def demo(
     graded: bool,  # noqa: FBT001 (click passes arguments by name)
     faults: bool,  # noqa: FBT001
 ) -> None:
-    """Run the station against the twin, with a line that brings fruit, triggers, and reads the outcomes.
+    """Run the station against the twin, with a line that feeds fruit, triggers, and reads the outcomes.
 
-    Arm, gripper, sensor and PLC are simulated, what is between them is real: RTDE, the gripper's socket, camera frames
-    and Modbus TCP. The first time, the simulated sensor is calibrated by a drawn ball, in a few seconds. Logs and
-    records lie in the home folder's `demo`.
+    Arm, gripper, sensor and PLC are simulated, the protocols between them are real: RTDE, the gripper's socket, camera
+    frames and Modbus TCP. The first time, the simulated sensor is calibrated by a drawn ball, in a few seconds. Logs
+    and records are in the home folder's `demo`.
     """
     asked = load_configuration()
     os.environ["STATION_HOME"] = str(asked.home.resolve() / "demo")
@@ -80,13 +80,13 @@ def demo(
     pace = Pace(every_s=60 / speed if speed else 0.0)
     new = calibrate_simulated_unit(site, "demo")
     if new is not None:
-        click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.in_words()}")
+        click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.summary()}")
     supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])
     asyncio.run(_run(site, supervisor, nest, LineProgram(plan, _LOT), pace, count))
 
 
 def _refuse_real_devices(site: Configuration) -> None:
-    """A demonstration must not move a real arm because a site's configuration happens to be in force."""
+    """Refuse a configuration of real devices: a demonstration must not move a real arm."""
     hosts = {
         "arm.host": site.arm.host,
         "gripper.urcap.host": site.gripper.urcap.host,
@@ -155,7 +155,7 @@ async def _inspect(
 
 
 def _sketch(site: Configuration, sequence: int) -> str:
-    """A result's area over closing, from the station's records."""
+    """Draw a result's area over closing, from the station's records."""
     folder = records_folder(site.home)
     try:
         with reading(folder) as connection:

@@ -1,4 +1,4 @@
-"""`station devices`: what answers at the devices' addresses."""
+"""`station devices`: check the devices, and recover the arm."""
 
 import asyncio
 import contextlib
@@ -15,7 +15,7 @@ from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
 from station.devices.camera.probe import probe_camera
-from station.devices.finding import Finding
+from station.devices.check_result import CheckResult
 from station.devices.gripper.probe import probe_gripper
 from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
@@ -29,18 +29,18 @@ _COLOURS = {"ok": "green", "warning": "yellow", "fault": "red"}
 
 @click.group("devices")
 def devices() -> None:
-    """Look at the station's devices, and bring the arm back after a stop."""
+    """Check the station's devices, and recover the arm after a stop."""
 
 
 @devices.command("check")
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 @click.option("--bench", is_flag=True, help="No arm.")
 def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click passes arguments by name)
-    """Ask every device who it is and how it does; nothing is moved.
+    """Check every device's identity and state; nothing is moved.
 
-    Says for each what was found, a verdict, and what to do. The exit code is 1 where a device is faulty.
+    Prints for each the finding, a verdict, and what to do. The exit code is 1 if a device is faulty.
     """
-    findings = asyncio.run(_look(load_configuration(config), bench=bench))
+    findings = asyncio.run(_check_devices(load_configuration(config), bench=bench))
     for finding in findings:
         verdict = click.style(f"{finding.verdict:8}", fg=_COLOURS[finding.verdict])
         click.echo(f"{verdict}{finding.device:16}{finding.found}")
@@ -59,7 +59,7 @@ VERBS = get_args(RecoveryName)
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 @click.option("--yes", is_flag=True, help="Do not ask: a person has looked.")
 def recover(what: RecoveryName, config: Path | None, yes: bool) -> None:  # noqa: FBT001
-    """Bring the arm back after a stop, once a person has looked at the cell.
+    """Recover the arm after a stop, once a person has checked the cell.
 
     protective-stop: confirm it and start the program again; power: power on and release the brakes, after an
     emergency stop too; program: upload it again, after the pendant stopped it or took local control.
@@ -76,7 +76,7 @@ async def _recover(configuration: Configuration, what: RecoveryName) -> None:
 
 
 async def _recovered_by_the_station(configuration: Configuration, what: RecoveryName) -> bool:
-    """Ask the station's process, which holds the arm's registers while it runs; False where none runs."""
+    """Request the recovery from the station, which has the arm's registers while it runs; False if none runs."""
     endpoint = line_endpoint(configuration.handshake, configuration.home)
     async with ChannelClient(endpoint, "the station") as station:
         try:
@@ -105,7 +105,7 @@ async def _recover_alone(configuration: Configuration, what: RecoveryName) -> No
         await arm.ready(_ARM_DEADLINE_S)
 
 
-async def _look(configuration: Configuration, *, bench: bool) -> list[Finding]:
+async def _check_devices(configuration: Configuration, *, bench: bool) -> list[CheckResult]:
     others = asyncio.gather(probe_gripper(configuration.gripper), probe_camera(configuration.camera))
     arm = [] if bench else await probe_arm(configuration.arm)
     return [*arm, *(finding for found in await others for finding in found)]

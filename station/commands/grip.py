@@ -1,4 +1,4 @@
-"""`station grip`: one grip, its frames and widths kept for `station analyze`."""
+"""`station grip`: one grip, its frames and widths written for `station analyze`."""
 
 import asyncio
 import contextlib
@@ -36,7 +36,7 @@ _COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_
 def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click's way)
     """Grip one fruit by a recipe's width steps, without a judgement. The arm and the gripper move.
 
-    Writes reference/, frames/ and widths.csv with the measured widths, and truth/ where the camera is the twin's.
+    Writes reference/, frames/ and widths.csv with the measured widths, and truth/ with the twin's camera.
     """
     configuration = load_configuration(config)
     recipe = find_recipe(recipe_name, configuration.recipes_folder)
@@ -53,7 +53,7 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
 
 
 async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
-    called_off = _call_off_by_signal()
+    called_off = _cancelled_by_signal()
     camera = camera_from(configuration.camera)
     async with contextlib.AsyncExitStack() as stack:
         stack.push_async_callback(camera.close)
@@ -79,8 +79,8 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
         raise asyncio.CancelledError
 
 
-def _call_off_by_signal() -> asyncio.Event:
-    """Let Ctrl-C, and what ends a service, cancel the task that calls this; the event tells that one came."""
+def _cancelled_by_signal() -> asyncio.Event:
+    """Let Ctrl-C, and the signal that ends a service, cancel the calling task and set the event."""
     called_off = asyncio.Event()
     task = asyncio.current_task()
 
@@ -95,7 +95,7 @@ def _call_off_by_signal() -> asyncio.Event:
 
 
 class _Recording:
-    """The folder of one grip; what was reached stays, whatever comes after."""
+    """Folder of one grip; written steps remain, whatever fails later."""
 
     def __init__(self, folder: Path) -> None:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -105,11 +105,11 @@ class _Recording:
 
     @property
     def count(self) -> int:
-        """How many steps are kept."""
+        """Return the number of written steps."""
         return len(self._rows)
 
     def add_references(self, references: Sequence[Image]) -> None:
-        """Keep the reference frames.
+        """Write the reference frames.
 
         Args:
             references: images with nothing touching the gel.
@@ -118,10 +118,9 @@ class _Recording:
             self._write(f"reference/reference_{number}.png", image)
 
     def add(self, step: GripStep, mask: npt.NDArray[np.uint8] | None) -> None:
-        """Keep a step: picture, true mask where it is known, and a row of the table.
+        """Write a step: picture, true mask if known, and a row of the table.
 
         Args:
-            step: as reached.
             mask: shape (height, width), 0 or 255.
         """
         name = f"step_{len(self._rows):02d}.png"

@@ -1,4 +1,4 @@
-"""`station grr`: how far a measurement repeats, and whether others would get the same."""
+"""`station grr`: repeatability and reproducibility of the measurement."""
 
 import os
 import sys
@@ -54,7 +54,7 @@ def grr(
     """Analyse a gauge study: every operator measured every part several times.
 
     The CSV file has the columns part,operator,repeat,area_mm2 and, where known, outcome (PASS, FAIL, NO_RESULT) and
-    reference (PASS, FAIL). Writes measurements.csv, grr.json and report.html; interrupted, it leaves nothing.
+    reference (PASS, FAIL). Writes measurements.csv, grr.json and report.html; interrupted, it writes nothing.
     """
     if twin == (measurements is not None):
         raise click.UsageError("expected either a CSV file of measurements or --twin")

@@ -1,4 +1,4 @@
-"""`station outbox`: other systems are told of inspections, lots and the audit trail."""
+"""`station outbox`: publish inspections, lots and the audit trail to other systems."""
 
 import asyncio
 import contextlib
@@ -12,23 +12,23 @@ from station.commands.records_options import config_option
 from station.errors import StationError
 from station.logs import configure_logging
 from station.outbox.lag import LOST_S
+from station.outbox.publisher import destinations, run_outbox
 from station.outbox.status import outbox_folder, read_status
-from station.outbox.telling import destinations, keep_telling
 from station.settings.configuration import Configuration, load_configuration
 from station.supervision.notify import feed_watchdog, notify
 
 
 @click.group()
 def outbox() -> None:
-    """Tell other systems of inspections, lots and the audit trail: PostgreSQL, MQTT."""
+    """Publish inspections, lots and the audit trail to other systems: PostgreSQL, MQTT."""
 
 
 @outbox.command()
 @config_option
 def run(config: Path | None) -> None:
-    """Tell them until SIGTERM or Ctrl-C; `station run` starts this by itself where one is enabled.
+    """Publish until SIGTERM or Ctrl-C; `station run` starts this by itself if a destination is enabled.
 
-    It reads the records and never writes them; what cannot be told now is told later, in order.
+    It reads the records and never writes them; what cannot be published now is published later, in order.
     """
     configure_logging("outbox")
     asyncio.run(_until_ended(load_configuration(config)))
@@ -37,7 +37,7 @@ def run(config: Path | None) -> None:
 @outbox.command()
 @config_option
 def status(config: Path | None) -> None:
-    """Say how far they are told; exit code 1 where one is behind for want of a connection."""
+    """Show each destination's delay; exit code 1 if one is delayed by a lost connection."""
     site = load_configuration(config)
     said = read_status(outbox_folder(site.home))
     wanted = [each.name for each in destinations(site.outbox, site.home)]
@@ -70,7 +70,7 @@ async def _until_ended(site: Configuration) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     tasks = [
-        asyncio.create_task(keep_telling(site.outbox, site.home, progress), name="outbox"),
+        asyncio.create_task(run_outbox(site.outbox, site.home, progress), name="outbox"),
         asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < LOST_S), name="watchdog"),
         asyncio.create_task(ended.wait(), name="order to end"),
     ]

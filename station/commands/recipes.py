@@ -1,4 +1,4 @@
-"""`station recipes`: look after recipes, their revisions and who approves them."""
+"""`station recipes`: manage recipes, their revisions and approvals."""
 
 import os
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from station.errors import BadInputError
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import FileState, RecipeState
 from station.recipe_store.revision import Revision, Status
-from station.recipe_store.standing import FileState, Standing
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened
@@ -36,7 +36,7 @@ _base = click.option(
 
 
 def _person(command: Command) -> Command:
-    """Ask who acts, in what capacity, and why: it goes into the audit trail."""
+    """Add the options of the person, role and reason, for the audit trail."""
     why = click.option("--reason", required=True, help="Why; for the audit trail.")
     role = click.option("--role", default="quality", show_default=True, help="In what capacity.")
     return click.option("--who", "--by", "who", required=True, metavar="NAME", help="Who does it.")(role(why(command)))
@@ -44,7 +44,7 @@ def _person(command: Command) -> Command:
 
 @click.group()
 def recipes() -> None:
-    """Look after recipes: their files, their revisions, and who approves them."""
+    """Manage recipes: their files, revisions and approvals."""
 
 
 @recipes.command()
@@ -52,9 +52,9 @@ def recipes() -> None:
 @_config
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...], config: Path | None) -> None:
-    """Check recipe files, and say all that is wrong with them.
+    """Check recipe files, and report all their errors.
 
-    A FILE may be a folder. Without FILE the configured folder is checked, or else the recipes shipped.
+    A FILE may be a folder. Without FILE the configured folder is checked, or else the shipped recipes.
     """
     if not files:
         files = tuple(recipe_files(load_configuration(config).recipes_folder))
@@ -62,7 +62,7 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
     found = [path for file in files for path in (recipe_files(file) if os.path.isdir(file) else [file])]  # noqa: PTH112
     checked = check_recipes(dict.fromkeys(found))
     for path, recipe in checked.recipes.items():
-        click.echo(f"OK {shortened(str(path), 1000)}: {_facts(recipe)}")
+        click.echo(f"OK {shortened(str(path), 1000)}: {_format_recipe(recipe)}")
     for problem in checked.problems:
         click.echo(str(problem), err=True)
     if checked.problems:
@@ -72,7 +72,7 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
 @recipes.command("list")
 @_config
 def list_all(config: Path | None) -> None:
-    """List the recipes: the revision in force, what the file says beside it, and what waits for whom."""
+    """List the recipes: the revision in force, the state of the file, and drafts that wait for approval."""
     store = _store(config)
     standings, problems = store.read()
     begun = bool(store.history())
@@ -91,21 +91,21 @@ def list_all(config: Path | None) -> None:
 @_revision
 @_config
 def show(name: str, revision: int | None, config: Path | None) -> None:
-    """Show a recipe's file, or the text of one of its revisions, as it was written."""
+    """Show a recipe's file, or the text of one of its revisions, unchanged."""
     store = _store(config)
-    click.echo(store.good_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
+    click.echo(store.valid_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
 
 
 @recipes.command()
 @click.argument("name")
 @_config
 def history(name: str, config: Path | None) -> None:
-    """Show a recipe's revisions: who wrote, approved and retired them, when, why, and what changed."""
+    """Show a recipe's revisions: author, approver, retirement, times, reasons and changes."""
     store = _store(config)
-    store.standing(name)
+    store.state(name)
     before: Revision | None = None
     for each in store.history(name):
-        click.echo("\n".join(_told(each, before)))
+        click.echo("\n".join(_format_revision(each, before)))
         before = each
 
 
@@ -117,14 +117,14 @@ def history(name: str, config: Path | None) -> None:
 def diff(name: str, old: int | None, new: int | None, config: Path | None) -> None:
     """Show every value that differs between two revisions, or between the approved one and the file."""
     store = _store(config)
-    standing = store.standing(name)
+    standing = store.state(name)
     if old is not None:
         before = store.revision(name, old).recipe
     elif standing.control is not None:
         before = standing.control.recipe
     else:
         raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --from")
-    after = store.good_file(name).recipe if new is None else store.revision(name, new).recipe
+    after = store.valid_file(name).recipe if new is None else store.revision(name, new).recipe
     for difference in differences(before, after):
         click.echo(str(difference))
 
@@ -132,7 +132,7 @@ def diff(name: str, old: int | None, new: int | None, config: Path | None) -> No
 @recipes.command()
 @_config
 def adopt(config: Path | None) -> None:
-    """Begin the history, as the station's first start does: what is there counts as approved. Idempotent."""
+    """Start the history, as the station's first start does: existing recipes count as approved. Idempotent."""
     store = _store(config)
     store.begin({})
     for standing in store.read()[0]:
@@ -148,9 +148,9 @@ def adopt(config: Path | None) -> None:
 @_person
 @_config
 def edit(name: str, changes: tuple[str, ...], base: str, who: str, role: str, reason: str, config: Path | None) -> None:
-    """Change values in a recipe's file, its comments kept. It is an unapproved draft then: submit it.
+    """Change values in a recipe's file; comments remain. The file is then an unapproved draft: submit it.
 
-    With --base the change is refused where the file is not what it was made to, and the message says what changed.
+    With --base the change is refused if the file is another version, and the message lists the differences.
     """
     values = dict(_change(text) for text in changes)
     standing = _editor(config).edit(name, values, Person(who, role, reason), base)
@@ -195,7 +195,7 @@ def retire(name: str, revision: int | None, who: str, role: str, reason: str, co
 @_person
 @_config
 def revert(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
-    """Put the approved revision's text back into the file, or another's; what stood there is kept as a backup."""
+    """Put the approved revision's text, or another's, back into the file; the present text is stored as a backup."""
     click.echo(_line(_editor(config).revert(name, Person(who, role, reason), revision)))
 
 
@@ -205,7 +205,7 @@ def revert(name: str, revision: int | None, who: str, role: str, reason: str, co
 @click.option("--out", metavar="FILE", type=click.Path(path_type=Path), help="[default: standard output]")
 @_config
 def export_one(name: str, revision: int | None, out: Path | None, config: Path | None) -> None:
-    """Write a recipe with a first line that names what it is, for editing it elsewhere and importing it again."""
+    """Write a recipe with a first line that names its version, to edit it elsewhere and import it again."""
     text = _editor(config).export_text(name, revision)
     if out is None:
         click.echo(text, nl=False)
@@ -222,9 +222,9 @@ def export_one(name: str, revision: int | None, out: Path | None, config: Path |
 @_person
 @_config
 def import_one(file: Path, base: str, who: str, role: str, reason: str, config: Path | None) -> None:
-    """Put FILE in the place of the recipe's file. It is an unapproved draft then: submit it.
+    """Replace the recipe's file by FILE. It is then an unapproved draft: submit it.
 
-    Refused where the recipe was changed since FILE was exported; the message says what changed.
+    Refused where the recipe was changed since FILE was exported; the message lists the differences.
     """
     check = check_recipes([file])
     if check.problems:
@@ -237,7 +237,7 @@ def import_one(file: Path, base: str, who: str, role: str, reason: str, config: 
 @_person
 @_config
 def upgrade(who: str, role: str, reason: str, config: Path | None) -> None:
-    """Write files of an earlier form in this program's form, comments kept, with a backup. Idempotent."""
+    """Convert files of an earlier schema to this program's, comments included, with a backup. Idempotent."""
     done = _editor(config).upgrade(Person(who, role, reason))
     for path, form in done:
         click.echo(f"{path}: form {form} upgraded")
@@ -264,8 +264,8 @@ def _change(text: str) -> tuple[str, Any]:
         raise BadInputError(f"--set {shortened(text)}: {error}") from error
 
 
-def _line(standing: Standing) -> str:
-    """A recipe's standing in one line."""
+def _line(standing: RecipeState) -> str:
+    """Format a recipe's state in one line."""
     control = standing.control
     force = "not in force" if control is None else f"revision {control.revision} in force"
     known = control.recipe if control else standing.file.recipe if standing.file else None
@@ -278,8 +278,8 @@ def _line(standing: Standing) -> str:
     return f"{standing.name}: {force}{what}; file: {standing.file_state}{waits}"
 
 
-def _told(each: Revision, before: Revision | None) -> list[str]:
-    """A revision in some lines."""
+def _format_revision(each: Revision, before: Revision | None) -> list[str]:
+    """Format a revision in some lines."""
     lines = [f"{each.name} revision {each.revision}: {each.status}, {each.origin}, {each.sha256[:12]}"]
     lines.append(f"    by {each.author} at {_time(each.created_utc_ms)}: {each.reason}")
     if each.approved_utc_ms is not None:
@@ -296,8 +296,8 @@ def _time(utc_ms: int) -> str:
     return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def _facts(recipe: Recipe) -> str:
-    """A recipe in one line."""
+def _format_recipe(recipe: Recipe) -> str:
+    """Format a recipe in one line."""
     steps = recipe.steps
     closings = ", ".join(f"{closing_mm:g}" for closing_mm in steps.result_closings_mm)
     return (

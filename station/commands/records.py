@@ -1,33 +1,33 @@
-"""`station records`: ask what happened."""
+"""`station records`: query the records."""
 
 from pathlib import Path
 
 import click
 
-from station.commands.records_keeping import backup, check, hold, holds, lot, release, restore
+from station.commands.records_maintenance import backup, check, hold, holds, lot, release, restore
 from station.commands.records_marks import mark, marks
 from station.commands.records_options import config_option, folder_of, query_options
 from station.commands.records_output import export, report
 from station.records.database import reading
-from station.records.opening import set_mark
-from station.records.reading import Summary, read_inspection
-from station.records.report import described, listed
+from station.records.open import set_mark
+from station.records.queries import Summary, read_inspection
+from station.records.report import format_inspection, format_list
 from station.records.search import LARGEST_PAGE, Query, find_page
 
 
 @click.group()
 def records() -> None:
-    """Ask what was inspected, and why it ended as it did; hand it on, and keep it safe."""
+    """Query inspections and their explanations; export them, and back them up."""
 
 
 @records.command()
 @click.argument("sequence", type=click.IntRange(1, 2**32 - 1))
 @config_option
 def show(sequence: int, config: Path | None) -> None:
-    """Show all that is known of the inspection with the number SEQUENCE: why it ended so, its curve, its images."""
+    """Show everything stored of the inspection with the number SEQUENCE: explanation, curve, images."""
     folder = folder_of(config)
     with reading(folder) as connection:
-        click.echo(described(read_inspection(connection, sequence, folder)))
+        click.echo(format_inspection(read_inspection(connection, sequence, folder)))
 
 
 @records.command("list")
@@ -36,7 +36,7 @@ def show(sequence: int, config: Path | None) -> None:
 @query_options
 @config_option
 def list_last(last: int, below: int | None, query: Query, config: Path | None) -> None:
-    """List the last inspections, newest first; all conditions given have to hold."""
+    """List the last inspections, newest first; all conditions given have to be met."""
     found: list[Summary] = []
     with reading(folder_of(config)) as connection:
         while len(found) < last:
@@ -45,7 +45,7 @@ def list_last(last: int, below: int | None, query: Query, config: Path | None) -
             below = page.below
             if below is None:
                 break
-    click.echo(listed(found))
+    click.echo(format_list(found))
     if below is not None:
         click.echo(f"more: --below {below}", err=True)
 
@@ -54,7 +54,7 @@ def list_last(last: int, below: int | None, query: Query, config: Path | None) -
 @click.argument("number", type=click.IntRange(0, 2**32 - 2))
 @config_option
 def continue_after(number: int, config: Path | None) -> None:
-    """Number the next inspection NUMBER + 1, where the station lost count; never lower than it knows itself."""
+    """Number the next inspection NUMBER + 1, if the station lost count; never lower than its own records."""
     set_mark(folder_of(config), number)
     click.echo(f"the next inspection is number {number + 1}")
 

@@ -1,4 +1,4 @@
-"""`station records mark`: what a person found of a fruit, for the proposal of thresholds."""
+"""`station records mark`: a person's mark of fruit as good or bad, for proposed thresholds."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -7,10 +7,10 @@ import click
 
 from station.commands.records_options import by_option, config_option, folder_of
 from station.records.audit import AuditEntry, append_audit
-from station.records.changing import changing
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked
-from station.records.wording import printable
+from station.records.short_transaction import short_transaction
+from station.records.texts import printable
 
 _MARKS: dict[str, Mark | None] = {"good": "good", "bad": "bad", "none": None}
 
@@ -21,12 +21,12 @@ _MARKS: dict[str, Mark | None] = {"good": "good", "bad": "bad", "none": None}
 @by_option
 @config_option
 def mark(sequences: tuple[int, ...], word: str, by: str, config: Path | None) -> None:
-    """Say that a person found these fruit good or bad, whatever the station judged; `none` takes a mark away.
+    """Mark fruit as good or bad, whatever the station judged; `none` removes a mark.
 
-    `station thresholds` proposes limits from what is marked. All of the fruit are marked, or none.
+    `station thresholds` proposes limits from the marks. All of the fruit are marked, or none.
     """
     wanted, changed = _MARKS[word], 0
-    with changing(folder_of(config)) as connection:
+    with short_transaction(folder_of(config)) as connection:
         for sequence in sequences:
             before = place_mark(connection, sequence, wanted, by)
             if (was := None if before is None else before.mark) != wanted:
@@ -39,7 +39,7 @@ def mark(sequences: tuple[int, ...], word: str, by: str, config: Path | None) ->
 @click.command()
 @config_option
 def marks(config: Path | None) -> None:
-    """List the fruit that people have marked, with who and when."""
+    """List the fruit that people have marked, with person and time."""
     with reading(folder_of(config)) as connection:
         for each in read_marked(connection):
             when = datetime.fromtimestamp(each.marked_utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

@@ -1,4 +1,4 @@
-"""What several commands of `station records` take."""
+"""Options shared by commands of `station records`."""
 
 import getpass
 from collections.abc import Callable
@@ -22,7 +22,7 @@ config_option = click.option(
 
 
 def folder_of(config: Path | None) -> Path:
-    """The records' folder.
+    """Return the records' folder.
 
     Args:
         config: the file that the user named.
@@ -31,7 +31,7 @@ def folder_of(config: Path | None) -> Path:
 
 
 class Moment(click.ParamType):
-    """A date, or a date and time, as ISO 8601 has it; UTC where no offset is given. Gives ms since 1970."""
+    """Date, or date and time, ISO 8601; UTC without an offset. Converted to ms since 1970."""
 
     name = "time"
 
@@ -47,7 +47,7 @@ class Moment(click.ParamType):
 
 
 def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The conditions of a search, handed over as `query`."""
+    """Add the conditions of a search, passed as `query`."""
 
     def gathered(
         *,
@@ -87,7 +87,7 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def by_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Who does it."""
+    """Add the option of the person."""
     return click.option(
         "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
     )(command)

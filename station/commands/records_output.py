@@ -1,13 +1,13 @@
-"""`station records`: what is handed on to other programs and people."""
+"""`station records`: exports and reports for other programs and people."""
 
 from pathlib import Path
 
 import click
 
 from station.commands.records_options import config_option, folder_of, query_options
+from station.records.error_mapping import map_error
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
-from station.records.failures import in_words
 from station.records.lot_report import WAYS, write_report
 from station.records.lot_summary import summarise
 from station.records.search import Query
@@ -18,7 +18,7 @@ from station.records.search import Query
 @query_options
 @config_option
 def export(file: Path, query: Query, config: Path | None) -> None:
-    """Write inspections to FILE, one row each: .csv or .parquet by its ending; all, or those that a condition finds."""
+    """Write inspections to FILE, one row each: .csv or .parquet by its suffix; all, or those of the conditions."""
     if file.suffix not in SUFFIXES:
         raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(SUFFIXES)}")
     click.echo(f"{file}: {write_export(folder_of(config), query, file)} inspections")
@@ -29,12 +29,12 @@ def export(file: Path, query: Query, config: Path | None) -> None:
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @config_option
 def report(lot: str, file: Path, config: Path | None) -> None:
-    """Write a report of the lot LOT to FILE: .html or .pdf by its ending, one file that needs no other."""
+    """Write a report of the lot LOT to FILE: .html or .pdf by its suffix, one file that needs no other."""
     if file.suffix not in WAYS:
         raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(WAYS)}")
     summary = summarise(folder_of(config), lot)
     try:
         write_report(summary, file)
     except OSError as error:
-        raise in_words(error, str(file)) from error
+        raise map_error(error, str(file)) from error
     click.echo(f"{file}: {summary.total} inspections of lot {lot}")

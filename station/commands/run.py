@@ -1,4 +1,4 @@
-"""`station run`: the whole station, its processes supervised."""
+"""`station run`: the whole station, with supervised processes."""
 
 import asyncio
 import logging
@@ -19,8 +19,8 @@ from station.supervision.supervisor import Supervisor
 def run(config: Path | None) -> None:
     """Run the station until Ctrl-C: the service, the PLC interface and the pages, each a process of its own.
 
-    What dies or hangs is started again, at most 5 times within 60 s. On SIGTERM a running inspection ends, the jaws
-    open, and all processes end.
+    A process that dies or hangs is restarted, at most 5 times within 60 s. On SIGTERM a running inspection ends, the
+    jaws open, and all processes end.
     """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
     site = load_configuration(config)
@@ -42,11 +42,7 @@ async def _supervise(site: Configuration, config: Path | None) -> None:
 
 
 def addresses(site: Configuration) -> str:
-    """Where a station is reached, one line each.
-
-    Args:
-        site: its configuration.
-    """
+    """Return the station's addresses, one line each."""
     return (
         f"HMI         {address_of(site.hmi)}\n"
         f"Modbus TCP  {site.modbus.host}:{site.modbus.port}, unit {site.modbus.unit}\n"

@@ -26,7 +26,7 @@ from station.supervision.memory import keep_freed_memory
 def service(config: Path | None, style: str) -> None:
     """Inspect fruit at the PLC's triggers, until SIGTERM or Ctrl-C. The arm and the gripper move.
 
-    An order to end lets the running inspection come to its outcome and opens the jaws; then the exit code is 0.
+    At SIGTERM the running inspection ends with its outcome, and the jaws open; then the exit code is 0.
     """
     configure_logging("station", style)  # type: ignore[arg-type] (click has checked it)
     configuration, broken = load_or_last_good(config)

@@ -1,44 +1,44 @@
-"""The simulated sensor's calibration: the station's own procedure on the simulated sensor's ball, without the wire."""
+"""Calibration of the simulated sensor: the station's own procedure on a drawn ball, without the wire."""
 
 import asyncio
 from importlib.metadata import version
 
-from station.calibration.bench import Place, Unit
-from station.calibration.calibrating import Calibrating
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.model import Calibration
+from station.calibration.rig import Place, Unit
 from station.calibration.store import CalibrationStore
-from station.commands.calibration_storing import store_calibration
+from station.commands.calibration_storage import store_calibration
 from station.devices.camera.twin import TwinCamera
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
-from station.studies.drawn_ball import DrawnBall
+from station.studies.simulated_rig import SimulatedRig
 
 PLACES = (Place(-2.5, 0.0), Place(0.0, 3.0))
-"""Beside the first, as docs/calibration.md asks of a person: so the scale is measured."""
+"""Further places, as docs/calibration.md requires of a person: so the scale is measured."""
 
 
 def calibrate_simulated_unit(site: Configuration, operator: str) -> Calibration | None:
-    """Calibrate the twin's sensor where it never was, in a few seconds.
+    """Calibrate the twin's sensor if it never was, in a few seconds.
 
     The ball is drawn as the twin draws it, at the gripper's counts and with the sensor's noise; arm, gripper and frames
     do not go over the wire, which would take minutes. All else is what `station calibrate` does and stores.
 
     Args:
-        site: its home, and the twin's camera.
+        site: its home folder, and the twin's camera.
         operator: who calibrates.
 
     Returns:
-        What was stored; None where the unit has a calibration already.
+        The stored calibration; None if the unit has one already.
 
     Raises:
-        StationError: it could not be stored, or the procedure refused what it saw.
+        StationError: it could not be stored, or the procedure refused the result.
     """
     camera = TwinCamera(site.camera).description
     if CalibrationStore(site.home).current(camera.serial) is not None:
         return None
     draft = asyncio.run(
-        Calibrating(
-            DrawnBall(),
+        CalibrationProcedure(
+            SimulatedRig(),
             Unit(camera.serial, camera.name, simulated=True),
             find_recipe(site.calibration.recipe, site.recipes_folder),
             site.calibration,

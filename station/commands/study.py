@@ -30,7 +30,7 @@ from station.studies.workers import stop_on_sigterm
 def study(fruit: str, samples: int, seed: int, method: str, out: Path, jobs: int, scheduler: str | None) -> None:
     """Press a cohort of the paper's fruit on the twin, and count the samples whose measurement fails.
 
-    Writes samples/, curves.csv, summary.json and report.html. Interrupted, it goes on where it was when the same
+    Writes samples/, curves.csv, summary.json and report.html. Interrupted, it continues when the same
     command is given again; with more --samples the cohort grows. The same seed gives the same numbers on any machine
     of the same kind, with any number of workers. No device is touched.
     """

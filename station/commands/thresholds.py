@@ -1,4 +1,4 @@
-"""`station thresholds`: the limit from fruit that a person has marked good and bad, and what either error costs."""
+"""`station thresholds`: proposed limit from fruit marked good and bad, with the cost of both errors."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -51,14 +51,14 @@ def thresholds(
     draft: Path | None,
     config: Path | None,
 ) -> None:
-    """Propose the last damage threshold from fruit marked good and bad, with what is unsure about it.
+    """Propose the last damage threshold from fruit marked good and bad, with its uncertainty.
 
     Writes DIR/thresholds.html, with both errors over the limit, and thresholds.json. Nothing is put in force: a recipe
-    written with --draft goes the way of every draft, as by `station recipes import`.
+    written with --draft is a draft like any other, as by `station recipes import`.
     """
     site, costs = load_configuration(config), Costs(false_accept, damaged)
     recipe, folder = find_recipe(name, site.recipes_folder), records_folder(site.home)
-    marked = _told_marks(folder) if marks is None else read_marks(marks)
+    marked = _stored_marks(folder) if marks is None else read_marks(marks)
     stored, own = _marked(folder, recipe.name, lots, set(marked))
     for mark in ("good", "bad"):
         if not any(marked[each.sequence] == mark for each in stored):
@@ -94,8 +94,8 @@ def thresholds(
     click.echo(f"see {out / 'thresholds.html'}" + (f"; the draft is {draft}" if draft else ""))
 
 
-def _told_marks(folder: Path) -> dict[int, Mark]:
-    """What people have told of fruit by `station records mark`, or on the panel."""
+def _stored_marks(folder: Path) -> dict[int, Mark]:
+    """Read the marks that people made by `station records mark`, or on the panel."""
     with reading(folder) as connection:
         told: dict[int, Mark] = {each.sequence: each.mark for each in read_marked(connection)}
     if not told:
@@ -106,7 +106,7 @@ def _told_marks(folder: Path) -> dict[int, Mark]:
 def _marked(
     folder: Path, name: str, lots: Sequence[str], marked: set[int]
 ) -> tuple[list[StoredPress], dict[str, Recipe]]:
-    """The marked inspections that have a curve, with the recipes that they were judged by."""
+    """Read the marked inspections that have a curve, with the recipes that they were judged by."""
     with reading(folder) as connection:
         wanted = [sequence for sequence in sequences(connection, name, lots, None) if sequence in marked]
         texts = snapshots(connection, name)
@@ -117,7 +117,7 @@ def _marked(
 
 
 def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
-    """The recipe's file with the limit in the place of its last one; sooner ones are lowered where they have to be."""
+    """Return the recipe's text with the limit in place of its last one; earlier limits are lowered where necessary."""
     last, limit = len(recipe.damage.area) - 1, round(best.limit_mm2, 1)
     changes: dict[str, Any] = {
         f"damage.area[{place}].area_mm2": limit
@@ -139,7 +139,7 @@ def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tu
 def _rate(
     stored: Sequence[StoredPress], marked: Mapping[int, Mark], mark: Mark, own: dict[str, Recipe], proposed: Recipe
 ) -> dict[str, Any]:
-    """What the judge makes of the marked fruit by the proposed recipe."""
+    """Judge the marked fruit by the proposed recipe and count the results."""
     group = [each for each in stored if marked[each.sequence] == mark]
     after = [replay(each, own[each.recipe_sha256], proposed).after for each in group]
     decided = [each for each in after if each != "UNDECIDABLE"]

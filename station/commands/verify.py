@@ -1,4 +1,4 @@
-"""`station verify`: the check at the shift's start, with the ball against the stored calibration."""
+"""`station verify`: verification of the sensor at the shift's start, with the ball."""
 
 import asyncio
 import getpass
@@ -11,13 +11,13 @@ from station.calibration.errors import CalibrationError
 from station.calibration.model import Calibration
 from station.calibration.report import verification_files
 from station.calibration.store import PAGE, CalibrationStore
-from station.calibration.verifying import Verified, Verifying
-from station.commands.ball import at_the_bench, cancelled_by_signals, show
+from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
+from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
 from station.errors import StationError
 from station.records.audit import append_audit
 from station.records.database import records_folder
-from station.records.direct import writing
-from station.service.trail import calibration_verified
+from station.records.direct_transaction import direct_transaction
+from station.service.audit_logger import verification_entry
 from station.settings.configuration import Configuration, load_configuration
 
 
@@ -34,12 +34,14 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
     site = load_configuration(config)
     store = CalibrationStore(site.home)
 
-    async def run() -> tuple[Verified, Calibration]:
+    async def run() -> tuple[VerificationResult, Calibration]:
         cancelled_by_signals()
-        async with at_the_bench(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
+        async with open_rig(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
             calibration = _calibration(store, unit.serial, site)
             pictures = store.golden(calibration), store.presses(calibration)
-            procedure = Verifying(ball_bench, recipe, site.calibration, calibration, *pictures, operator, show)
+            procedure = VerificationProcedure(
+                ball_bench, recipe, site.calibration, calibration, *pictures, operator, show
+            )
             return await procedure.run(), calibration
 
     logging.basicConfig(format="station: %(message)s")
@@ -48,9 +50,9 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
     except asyncio.CancelledError:
         raise click.Abort from None
     verification = verified.verification
-    with writing(records_folder(site.home)) as connection:
+    with direct_transaction(records_folder(site.home)) as connection:
         subject, passed = f"sensor {calibration.serial}", verification.passed
-        entry = calibration_verified(operator, subject, calibration.id, verification.id, passed=passed)
+        entry = verification_entry(operator, subject, calibration.id, verification.id, passed=passed)
         append_audit(connection, entry)
         folder = store.add_verification(verification, verification_files(verified, calibration))
     for check in verification.checks:

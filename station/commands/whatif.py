@@ -1,4 +1,4 @@
-"""`station whatif`: what would a draft of a recipe have done with the fruit that were inspected?"""
+"""`station whatif`: stored inspections judged again by a draft of a recipe."""
 
 import os
 import sys
@@ -15,7 +15,7 @@ from station.settings.recipe import Recipe, find_recipe
 from station.settings.recipe_form import content_sha256
 from station.whatif.against_marks import Compared, compared
 from station.whatif.outcome_table import Counted, as_csv, counted
-from station.whatif.page import MOST_SHOWN, Page, as_json, render, shown
+from station.whatif.page import MOST_SHOWN, Page, as_json, fruit_views, render
 from station.whatif.progress_file import ProgressFile
 from station.whatif.replay import Replayed, recipe_of_snapshot
 from station.whatif.runner import batches, run
@@ -42,8 +42,8 @@ def whatif(
     """Judge stored inspections again by DRAFT, and show which fruit would have changed sides.
 
     Fruit that people have marked good or bad are counted by the errors. Writes DIR/whatif.html, changes.csv and
-    summary.json. A run that was ended goes on where it was. What cannot be
-    known, as where a curve was stopped early, is counted apart and never guessed.
+    summary.json. An interrupted run continues when it is repeated. What cannot
+    be known, as after an early stop, is counted apart and never guessed.
     """
     site = load_configuration(config)
     draft, folder = find_recipe(recipe_name, site.recipes_folder), records_folder(site.home)
@@ -87,7 +87,7 @@ def _page(
     single = known[-1] if known else None
     changed = [each for each in results if each.changes_side]
     with reading(folder) as connection:
-        tiles = shown(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
+        tiles = fruit_views(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
     facts = [
         ("draft", f"{draft.title}, {content_sha256(draft)[:12]}"),
         ("inspections", f"{results[0].sequence} to {results[-1].sequence}{_of(lots)}"),

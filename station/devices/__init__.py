@@ -1,1 +1,1 @@
-"""Camera, gripper and arm: for each a small Protocol and its real drivers beside it."""
+"""Device drivers of camera, gripper and arm: for each a small Protocol and its real drivers."""

@@ -1,1 +1,1 @@
-"""What other systems are told of the station's records: a process of its own, which only reads them."""
+"""Outbox: a process that publishes the station's records to other systems and only reads them."""

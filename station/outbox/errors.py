@@ -1,14 +1,14 @@
-"""What can keep the outbox from telling."""
+"""Outbox errors."""
 
 from station.errors import StationError
 
 
 class OutboxError(StationError):
-    """Another system cannot be told now; it is told later, in order.
+    """Another system cannot be reached now; its events are published later, in order.
 
     Args:
-        cause: what is wrong.
-        remedy: what a person does.
+        cause: the fault.
+        remedy: what a person has to do.
     """
 
     def __init__(self, cause: str, remedy: str) -> None:

@@ -1,4 +1,4 @@
-"""What there is to tell, read from the records in order, by a connection that cannot write."""
+"""Feed of outbox events, read from the records in order, by a connection that cannot write."""
 
 import json
 import math
@@ -20,49 +20,49 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
-from station.records.writing import OutboxKind
+from station.records.write_requests import OutboxKind
 
 LARGEST_BATCH = 500
 _LAST_UTC_MS = 253_402_300_799_000
-"""The end of the year 9999: a clock that stepped further holds up nothing."""
+"""The end of the year 9999: a clock beyond it must not block the outbox."""
 
 
 class Event(NamedTuple):
-    """One thing to tell, as it is now."""
+    """One event to publish, in its present state."""
 
     entry: int
     kind: OutboxKind
     data: dict[str, Any]
-    """Plain JSON; times are texts as RFC 3339 has them, UTC."""
+    """Plain JSON; times are RFC 3339 texts, UTC."""
 
 
 class Origin(NamedTuple):
-    """A database that gave entries; after a restoring others than before have their numbers."""
+    """A database that numbered entries; a restored one gives the same numbers to other entries."""
 
     id: str
     last_entry: int | None
-    """The last one it gave; None for the present one."""
+    """The last entry of this database; None for the present one."""
 
 
 class Batch(NamedTuple):
-    """What is next."""
+    """The next events."""
 
     lineage: tuple[Origin, ...]
     """The present database's origin first."""
     events: tuple[Event, ...]
-    """A row that changed more than once is told of once."""
+    """A row that changed more than once is published once."""
     up_to: int
     """The last entry that these events cover."""
     last: int
     """The last entry of all."""
     oldest_utc_ms: int | None
-    """When the first of them was done; None where there is nothing to tell."""
+    """Time of the first of them; None if there is nothing to publish."""
 
     def known(self, positions: dict[str, int]) -> int | None:
-        """The last entry that somebody has who counted by origins; None where they know none of this lineage.
+        """Return the last entry that a destination has; None if it has none of this lineage.
 
         Args:
-            positions: by origin, the last entry that they have.
+            positions: the destination's last entry, by origin.
         """
         for origin in self.lineage:
             if origin.id in positions:
@@ -71,12 +71,10 @@ class Batch(NamedTuple):
 
 
 def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATCH) -> Batch:
-    """What comes after an entry.
+    """Read the events after an entry.
 
     Args:
-        folder: the records' folder.
-        station: this station's name.
-        after: the last entry that was told.
+        after: the last entry that was published.
         limit: at most so many entries.
 
     Raises:
@@ -104,12 +102,8 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
     return Batch(lineage, tuple(told), entries[-1].entry if entries else after, last, oldest)
 
 
-def text_of(data: dict[str, Any]) -> str:
-    """An event's JSON, in one line, without what JSON, UTF-8 or PostgreSQL's jsonb cannot hold.
-
-    Args:
-        data: the event's.
-    """
+def json_text(data: dict[str, Any]) -> str:
+    """Return an event's JSON, in one line, without what JSON, UTF-8 or PostgreSQL's jsonb cannot store."""
     try:
         text = _dumped(data)
     except ValueError:
@@ -200,7 +194,7 @@ def _lots(connection: Connection, ids: list[int]) -> dict[int, dict[str, Any]]:
 
 
 def _audit(connection: Connection, seqs: list[int]) -> dict[int, dict[str, Any]]:
-    """The trail's rows as they are, so that their hashes can be checked anywhere; `utc_ms` is part of the hash."""
+    """Read the trail's rows unchanged, so that their hashes can be checked anywhere; `utc_ms` is part of the hash."""
     rows = connection.execute(select(audit).where(audit.c.seq.in_(seqs)))
     return {row.seq: {**row._asdict(), "at": _time(row.utc_ms)} for row in rows}
 

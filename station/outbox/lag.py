@@ -1,4 +1,4 @@
-"""Whether other systems are told in time, by what the outbox's process says of itself."""
+"""Outbox monitor: checks by the outbox's status that other systems are up to date."""
 
 import time
 from pathlib import Path
@@ -7,29 +7,24 @@ from station.outbox.status import DestinationStatus, outbox_folder, read_status
 from station.settings.outbox import OutboxSettings
 
 LOST_S = 30.0
-"""A process that says nothing for so long does not run."""
+"""A process that writes no status for so long does not run."""
 
 
-class Lag:
-    """Looks at the outbox's status.
-
-    Args:
-        settings: the site's.
-        home: the station's home folder.
-    """
+class OutboxMonitor:
+    """Delay of the outbox."""
 
     def __init__(self, settings: OutboxSettings, home: Path) -> None:
         self._settings, self._folder = settings, outbox_folder(home)
         self._enabled = settings.postgresql.enabled or settings.mqtt.enabled
         self._began_s = time.monotonic()
 
-    def trouble(self) -> str:
-        """What is behind, in a sentence each; empty where nothing is, or where no other system is to be told."""
+    def alarm_detail(self) -> str:
+        """Return what is delayed, in a sentence each; empty for nothing, and if no destination is enabled."""
         if not self._enabled:
             return ""
         status, now_s = read_status(self._folder), time.time()
         silent_s = time.monotonic() - self._began_s
-        if status is not None:  # what an earlier start said is not held against this one
+        if status is not None:  # the status of an earlier start does not count
             silent_s = min(silent_s, now_s - status.utc_ms / 1000)
         if silent_s > LOST_S:
             return f"the outbox's process has not been heard for {silent_s:.0f} s"

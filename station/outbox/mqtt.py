@@ -1,4 +1,4 @@
-"""An MQTT broker as a destination: the same events as plain JSON, at least once and in order."""
+"""MQTT destination: the events as plain JSON, at least once and in order."""
 
 import asyncio
 import contextlib
@@ -13,9 +13,9 @@ from pathlib import Path
 import aiomqtt
 
 from station.outbox.errors import OutboxError
-from station.outbox.feed import Batch, text_of
+from station.outbox.feed import Batch, json_text
 from station.outbox.secrets import password
-from station.outbox.status import write_whole
+from station.outbox.status import write_atomically
 from station.settings.outbox import OutboxMqttSettings
 
 log = logging.getLogger(__name__)
@@ -26,12 +26,10 @@ _AT_LEAST_ONCE = 1
 
 
 class Mqtt:
-    """A publisher.
+    """MQTT publisher.
 
     Args:
-        settings: where the broker is.
-        station: this station's name.
-        folder: where the position is kept: a broker keeps none.
+        folder: stores the position: a broker stores none.
     """
 
     name = NAME
@@ -43,7 +41,7 @@ class Mqtt:
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator["Session"]:
-        """Connect. `TOPIC/STATION/online` is `true` as long as the block lasts, then `false`: the broker's last will.
+        """Connect. `TOPIC/STATION/online` is `true` inside the block, then `false`: the broker's last will.
 
         Raises:
             OutboxError: the broker cannot be reached, or the connection was lost in the block.
@@ -79,7 +77,7 @@ class Session:
         self._client, self._root, self._path = client, root, position
 
     async def position(self, lineage: Batch) -> int:
-        """The last entry that was published; at the very first start the last there is: what is past is no news.
+        """Return the last entry that was published; at the very first start the newest entry: history is not published.
 
         Args:
             lineage: any batch of the present database.
@@ -95,28 +93,24 @@ class Session:
         known = lineage.known(kept)
         return lineage.last if known is None and not kept else known or 0
 
-    async def tell(self, batch: Batch) -> None:
-        """Publish a batch, each event after the broker has taken the one before.
+    async def publish(self, batch: Batch) -> None:
+        """Publish a batch, each event after the broker has acknowledged the one before.
 
         Args:
-            batch: what comes after the position.
+            batch: the entries after the position.
         """
         for event in batch.events:
             now = datetime.now(UTC).isoformat(timespec="milliseconds")
             data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}
-            await self._client.publish(f"{self._root}/{event.kind}", text_of(data).encode(), _AT_LEAST_ONCE)
+            await self._client.publish(f"{self._root}/{event.kind}", json_text(data).encode(), _AT_LEAST_ONCE)
         self._keep(batch, batch.up_to)
 
     async def idle(self, pause_s: float) -> None:
-        """Let time pass; a broker that goes away meanwhile is noticed.
-
-        Args:
-            pause_s: how long.
-        """
+        """Wait; raises if the broker goes away meanwhile."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(pause_s):
                 async for _ in self._client.messages:  # none is subscribed to: it only ends with the connection
                     pass
 
     def _keep(self, batch: Batch, position: int) -> None:
-        write_whole(self._path, json.dumps({batch.lineage[0].id: position}))
+        write_atomically(self._path, json.dumps({batch.lineage[0].id: position}))

@@ -1,4 +1,4 @@
-"""PostgreSQL as a destination: rows and the position they reach are one transaction, so none is lost or doubled."""
+"""PostgreSQL destination: rows and their position are one transaction, so none is lost or doubled."""
 
 import asyncio
 import logging
@@ -10,9 +10,9 @@ import psycopg
 from psycopg import AsyncConnection, sql
 
 from station.outbox.errors import OutboxError
-from station.outbox.feed import Batch, Event, text_of
+from station.outbox.feed import Batch, Event, json_text
 from station.outbox.secrets import password
-from station.records.writing import OutboxKind
+from station.records.write_requests import OutboxKind
 from station.settings.outbox import OutboxPostgresqlSettings
 
 log = logging.getLogger(__name__)
@@ -22,7 +22,7 @@ NAME = "postgresql"
 _CONNECT_S = 5
 _STATEMENT_MS = 60_000
 _SILENT_MS = 20_000
-"""A peer that acknowledges nothing for so long is gone."""
+"""A peer that acknowledges nothing for so long counts as lost."""
 
 _INSPECTION: tuple[LiteralString, ...] = (
     "station", "sequence", "began", "ended", "duration_ms", "published", "lot", "fruit", "recipe_sha256", "outcome",
@@ -40,8 +40,8 @@ _TABLES: dict[OutboxKind, tuple[LiteralString, tuple[LiteralString, ...], tuple[
     "lot": ("lots", _LOT, ("station", "name")),
     "audit": ("audit", _AUDIT, ("station", "seq", "hash")),
 }
-"""By kind: the table, its columns, and its key. A row that is there already becomes as it is now at the station; one of
-the audit trail never changes."""
+"""By kind: the table, its columns, and its key. A row that exists is updated to the station's present state; one of the
+audit trail never changes."""
 _RECIPES: LiteralString = (
     "INSERT INTO recipes SELECT DISTINCT ON (data->>'recipe_sha256') data->>'recipe_sha256', data->>'fruit', "
     "(data->>'recipe_number')::integer, data->>'recipe_revision', data->'recipe' FROM incoming "
@@ -50,12 +50,7 @@ _RECIPES: LiteralString = (
 
 
 class Postgresql:
-    """A connection to the database of many stations.
-
-    Args:
-        settings: where it is.
-        station: this station's name.
-    """
+    """Connection to the database of many stations."""
 
     name = NAME
 
@@ -66,7 +61,7 @@ class Postgresql:
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator["Session"]:
-        """Connect, and see that the database is the right one and no other process tells as this station.
+        """Connect, and check that the database is the right one and no other process publishes as this station.
 
         Raises:
             OutboxError: it cannot be reached or used, or the connection was lost in the block.
@@ -130,7 +125,7 @@ class Session:
         self._owner, self._connection, self._station = owner, connection, station
 
     async def position(self, lineage: Batch) -> int:
-        """The last entry that the database has; 0 where it has none of this lineage.
+        """Return the last entry that the database has; 0 if it has none of this lineage.
 
         Args:
             lineage: any batch of the present database.
@@ -140,11 +135,11 @@ class Session:
         await self._connection.commit()
         return lineage.known(dict(rows)) or 0
 
-    async def tell(self, batch: Batch) -> None:
-        """Write a batch and the position behind it: all of it, or nothing.
+    async def publish(self, batch: Batch) -> None:
+        """Write a batch and its position: all of it, or nothing.
 
         Args:
-            batch: what comes after the position.
+            batch: the entries after the position.
         """
         try:
             await self._write(batch.events)
@@ -160,13 +155,9 @@ class Session:
         await self._connection.commit()
 
     async def idle(self, pause_s: float) -> None:
-        """Let time pass; a connection that ends meanwhile is noticed, a silent one by keepalives of TCP (25 s).
-
-        Args:
-            pause_s: how long.
-        """
+        """Wait; raises if the connection ends meanwhile. TCP keepalives find a silent one (25 s)."""
         loop, heard, socket = asyncio.get_running_loop(), asyncio.Event(), self._connection.fileno()
-        loop.add_reader(socket, heard.set)  # nothing is asked for: the server only tells of its end
+        loop.add_reader(socket, heard.set)  # no request: the server only reports its end
         try:
             async with asyncio.timeout(pause_s):
                 await heard.wait()
@@ -181,7 +172,7 @@ class Session:
         async with self._connection.cursor() as cursor:
             async with cursor.copy("COPY incoming FROM STDIN") as copy:
                 for event in events:
-                    await copy.write_row((event.entry, event.kind, text_of(event.data)))
+                    await copy.write_row((event.entry, event.kind, json_text(event.data)))
             kinds: set[OutboxKind] = {event.kind for event in events}
             if "inspection" in kinds:
                 await cursor.execute(_RECIPES)
@@ -189,7 +180,7 @@ class Session:
                 await cursor.execute(_statement(kind), (kind,))
 
     async def _write_one_by_one(self, batch: Batch) -> None:
-        """Keep what is refused in a table of its own, and go on."""
+        """Write rejected events to a table of their own, and continue."""
         await self._connection.execute("SELECT 1")  # so that each row below has a savepoint, not a transaction
         for event in batch.events:
             try:
@@ -201,7 +192,7 @@ class Session:
                 row = (self._station, batch.lineage[0].id, event.entry, event.kind, _first_line(error))
                 await self._connection.execute(
                     "INSERT INTO refused VALUES (%s, %s, %s, %s, %s, %s) ON CONFLICT DO NOTHING",
-                    (*row, text_of(event.data)),
+                    (*row, json_text(event.data)),
                 )
                 log.error("%s %s was refused: %s", event.kind, event.entry, _first_line(error))  # noqa: TRY400
 

@@ -1,4 +1,4 @@
-"""Passwords: from a file or the environment, never from the configuration, and in no message."""
+"""Passwords from a file or the environment; never in the configuration, and in no message."""
 
 import os
 import stat
@@ -8,11 +8,11 @@ from station.outbox.errors import OutboxError
 
 
 def password(file: Path | None, variable: str) -> str | None:
-    """The password; None where neither gives one.
+    """Return the password; None if neither gives one.
 
     Args:
-        file: its first line; only its owner may read it.
-        variable: of the environment, where no file is named.
+        file: its first line is read; only its owner may have access.
+        variable: of the environment, if no file is named.
 
     Raises:
         OutboxError: the file cannot be read, or others can read it.

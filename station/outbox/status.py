@@ -1,4 +1,4 @@
-"""How the outbox does, in a small file that the station's metrics are made from."""
+"""Outbox status, in a small file that the station's metrics are made from."""
 
 import json
 import os
@@ -12,25 +12,25 @@ _FILE_NAME = "status.json"
 
 
 class DestinationStatus(BaseModel):
-    """Of one destination."""
+    """Status of one destination."""
 
     model_config = ConfigDict(frozen=True, strict=True)
     connected: bool
     told: int
-    """Events since the process began."""
+    """Events published since the process started."""
     refused: int
     waiting: int | None
-    """Entries that it has not been told; None before the first connection."""
+    """Entries not published to it yet; None before the first connection."""
     oldest_utc_ms: int | None
-    """When the first of them was done."""
+    """Time of the first of them."""
     error: str
-    """Why it cannot be told now; empty where it can."""
+    """Its fault now; empty for none."""
     away_since_utc_ms: int | None = None
-    """Since when it cannot."""
+    """Start of the fault."""
 
 
 class OutboxStatus(BaseModel):
-    """Of all."""
+    """Status of all destinations."""
 
     model_config = ConfigDict(frozen=True, strict=True)
     utc_ms: int
@@ -38,46 +38,33 @@ class OutboxStatus(BaseModel):
 
 
 def outbox_folder(home: Path) -> Path:
-    """Where the outbox keeps its few files.
-
-    Args:
-        home: the station's home folder.
-    """
+    """Return the folder of the outbox's files."""
     return home / FOLDER_NAME
 
 
 def write_status(folder: Path, destinations: dict[str, DestinationStatus]) -> None:
-    """Say how it does.
-
-    Args:
-        folder: the outbox's.
-        destinations: by name.
+    """Write the status.
 
     Raises:
         OSError: it cannot be written.
     """
     status = OutboxStatus(utc_ms=time.time_ns() // 1_000_000, destinations=destinations)
-    write_whole(folder / _FILE_NAME, status.model_dump_json())
+    write_atomically(folder / _FILE_NAME, status.model_dump_json())
 
 
 def read_status(folder: Path) -> OutboxStatus | None:
-    """What it said last; None where it never did, or not so that it can be read.
-
-    Args:
-        folder: the outbox's.
-    """
+    """Read the last status; None if there is none that can be read."""
     try:
         return OutboxStatus.model_validate(json.loads((folder / _FILE_NAME).read_bytes()))
     except (OSError, ValueError, ValidationError):
         return None
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Put a file in the place of the one there, whole or not at all.
+def write_atomically(path: Path, text: str) -> None:
+    """Write a file atomically.
 
     Args:
-        path: in a folder that is made where missing.
-        text: its content.
+        path: its folder is made if missing.
 
     Raises:
         OSError: it cannot be written.

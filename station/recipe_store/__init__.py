@@ -1,1 +1,1 @@
-"""The recipes' history beside their files: revisions, who approved them, and by which of them fruit is inspected."""
+"""Recipe store: revisions, approvals, and the recipes in force, beside the recipe files."""

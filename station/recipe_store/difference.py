@@ -1,4 +1,4 @@
-"""What differs between two recipes, value by value."""
+"""Differences of two recipes, value by value."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ _ABSENT = "nothing"
 
 
 class Difference(NamedTuple):
-    """One value that differs."""
+    """One different value."""
 
     path: str
     old: Any
@@ -21,22 +21,12 @@ class Difference(NamedTuple):
 
 
 def differences(old: Recipe, new: Recipe) -> tuple[Difference, ...]:
-    """Every value of two recipes that is not the same, in the order of the file.
-
-    Args:
-        old: the recipe before.
-        new: the recipe after.
-    """
+    """List every value of two recipes that differs, in the order of the file."""
     return tuple(_walk(old.model_dump(mode="json"), new.model_dump(mode="json"), ()))
 
 
-def in_a_line(old: Recipe, new: Recipe) -> str:
-    """The differences for a message.
-
-    Args:
-        old: the recipe before.
-        new: the recipe after.
-    """
+def format_differences(old: Recipe, new: Recipe) -> str:
+    """Format the differences for a message."""
     return "; ".join(map(str, differences(old, new))) or "no value differs"
 
 

@@ -1,6 +1,6 @@
-"""A recipe's file changed by a program: by values, as a whole, back to a revision, to a newer form of the file.
+"""Recipe editor: changes a recipe's file by values, by import, by revert or by an upgrade of its schema.
 
-Every change makes an unapproved draft at most; what is in force stays so until a draft is approved.
+Every change makes an unapproved draft at most; the revision in force does not change until a draft is approved.
 """
 
 import re
@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from station.errors import BadInputError
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.files import locked, read_folder, write_back
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import RecipeState, ValidFile
 from station.recipe_store.revision import ConflictError, RecipeStoreError, Status
-from station.recipe_store.standing import Found, Standing
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
-from station.records.direct import writing
+from station.records.direct_transaction import direct_transaction
 from station.settings.recipe import shipped_folder
 from station.settings.recipe_form import content_sha256, parse_recipe
 from station.settings.recipe_model import Recipe
@@ -29,47 +29,44 @@ _SHORTEST_BASE = 8
 
 
 class RecipeEditor:
-    """Writes a site's recipe files. Every verb blocks.
+    """Editor of a site's recipe files. Every method blocks.
 
     Args:
-        home: the station's home folder.
-        folder: the site's recipe files; None for those shipped, which cannot be edited in place.
+        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
     """
 
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder = home, folder
         self._store = RecipeStore(home, folder)
 
-    def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> Standing:
-        """Change values in a recipe's file, comments kept: it is an unapproved draft afterwards.
+    def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> RecipeState:
+        """Change values in a recipe's file; comments remain. The file is then an unapproved draft.
 
         Args:
-            name: the recipe's.
-            changes: new values by their dotted paths.
-            person: who edits, and why.
-            base: the content hash, or its beginning, of what the editor has looked at; empty for what is there now.
+            changes: new values by their dotted paths. person: the editor, and the reason. base: the content hash, or
+            its beginning, of the version that the editor has seen; empty for the present one.
 
         Raises:
-            BadInputError: the recipe would be bad; the file is as it was.
-            ConflictError: the file is not what the editor has looked at.
+            BadInputError: the recipe would be invalid; the file is unchanged.
+            ConflictError: the file is another version.
             RecipeStoreError: the file cannot be written.
         """
         with self._editing(name) as file:
             self._check_base(file, base)
             text, recipe = with_values(file.text, changes, str(file.path))
             self._put(file, text, recipe, "recipe.edited", person)
-        return self._store.standing(name)
+        return self._store.state(name)
 
-    def import_text(self, text: str, person: Person, base: str = "") -> Standing:
-        """Put a whole recipe in the place of its file: it is an unapproved draft afterwards.
+    def import_text(self, text: str, person: Person, base: str = "") -> RecipeState:
+        """Replace a recipe's file. The file is then an unapproved draft.
 
         Args:
-            text: YAML; as exported it names in its first lines what it is based on.
-            person: who imports, and why.
-            base: as for `edit`; empty for what the text names.
+            text: YAML; an exported text names its base version in its first lines.
+            person: the editor, and the reason.
+            base: as for `edit`; empty for the one that the text names.
 
         Raises:
-            BadInputError: the recipe is bad, or neither text nor caller names what it is based on.
+            BadInputError: the recipe is invalid, or neither text nor caller names the base version.
             ConflictError: the file was changed since it was exported.
             RecipeStoreError: the file cannot be written.
         """
@@ -86,7 +83,7 @@ class RecipeEditor:
                     raise RecipeStoreError(
                         f"{path}: there is a file of that name which is no good recipe; mend it first"
                     )
-                self._put(Found(path, "", recipe), body, recipe, "recipe.imported", person)
+                self._put(ValidFile(path, "", recipe), body, recipe, "recipe.imported", person)
             else:
                 if not base:
                     raise BadInputError(
@@ -95,19 +92,18 @@ class RecipeEditor:
                     )
                 self._check_base(file, base)
                 self._put(file, body, recipe, "recipe.imported", person)
-        return self._store.standing(recipe.name)
+        return self._store.state(recipe.name)
 
     def export_text(self, name: str, revision: int | None = None) -> str:
-        """A recipe's file, with a first line that names what it is, so that `import_text` notices changes meanwhile.
+        """Return a recipe's file; its first line names the version, so that `import_text` notices later changes.
 
         Args:
-            name: the recipe's.
-            revision: one of its revisions; the file as it is where None.
+            revision: None for the present file.
 
         Raises:
             BadInputError: there is none.
         """
-        standing = self._store.standing(name)
+        standing = self._store.state(name)
         now = standing.file
         if revision is not None:
             text = self._store.revision(name, revision).text
@@ -118,13 +114,12 @@ class RecipeEditor:
         base = "" if now is None else f"# base: sha256 {content_sha256(now.recipe)}\n"
         return base + _BASE.sub("", text, count=1)
 
-    def revert(self, name: str, person: Person, revision: int | None = None) -> Standing:
-        """Put a revision's text back into the recipe's file; what stood there is kept as a backup.
+    def revert(self, name: str, person: Person, revision: int | None = None) -> RecipeState:
+        """Put a revision's text back into the recipe's file; the present text is stored as a backup.
 
         Args:
-            name: the recipe's.
-            person: who does so, and why.
-            revision: which one; the approved one where None.
+            person: the editor, and the reason.
+            revision: None for the approved one.
 
         Raises:
             BadInputError: there is none.
@@ -138,17 +133,17 @@ class RecipeEditor:
                 raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --revision")
             good = {file.recipe.name: file for file in read_folder(self._sites()).found}
             path = good[name].path if name in good else self._sites() / f"{name}.yaml"
-            self._put(Found(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
-        return self._store.standing(name)
+            self._put(ValidFile(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
+        return self._store.state(name)
 
     def upgrade(self, person: Person) -> list[tuple[Path, int]]:
-        """Write every file of an earlier form in this program's form, comments kept, with a backup.
+        """Convert every file of an earlier schema to this program's, comments included, with a backup.
 
         Args:
-            person: who does so, and why.
+            person: the editor, and the reason.
 
         Returns:
-            The files written, and the forms that they had.
+            The files written, and the schema versions that they had.
         """
         done = []
         with locked(self._home):
@@ -160,28 +155,30 @@ class RecipeEditor:
         return done
 
     @contextmanager
-    def _editing(self, name: str) -> Iterator[Found]:
+    def _editing(self, name: str) -> Iterator[ValidFile]:
         with locked(self._home):
             self._sites()
-            yield self._store.good_file(name)
+            yield self._store.valid_file(name)
 
-    def _check_base(self, file: Found, base: str) -> None:
-        """The file has to be what the editor has looked at."""
+    def _check_base(self, file: ValidFile, base: str) -> None:
+        """Check that the file is the version that the editor has seen."""
         now = content_sha256(file.recipe)
         if not base or (len(base) >= _SHORTEST_BASE and now.startswith(base.lower())):
             return
         seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
-        changed = f": {in_a_line(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
+        changed = (
+            f": {format_differences(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
+        )
         raise ConflictError(
             f"recipe {file.recipe.name}: it was changed since {base[:12]} was looked at, to {now[:12]}{changed}; "
             "look at it as it is now and make the change again"
         )
 
-    def _put(self, file: Found, text: str, recipe: Recipe, action: str, person: Person) -> None:
-        """Write a file back, with its row of the trail: first noted, then done, so that nothing is done unnoted."""
+    def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:
+        """Write a file and its audit entry: the entry first, so that no change is made without one."""
         old = content_sha256(parse_recipe(file.text, str(file.path))) if file.text else None
         new = {"sha256": content_sha256(recipe), "file": file.path.name}
-        with writing(records_folder(self._home)) as connection:
+        with direct_transaction(records_folder(self._home)) as connection:
             entry = AuditEntry(
                 person.who, person.role, action, f"recipe {recipe.name}", person.reason, {"sha256": old}, new
             )

@@ -1,4 +1,4 @@
-"""The recipe files of a folder: read beside each other, and written back whole or not at all."""
+"""Recipe files of a folder: reading, locking, and atomic writing with a backup."""
 
 import contextlib
 import fcntl
@@ -10,9 +10,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
-from station.recipe_store.standing import Found
-from station.records.sequence_mark import sync_folder
+from station.records.high_water_mark import sync_folder
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import check_recipes, recipe_files
 from station.settings.recipe_form import parse_recipe
@@ -22,20 +22,20 @@ _LOCK = "recipes.lock"
 
 
 class Folder(NamedTuple):
-    """What a folder holds."""
+    """Content of a recipe folder."""
 
-    found: tuple[Found, ...]
+    found: tuple[ValidFile, ...]
     broken: dict[str, list[Problem]]
-    """What is wrong with the files that are not good, by their stems."""
+    """Errors of the invalid files, by their stems."""
     problems: tuple[Problem, ...]
-    """All that is wrong, clashes between files included."""
+    """All errors, conflicts between files included."""
 
 
 def read_folder(folder: Path | None) -> Folder:
-    """Read every recipe of a folder, whatever is wrong with some.
+    """Read every recipe of a folder, also if some are invalid.
 
     Args:
-        folder: the site's; None for the recipes shipped.
+        folder: the site's; None for the shipped recipes.
 
     Raises:
         SettingsError: the folder cannot be read or holds no recipe.
@@ -46,7 +46,7 @@ def read_folder(folder: Path | None) -> Folder:
     for path in checked.recipes:
         try:
             text = path.read_text(encoding="utf-8-sig")
-            found.append(Found(path, text, parse_recipe(text, str(path))))  # as it is now, with its text
+            found.append(ValidFile(path, text, parse_recipe(text, str(path))))  # as it is now, with its text
         except (OSError, UnicodeDecodeError) as error:
             problems.append(Problem(f"{path}:1", "file", f"expected a readable file: {error}"))
         except SettingsError as error:
@@ -62,13 +62,10 @@ def read_folder(folder: Path | None) -> Folder:
 
 @contextmanager
 def locked(home: Path) -> Iterator[None]:
-    """Keep other commands from changing recipes for as long as the block lasts.
-
-    Args:
-        home: the station's home folder.
+    """Lock the recipes against other commands inside the block.
 
     Raises:
-        RecipeStoreError: another one changes them now, or the folder cannot be written.
+        RecipeStoreError: another command changes them now, or the folder cannot be written.
     """
     try:
         home.mkdir(parents=True, exist_ok=True)
@@ -85,18 +82,17 @@ def locked(home: Path) -> Iterator[None]:
 
 
 def write_back(path: Path, text: str, home: Path) -> Path | None:
-    """Put a text in the place of a recipe's file, whole or not at all; what stood there is kept as a backup.
+    """Replace a recipe's file atomically; the present text is stored as a backup.
 
     Args:
-        path: the recipe's file, there or not.
-        text: the new content.
-        home: the station's home folder, where the backup goes.
+        path: the recipe's file, existing or not.
+        home: the station's home folder, which contains the backups.
 
     Returns:
-        The backup; None where there was no file.
+        The backup; None if there was no file.
 
     Raises:
-        RecipeStoreError: it could not be written; the file is as it was.
+        RecipeStoreError: it could not be written; the file is unchanged.
     """
     backup: Path | None = None
     try:

@@ -1,21 +1,21 @@
-"""The history in the records' database: each change is one transaction with its row of the audit trail."""
+"""Recipe history in the records' database: each change is one transaction with its audit entry."""
 
 from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, func, insert, select, update
 
-from station.recipe_store.difference import in_a_line
+from station.recipe_store.difference import format_differences
 from station.recipe_store.revision import ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
 from station.records.schema import recipe_revisions
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
 
 
 class Person(NamedTuple):
-    """Who acts, and why."""
+    """Person who changes a recipe, and the reason."""
 
     who: str
     role: str
@@ -23,11 +23,10 @@ class Person(NamedTuple):
 
 
 def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
-    """The revisions by name, oldest first.
+    """Read the revisions by name, oldest first.
 
     Args:
-        connection: any.
-        name: of one recipe; all where empty.
+        name: of one recipe; all if empty.
     """
     query = select(recipe_revisions).order_by(recipe_revisions.c.name, recipe_revisions.c.revision)
     if name:
@@ -36,16 +35,16 @@ def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
 
 
 def submit(connection: Connection, text: str, recipe: Recipe, person: Person) -> Revision:
-    """Record a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
+    """Store a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         text: the file's.
-        recipe: what the text says.
+        recipe: the parsed text.
         person: the author.
 
     Raises:
-        RecipeStoreError: it is what is approved already, or a draft of somebody else's waits.
+        RecipeStoreError: it is approved already, or another person's draft waits.
     """
     known = read_revisions(connection, recipe.name)
     approved, draft = _with(known, Status.APPROVED), _with(known, Status.DRAFT)
@@ -59,24 +58,24 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
     if draft is not None and draft.author != person.who:
         raise ConflictError(
             f"recipe {recipe.name}: revision {draft.revision} of {draft.author} waits for approval, and differs from "
-            f"this one in {in_a_line(draft.recipe, recipe)}; let it be approved or retired first"
+            f"this one in {format_differences(draft.recipe, recipe)}; let it be approved or retired first"
         )
     if draft is not None:
         _retire(connection, draft, person, f"replaced by its author's next draft: {person.reason}")
     made = _new(known, text, recipe, Origin.SUBMITTED, person)
     _insert(connection, made)
-    before = None if approved is None else _told(approved)
-    _note(connection, person, "recipe.submitted", made, before, {**_told(made), "text": text})
+    before = None if approved is None else _audited(approved)
+    _note(connection, person, "recipe.submitted", made, before, {**_audited(made), "text": text})
     return made
 
 
 def approve(connection: Connection, wanted: Revision, file: Recipe | None, person: Person) -> Revision:
-    """Let fruit be inspected by a draft from the next lot on; the revision approved before is retired.
+    """Put a draft in force from the next lot on; the revision approved before is retired.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         wanted: the draft, as the approver has seen it.
-        file: what the recipe's file says now; None where it says nothing good.
+        file: the recipe's file now; None if it is invalid.
         person: the approver.
 
     Raises:
@@ -91,7 +90,7 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
     if draft.author.casefold().split() == person.who.casefold().split():
         raise RecipeStoreError(f"{place}: {draft.author} is its author; another person has to approve it")
     if file != draft.recipe:
-        what = "cannot be read" if file is None else f"says otherwise: {in_a_line(draft.recipe, file)}"
+        what = "cannot be read" if file is None else f"says otherwise: {format_differences(draft.recipe, file)}"
         raise ConflictError(f"{place}: the recipe's file {what}; submit the file again, or put it back with revert")
     for other in read_revisions(connection):
         if other.status is Status.APPROVED and other.name != draft.name and other.number == draft.number:
@@ -107,19 +106,19 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         approved_utc_ms=utc_ms(),
     )
     _update(connection, made)
-    changes = in_a_line(before.recipe, draft.recipe) if before else "the first revision"
-    old = None if before is None else _told(before)
-    _note(connection, person, "recipe.approved", made, old, {**_told(made), "changes": changes})
+    changes = format_differences(before.recipe, draft.recipe) if before else "the first revision"
+    old = None if before is None else _audited(before)
+    _note(connection, person, "recipe.approved", made, old, {**_audited(made), "changes": changes})
     return made
 
 
 def retire(connection: Connection, wanted: Revision, person: Person) -> Revision:
-    """Take a revision out of use: a draft is rejected; of an approved one no lot begins any more.
+    """Take a revision out of use: a draft is rejected; no lot begins with an approved one any more.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         wanted: a draft or an approved one.
-        person: who retires it.
+        person: who retires it, and why.
 
     Raises:
         RecipeStoreError: it is retired already.
@@ -130,13 +129,15 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
     return _retire(connection, now, person, person.reason)
 
 
-def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str) -> Revision:
-    """Record a recipe that is approved by where it comes from, in the place of what was approved before.
+def store_approved(
+    connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str
+) -> Revision:
+    """Store a recipe that is approved by its origin, in place of the revision approved before.
 
     Args:
-        connection: of a transaction for writing.
+        connection: in a write transaction.
         text: its file's.
-        recipe: what the text says.
+        recipe: the parsed text.
         origin: shipped or adopted.
         who: the distribution, or the station.
         reason: why it counts as approved.
@@ -152,8 +153,8 @@ def take_up(connection: Connection, text: str, recipe: Recipe, origin: Origin, w
         approved_utc_ms=utc_ms(),
     )
     _insert(connection, made)
-    old = None if before is None else _told(before)
-    _note(connection, person, f"recipe.{origin}", made, old, {**_told(made), "text": text})
+    old = None if before is None else _audited(before)
+    _note(connection, person, f"recipe.{origin}", made, old, {**_audited(made), "text": text})
     return made
 
 
@@ -182,7 +183,7 @@ def _retire(connection: Connection, now: Revision, person: Person, reason: str, 
     made = replace(now, status=Status.RETIRED, retired_by=person.who, retired_reason=reason, retired_utc_ms=utc_ms())
     _update(connection, made)
     if told:
-        _note(connection, person, "recipe.retired", made, _told(now), _told(made))
+        _note(connection, person, "recipe.retired", made, _audited(now), _audited(made))
     return made
 
 
@@ -207,7 +208,7 @@ def _note(connection: Connection, person: Person, action: str, of: Revision, old
     append_audit(connection, AuditEntry(person.who, person.role, action, subject, person.reason, old, new))
 
 
-def _told(revision: Revision) -> dict[str, Any]:
+def _audited(revision: Revision) -> dict[str, Any]:
     return {"revision": revision.revision, "status": str(revision.status), "sha256": revision.sha256}
 
 

@@ -1,4 +1,4 @@
-"""A recipe's revision, and what can be wrong with what is asked of the history."""
+"""Revision of a recipe, and the errors of the recipe history."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,32 +10,32 @@ from station.settings.recipe_model import Recipe
 
 
 class RecipeStoreError(StationError):
-    """What was asked of the recipes was not done, and nothing was changed."""
+    """A request about recipes was refused; nothing was changed."""
 
 
 class ConflictError(RecipeStoreError):
-    """Somebody else has changed the recipe meanwhile; the message says what."""
+    """Another person has changed the recipe meanwhile; the message gives the change."""
 
 
 class Status(StrEnum):
-    """Where a revision is in its life."""
+    """Status of a revision."""
 
     DRAFT = "draft"
-    """Submitted, to be looked at by another person."""
+    """Submitted, to be reviewed by another person."""
     APPROVED = "approved"
-    """The one by which fruit is inspected; at most one a recipe."""
+    """In force for inspections; at most one per recipe."""
     RETIRED = "retired"
 
 
 class Origin(StrEnum):
-    """Where a revision came from."""
+    """Origin of a revision."""
 
     SUBMITTED = "submitted"
     """By a person, from the recipe's file."""
     SHIPPED = "shipped"
     """With a distribution of the station, which approves it."""
     ADOPTED = "adopted"
-    """It was there when the history began: who installed the station answers for it."""
+    """It existed when the history began: the installer of the station is responsible for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Revision:
     sha256: str
     """Of its values when it was recorded."""
     text: str
-    """Its file as it was, with comments."""
+    """Its file unchanged, with comments."""
     status: Status
     origin: Origin
     based_on: int | None
@@ -68,15 +68,15 @@ class Revision:
 
     @property
     def recipe(self) -> Recipe:
-        """The recipe in this program's form.
+        """Return the recipe in this program's schema.
 
         Raises:
-            SettingsError: this program does not take it any more.
+            SettingsError: this program does not accept it any more.
         """
         return _parsed(self.text, f"{self.name} revision {self.revision}")
 
 
 @lru_cache(maxsize=256)
 def _parsed(text: str, source: str) -> Recipe:
-    """A revision never changes, and reading one takes some milliseconds."""
+    """Parse a revision, cached: it never changes, and parsing takes some milliseconds."""
     return parse_recipe(text, source)

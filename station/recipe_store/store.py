@@ -1,4 +1,4 @@
-"""The door to a station's recipes: for the command line, the service and the panel alike. Every verb blocks."""
+"""Recipe store of a station, for the command line, the service and the panel. Every method blocks."""
 
 import contextlib
 from collections.abc import Hashable, Mapping
@@ -9,12 +9,12 @@ from sqlalchemy import Connection
 
 from station.errors import BadInputError
 from station.recipe_store.files import Folder, locked, read_folder
-from station.recipe_store.history import Person, approve, read_revisions, retire, submit, take_up
+from station.recipe_store.history import Person, approve, read_revisions, retire, store_approved, submit
+from station.recipe_store.recipe_state import RecipeState, ValidFile, recipe_states
 from station.recipe_store.revision import Origin, RecipeStoreError, Revision, Status
-from station.recipe_store.standing import Found, Standing, standings
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import FILE_NAME, reading, records_folder
-from station.records.direct import writing
+from station.records.direct_transaction import direct_transaction
 from station.records.errors import RecordsError
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import approved_by_distribution, shipped_folder
@@ -25,18 +25,17 @@ BEGAN = "recipe.history_began"
 
 
 class RecipeStore:
-    """One station's recipes: the files that people edit, and the history of what was approved.
+    """Recipes of one station: the files that people edit, and the history of approved revisions.
 
     Args:
-        home: the station's home folder.
-        folder: the site's recipe files; None for those shipped, which cannot be edited in place.
+        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
     """
 
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder, self._records = home, folder, records_folder(home)
 
-    def read(self) -> tuple[tuple[Standing, ...], tuple[str, ...]]:
-        """How each recipe stands, and what is wrong with the files by themselves or with their folder.
+    def read(self) -> tuple[tuple[RecipeState, ...], tuple[str, ...]]:
+        """Return the state of each recipe, and the errors of the files and their folder.
 
         Raises:
             RecordsError: the history cannot be read.
@@ -45,10 +44,10 @@ class RecipeStore:
             folder = read_folder(self._folder)
         except SettingsError as error:
             folder = Folder((), {"": list(error.problems)}, error.problems)
-        return standings(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
+        return recipe_states(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
 
     def signature(self) -> Hashable:
-        """Another value whenever a file or the history has changed; it tells nothing else."""
+        """Return a value that differs whenever a file or the history has changed."""
         folder = self._folder or shipped_folder()
         files = []
         with contextlib.suppress(OSError):
@@ -63,10 +62,10 @@ class RecipeStore:
         return tuple(files), tuple(history)
 
     def history(self, name: str = "") -> list[Revision]:
-        """The revisions, oldest first; none before the history began.
+        """Return the revisions, oldest first; none before the history began.
 
         Args:
-            name: of one recipe; all where empty.
+            name: of one recipe; all if empty.
 
         Raises:
             RecordsError: they cannot be read.
@@ -77,79 +76,78 @@ class RecipeStore:
             return read_revisions(connection, name)
 
     def begin(self, last_good: Mapping[str, Recipe]) -> None:
-        """Take up what needs no person's approval; again and again, as at each start.
+        """Store the revisions that need no person's approval; call it at each start.
 
-        What the distribution ships counts as approved by it. When the history begins, what the station inspected by
-        until then, or else what is there, is adopted: whoever installed it answers for it.
+        Shipped recipes count as approved by the distribution. When the history begins, the recipes that the station
+        inspected by until then, or else the existing files, are adopted: their installer is responsible for them.
 
         Args:
-            last_good: recipes that the station was last seen to inspect by, where it remembers them.
+            last_good: recipes that the station last inspected by, if known.
 
         Raises:
             SettingsError: the folder cannot be read, or holds no recipe at all.
             RecordsError: the history cannot be written.
         """
         found = {file.recipe.name: file for file in read_folder(self._folder).found}
-        if self._is_begun() and not self._to_ship(list(found.values()), self.history()):
+        if self._is_started() and not self._to_ship(list(found.values()), self.history()):
             return
-        with locked(self._home), writing(self._records) as connection:
+        with locked(self._home), direct_transaction(self._records) as connection:
             _adopt(connection, found, last_good)
             for file in self._to_ship(list(found.values()), read_revisions(connection)):
                 who = f"fruit-station {version('fruit-station')}"
-                take_up(connection, file.text, file.recipe, Origin.SHIPPED, who, "shipped with the station's software")
+                store_approved(
+                    connection, file.text, file.recipe, Origin.SHIPPED, who, "shipped with the station's software"
+                )
 
     def submit(self, name: str, person: Person) -> Revision:
-        """Record the recipe's file as a draft for another person to approve.
+        """Store the recipe's file as a draft for another person to approve.
 
         Args:
-            name: the recipe's.
             person: its author.
 
         Raises:
-            BadInputError: there is no good file of that recipe.
+            BadInputError: there is no valid file of that recipe.
             RecipeStoreError: it is approved already, or another person's draft waits.
         """
         with locked(self._home):
-            file = self.good_file(name)
-            self._begun()
-            with writing(self._records) as connection:
+            file = self.valid_file(name)
+            self._started()
+            with direct_transaction(self._records) as connection:
                 return submit(connection, file.text, file.recipe, person)
 
     def approve(self, name: str, person: Person, revision: int | None = None) -> Revision:
-        """Let fruit be inspected by a draft from the next lot on.
+        """Put a draft in force from the next lot on.
 
         Args:
-            name: the recipe's.
-            person: another one than the author.
-            revision: the draft that the approver has seen; the one that waits where None.
+            person: must not be the author.
+            revision: the draft that the approver has seen; None for the one that waits.
 
         Raises:
             BadInputError: no draft waits.
             RecipeStoreError: it is the approver's own, or the file was changed since.
         """
         with locked(self._home):
-            standing = self.standing(name)
+            standing = self.state(name)
             wanted = standing.submitted if revision is None else self.revision(name, revision)
             if wanted is None:
                 raise BadInputError(f"recipe {name}: no draft waits for approval; submit one first")
             file = None if standing.file is None else standing.file.recipe
-            with writing(self._records) as connection:
+            with direct_transaction(self._records) as connection:
                 return approve(connection, wanted, file, person)
 
     def retire(self, name: str, person: Person, revision: int | None = None) -> Revision:
         """Take a revision out of use: no lot begins with it any more.
 
         Args:
-            name: the recipe's.
             person: who retires it, and why.
-            revision: which one; the approved one where None.
+            revision: None for the approved one.
 
         Raises:
             BadInputError: there is none.
             RecipeStoreError: it is retired already.
         """
         with locked(self._home):
-            self._begun()
+            self._started()
             history = self.history(name)
             if revision is not None:
                 wanted = self.revision(name, revision)
@@ -158,14 +156,11 @@ class RecipeStore:
                 if not approved:
                     raise BadInputError(f"recipe {name}: none of its revisions is approved; name one to retire")
                 wanted = approved[0]
-            with writing(self._records) as connection:
+            with direct_transaction(self._records) as connection:
                 return retire(connection, wanted, person)
 
-    def standing(self, name: str) -> Standing:
-        """How one recipe stands.
-
-        Args:
-            name: the recipe's.
+    def state(self, name: str) -> RecipeState:
+        """Return the state of one recipe.
 
         Raises:
             BadInputError: there is none of this name.
@@ -178,11 +173,7 @@ class RecipeStore:
         raise BadInputError(f"recipe {shortened(name)}: expected one of {known}")
 
     def revision(self, name: str, revision: int) -> Revision:
-        """One revision.
-
-        Args:
-            name: the recipe's.
-            revision: its number.
+        """Return one revision.
 
         Raises:
             BadInputError: there is none.
@@ -194,22 +185,19 @@ class RecipeStore:
         known = ", ".join(str(each.revision) for each in history) or "none yet"
         raise BadInputError(f"recipe {shortened(name)}: revision {revision}: expected one of {known}")
 
-    def good_file(self, name: str) -> Found:
-        """A recipe's file.
-
-        Args:
-            name: the recipe's.
+    def valid_file(self, name: str) -> ValidFile:
+        """Return a recipe's valid file.
 
         Raises:
-            BadInputError: there is none, or it is broken.
+            BadInputError: there is none, or it is invalid.
         """
-        standing = self.standing(name)
+        standing = self.state(name)
         if standing.file is None:
             raise BadInputError(f"recipe {name}: {standing.note or 'its file is gone'}")
         return standing.file
 
-    def _to_ship(self, found: list[Found], history: list[Revision]) -> list[Found]:
-        """The files that are as the distribution ships them, where no person has decided otherwise."""
+    def _to_ship(self, found: list[ValidFile], history: list[Revision]) -> list[ValidFile]:
+        """Return the files that are identical to the shipped ones, if no person has decided otherwise."""
         shipped, wanted = approved_by_distribution(), []
         for file in found:
             if shipped.get(file.recipe.name) != content_sha256(file.recipe):
@@ -222,28 +210,28 @@ class RecipeStore:
                 wanted.append(file)
         return wanted
 
-    def _is_begun(self) -> bool:
+    def _is_started(self) -> bool:
         if not (self._records / FILE_NAME).exists():
             return False
         with reading(self._records) as connection:
-            return _has_begun(connection)
+            return _has_started(connection)
 
-    def _begun(self) -> None:
-        """Before a person's first change: adopt what was there before, unless this is it."""
-        if not self._is_begun():
+    def _started(self) -> None:
+        """Adopt the existing recipes before a person's first change, unless that change is the adoption."""
+        if not self._is_started():
             raise RecipeStoreError(
                 "the recipes' history has not begun: `station recipes adopt`, or the station's first start, takes up "
                 "what is there"
             )
 
 
-def _has_begun(connection: Connection) -> bool:
+def _has_started(connection: Connection) -> bool:
     return connection.exec_driver_sql("SELECT 1 FROM audit WHERE action = ? LIMIT 1", (BEGAN,)).first() is not None
 
 
-def _adopt(connection: Connection, found: Mapping[str, Found], last_good: Mapping[str, Recipe]) -> None:
+def _adopt(connection: Connection, found: Mapping[str, ValidFile], last_good: Mapping[str, Recipe]) -> None:
     """Begin the history, once."""
-    if _has_begun(connection):
+    if _has_started(connection):
         return
     shipped = approved_by_distribution()
     reason = "it was there when the recipes' history began"
@@ -252,6 +240,6 @@ def _adopt(connection: Connection, found: Mapping[str, Found], last_good: Mappin
         file, good = found.get(name), last_good.get(name)
         if good is not None and (file is None or file.recipe != good):
             text = good.model_dump_json(indent=2) + "\n"
-            take_up(connection, text, good, Origin.ADOPTED, "station", "the station inspected by it until now")
+            store_approved(connection, text, good, Origin.ADOPTED, "station", "the station inspected by it until now")
         elif file is not None and shipped.get(name) != content_sha256(file.recipe):
-            take_up(connection, file.text, file.recipe, Origin.ADOPTED, "station", reason)
+            store_approved(connection, file.text, file.recipe, Origin.ADOPTED, "station", reason)

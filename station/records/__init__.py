@@ -1,1 +1,1 @@
-"""What happened, for ever: inspections with their curves and images, alarms, counters and events."""
+"""Records of the station: inspections with their curves and images, alarms, counters, events, audit trail."""

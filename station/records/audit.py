@@ -11,41 +11,41 @@ from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
 from station.records.errors import BadRecordError
 from station.records.schema import audit
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 GENESIS = "0" * 64
-"""What the first row of all has as the hash of the row before it."""
+"""The very first row's value for the hash of the row before."""
 CONTINUED = "audit.continued"
-"""The action of a row that says that rows before it are missing from this database."""
+"""Action of a row that records that rows before it are missing from this database."""
 RESTORED = "records.restored"
-"""The action of a row that says that a person put a backup back; rows written since then are missing before it."""
+"""Action of a row that records the restore of a backup; rows written since that backup are missing before it."""
 STATION = "station"
-"""Who acts where no person does, and its role."""
+"""Actor, and role, where no person acts."""
 LONGEST_WORD, LONGEST_REASON = 64, 1000
 
 _SPARE_NUMBERS = 1000
-"""Left out where the trail goes on without its last rows: rows that the head did not yet tell of keep theirs."""
+"""Numbers left free where the trail continues without its last rows: rows newer than the saved head had them."""
 _FORM = "fruit-station audit 1"
 
 
 @dataclass(frozen=True, slots=True)
 class AuditEntry:
-    """Something that was done, before it has its place in the trail."""
+    """One entry, before it has its place in the trail."""
 
     who: str
-    """A person's name or account; `station` or `plc` where none acted. One printable line."""
+    """A person's name or account; `station` or `plc` if no person acted. One printable line."""
     role: str
-    """In what capacity, as `operator`, `quality`, `service`, `plc`, `station`."""
+    """Role of `who`, as `operator`, `quality`, `service`, `plc`, `station`."""
     action: str
-    """What was done, as `recipe.approved`, `alarm.acknowledged`, `service.started`."""
+    """Action, as `recipe.approved`, `alarm.acknowledged`, `service.started`."""
     subject: str
-    """To what, as `recipe strawberry`, `alarm camera_lost`; may be empty."""
+    """Object of the action, as `recipe strawberry`, `alarm camera_lost`; may be empty."""
     reason: str = ""
-    """In the words of who did it."""
+    """Reason, as the person wrote it."""
     old: Any = None
-    """What was before, as JSON has it."""
+    """Value before, as JSON."""
     new: Any = None
-    """What is from now on, as JSON has it."""
+    """Value from now on, as JSON."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,39 +68,38 @@ class AuditRow:
 
     @property
     def true_hash(self) -> str:
-        """The SHA-256, hexadecimal, that the row's other columns have."""
+        """Return the SHA-256, hexadecimal, of the row's other columns."""
         columns = (self.seq, self.utc_ms, self.who, self.role, self.action, self.subject, self.reason)
         text = json.dumps([_FORM, *columns, self.old, self.new, self.previous_hash], ensure_ascii=True)
         return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
-    """Append to the trail, within the transaction of what is told of: both are durable, or neither.
+    """Append to the trail, within the transaction of the audited change: both are durable, or neither.
 
     Args:
-        connection: of a transaction that was begun for writing: the writer's, or one of `writing_connection`.
-        entry: what was done.
+        connection: in a write transaction: the writer's, or one of `writing_connection`.
 
     Raises:
         BadRecordError: a text is empty, too long or not printable, or a value has no JSON.
     """
-    check_entry(entry)
+    validate_entry(entry)
     return _append(connection, entry, last_row(connection), None)
 
 
 def continue_audit(connection: Connection, known: Head | None) -> AuditRow | None:
-    """At a start: where the trail lacks rows that are known to have been there, say so in it.
+    """Append, at a start, a row that records the loss of rows that are known to have existed.
 
     Args:
-        connection: as above.
-        known: the head as kept outside the database.
+        connection: in a write transaction.
+        known: the head stored outside the database.
 
     Returns:
-        The row that says so, with the last row that is here as `old` and the last one known as `new`; None where
-        nothing is missing.
+        That row, with the last row in this database as `old` and the last one known as `new`; None if no row is
+        missing.
     """
     last = last_row(connection)
-    if (known is None and last is None) or (known is not None and holds(connection, known)):
+    if (known is None and last is None) or (known is not None and has_row(connection, known)):
         return None
     if known is None:
         reason = f"{HEAD_NAME} is missing or unreadable: whether these are the last rows of the trail is not known"
@@ -112,43 +111,37 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
 
 
 def append_restored(connection: Connection, by: str, known: Head | None, new: dict[str, Any]) -> AuditRow:
-    """Say that a backup was put back, behind its last row; with a gap where rows are known that it does not have.
+    """Append, after a restored backup's last row, a row that records the restore; known newer rows leave a gap.
 
     Args:
-        connection: of a transaction on the restored database, begun for writing.
-        by: who did it.
-        known: the head of the trail that was there; None where there was none.
-        new: what is to be told of the backup.
+        connection: in a write transaction on the restored database.
+        by: the person's name.
+        known: the head of the trail before the restore; None if there was none.
+        new: what the row records of the backup.
 
     Raises:
-        BadRecordError: `by` is nothing that the trail can hold.
+        BadRecordError: the trail cannot store `by`.
     """
     last = last_row(connection)
-    lost = known if known is not None and not holds(connection, known) else None
+    lost = known if known is not None and not has_row(connection, known) else None
     here = None if last is None else {"seq": last.seq, "hash": last.hash}
     old = None if lost is None else {"audit": lost._asdict()}
     entry = AuditEntry(by, "command line", RESTORED, "records", "", old, {**new, "audit": here})
-    check_entry(entry)
+    validate_entry(entry)
     seq = None if lost is None else max(lost.seq, last.seq if last else 0) + _SPARE_NUMBERS
     return _append(connection, entry, last, seq)
 
 
-def holds(connection: Connection, head: Head) -> bool:
-    """Whether the trail has this very row.
-
-    Args:
-        connection: any.
-        head: its number and hash.
-    """
+def has_row(connection: Connection, head: Head) -> bool:
+    """Check that the trail has exactly this row."""
     return connection.scalar(select(audit.c.hash).where(audit.c.seq == head.seq)) == head.hash
 
 
 def newer_head(connection: Connection, known: Head | None) -> Head | None:
-    """The trail's head where it is beyond the one known; None where not.
+    """Return the trail's head if it is beyond the known one, else None.
 
     Args:
-        connection: any.
-        known: as saved last.
+        known: as last saved.
     """
     found = connection.execute(
         select(audit.c.seq, audit.c.hash)
@@ -160,17 +153,13 @@ def newer_head(connection: Connection, known: Head | None) -> Head | None:
 
 
 def last_row(connection: Connection) -> AuditRow | None:
-    """The trail's last row; None where there is none.
-
-    Args:
-        connection: any.
-    """
+    """Return the trail's last row; None if it is empty."""
     found = connection.execute(select(audit).order_by(audit.c.seq.desc()).limit(1)).one_or_none()
     return None if found is None else row_of(found)
 
 
 def row_of(found: Row[Any]) -> AuditRow:
-    """A row as read from the table.
+    """Make a row from the table's columns.
 
     Args:
         found: with all columns.
@@ -179,13 +168,10 @@ def row_of(found: Row[Any]) -> AuditRow:
 
 
 def canonical(value: Any) -> str | None:
-    """JSON of one form only: keys in order, no spaces; None for None.
-
-    Args:
-        value: as JSON has it.
+    """Return canonical JSON: keys in order, no spaces; None for None.
 
     Raises:
-        BadRecordError: it has no JSON, as NaN.
+        BadRecordError: the value has no JSON, as NaN.
     """
     if value is None:
         return None
@@ -214,11 +200,8 @@ def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, se
     return row
 
 
-def check_entry(entry: AuditEntry) -> None:
-    """Whether the trail can hold an entry's texts: for who has to know before something is done.
-
-    Args:
-        entry: what is to be done.
+def validate_entry(entry: AuditEntry) -> None:
+    """Check that the trail can store an entry's texts, before the action is carried out.
 
     Raises:
         BadRecordError: a text is empty, too long or not printable.

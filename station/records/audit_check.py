@@ -1,4 +1,4 @@
-"""Whether the audit trail is whole: every row as it was written, each behind the one before, none cut off."""
+"""Check of the audit trail: every row unchanged, linked to the row before, and none cut off."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -13,31 +13,30 @@ from station.records.schema import audit
 
 @dataclass(frozen=True, slots=True)
 class AuditCheck:
-    """What was found."""
+    """Result of the check."""
 
     rows: int
-    """How many were looked at."""
+    """Number of rows checked."""
     head: Head | None
-    """The last row; None of an empty trail."""
+    """The last row; None for an empty trail."""
     broken: tuple[str, ...]
-    """What is wrong, the first broken row first; empty where the trail is whole."""
+    """Faults, the first broken row first; empty if the trail is complete."""
     restored: tuple[str, ...]
-    """Rows that are missing because a person put a backup back, which the trail tells of; no fault by itself."""
+    """Rows that are missing because a person restored a backup, as the trail records; no fault by itself."""
 
 
-def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
-    """Go through the trail from its first row to its last.
+def check_audit(connection: Connection, saved: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
+    """Check the trail from its first row to its last.
 
     Args:
-        connection: any.
-        kept: the head as kept outside the database; None where it is missing.
-        anchors: rows known from elsewhere, as from a backup or a printed report.
-        since: leave out rows before this one, as where a break is known and explained.
+        saved: the head stored outside the database; None if it is missing.
+        anchors: rows known from other sources, as a backup or a printed report.
+        since: skip rows before this one, as after a known and explained break.
     """
     broken: list[str] = []
     restored: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
-    wanted = {anchor.seq for anchor in anchors} | ({kept.seq} if kept else set())
+    wanted = {anchor.seq for anchor in anchors} | ({saved.seq} if saved else set())
     for row in _rows(connection, since):
         number += 1
         if before is not None and (gap := _restored(row, before)):
@@ -49,9 +48,13 @@ def check_audit(connection: Connection, kept: Head | None, anchors: Iterable[Hea
         before = row
     head = None if before is None else Head(before.seq, before.hash)
     broken += [text for anchor in anchors if (text := _missing(anchor, hashes, "the anchor"))]
-    if kept is not None and kept.seq >= since and (text := _missing(kept, hashes, "the head kept beside the database")):
+    if (
+        saved is not None
+        and saved.seq >= since
+        and (text := _missing(saved, hashes, "the head kept beside the database"))
+    ):
         broken.append(text)
-    if kept is None and last_row(connection) is not None:
+    if saved is None and last_row(connection) is not None:
         broken.append("the head kept beside the database is missing: rows may have been cut off at the end")
     return AuditCheck(number, head, tuple(broken), tuple(restored))
 
@@ -62,7 +65,7 @@ def _rows(connection: Connection, since: int) -> Iterator[AuditRow]:
 
 
 def _restored(row: AuditRow, before: AuditRow) -> str:
-    """What a whole row says of the gap before it, where a backup ended with the row before; else empty."""
+    """Return what an intact row records of the gap before it, if a backup ended with the row before; else empty."""
     behind = row.action == RESTORED and row.seq != before.seq + 1
     if not behind or row.hash != row.true_hash or row.previous_hash != before.hash:
         return ""
@@ -76,7 +79,7 @@ def _restored(row: AuditRow, before: AuditRow) -> str:
 
 
 def _wrong(row: AuditRow, before: AuditRow | None, *, first_of_all: bool) -> list[str]:
-    """What is wrong with one row and its place."""
+    """Return the faults of one row and its place."""
     wrong = []
     if row.hash != row.true_hash:
         wrong.append(f"row {row.seq}: it was changed: its content does not have its hash")

@@ -1,7 +1,7 @@
-"""The audit trail's last row, kept outside the database: without it nobody could tell that last rows were cut off.
+"""Head of the audit trail, stored outside the database: without it, a cut-off end would not be found.
 
-Two lines of fixed length, written in turn in place, as the sequence mark's. Whoever appends to the trail saves it after
-the commit, so it may be some rows behind, never ahead.
+Two lines of fixed length, written in turn in place, as the sequence mark's. It is saved after the commit of new rows,
+so it may be some rows behind, never ahead.
 """
 
 import logging
@@ -10,7 +10,7 @@ import zlib
 from pathlib import Path
 from typing import NamedTuple
 
-from station.records.sequence_mark import sync_folder
+from station.records.high_water_mark import sync_folder
 
 FILE_NAME = "audit_head"
 log = logging.getLogger(__name__)
@@ -19,30 +19,26 @@ _LINE_BYTES = 10 + 1 + 64 + 1 + 8 + 1
 
 
 class Head(NamedTuple):
-    """Which row is the last."""
+    """Number and hash of the last row."""
 
     seq: int
     hash: str
 
 
 def read_head(folder: Path) -> Head | None:
-    """The head that was saved last; None where the file is missing or no line of it is whole.
-
-    Args:
-        folder: the records' folder.
+    """Read the last saved head; None if the file is missing or has no valid line.
 
     Raises:
-        OSError: it is there and cannot be read.
+        OSError: the file exists and cannot be read.
     """
     return max((head for head in _lines(folder / FILE_NAME) if head is not None), default=None)
 
 
 def save_head(folder: Path, head: Head) -> None:
-    """Make the head durable; the line that is not the newest gives way.
+    """Make the head durable; it replaces the older of the two lines.
 
     Args:
-        folder: the records' folder.
-        head: of a row that is durable.
+        head: of a durable row.
 
     Raises:
         OSError: it may not be durable.
@@ -63,12 +59,11 @@ def save_head(folder: Path, head: Head) -> None:
         sync_folder(folder)
 
 
-def keep_head(folder: Path, head: Head) -> None:
-    """Save the head as well as it can be: what is in the trail stays so without it.
+def try_save_head(folder: Path, head: Head) -> None:
+    """Save the head; a failure is logged only, because the trail itself is durable without it.
 
     Args:
-        folder: the records' folder.
-        head: of a row that is durable.
+        head: of a durable row.
     """
     try:
         save_head(folder, head)

@@ -1,4 +1,4 @@
-"""Rows of the audit trail, chosen, and as text for a terminal."""
+"""Audit report: selected rows of the trail, as text for a terminal."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -9,19 +9,18 @@ from sqlalchemy import Connection, select
 
 from station.records.audit import AuditRow, row_of
 from station.records.schema import audit
-from station.records.wording import printable
+from station.records.texts import printable
 
 _LONGEST_VALUE = 300
 
 
 def read_audit(connection: Connection, number: int, action: str = "", subject: str = "") -> list[AuditRow]:
-    """The last rows, oldest first.
+    """Read the last rows, oldest first.
 
     Args:
-        connection: any.
         number: at most so many.
-        action: rows of this action, or of all that begin so; all where empty.
-        subject: rows with this text in their subject; all where empty.
+        action: rows of this action, or of all that start with it; all if empty.
+        subject: rows with this text in their subject; all if empty.
     """
     query = select(audit).order_by(audit.c.seq.desc()).limit(number)
     if action:
@@ -31,12 +30,8 @@ def read_audit(connection: Connection, number: int, action: str = "", subject: s
     return [row_of(found) for found in connection.execute(query)][::-1]
 
 
-def told(rows: Sequence[AuditRow]) -> str:
-    """Rows for a person, some lines each.
-
-    Args:
-        rows: in the order of the lines.
-    """
+def format_rows(rows: Sequence[AuditRow]) -> str:
+    """Format rows for a person, some lines each."""
     return printable("\n".join(line for row in rows for line in _lines(row)))
 
 

@@ -1,4 +1,4 @@
-"""A whole copy of the records, made while the station writes, verified, and there only when it is complete."""
+"""Backup of the records, made while the station writes, verified, and visible only when it is complete."""
 
 import hashlib
 import os
@@ -10,15 +10,15 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from station.records.audit import holds, newer_head
+from station.records.audit import has_row, newer_head
 from station.records.audit_head import Head, read_head
 from station.records.database import FILE_NAME, open_engine, plain, reading
+from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError
-from station.records.failures import in_words
+from station.records.high_water_mark import LARGEST, HighWaterMark, sync_folder
 from station.records.images import FOLDER_NAME, image_path
 from station.records.retention import forget_missing, referred
-from station.records.sequence_mark import LARGEST, SequenceMark, sync_folder
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 MANIFEST_NAME = "backup.json"
 MARK_NAME = "sequence"
@@ -27,32 +27,31 @@ _CHUNK_BYTES = 1 << 20
 
 
 class Manifest(BaseModel):
-    """What a backup holds, to be checked before it is used."""
+    """Contents of a backup, to be checked before it is used."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     form: int = 1
     made_utc_ms: int = Field(ge=0)
     sequence: int = Field(ge=0, le=LARGEST)
-    """The highest number that was given by then."""
+    """The highest sequence number given when the backup was made."""
     inspections: int = Field(ge=0)
     images: int = Field(ge=0)
     size_bytes: int = Field(ge=0)
     database_sha256: str = Field(pattern="^[0-9a-f]{64}$")
     audit_head: str = Field(default="", pattern="^([0-9]+:[0-9a-f]{64})?$")
-    """The audit trail's last row as `ROW:HASH`, an anchor for `station audit verify`; empty where there is none."""
+    """The audit trail's last row as `ROW:HASH`, an anchor for `station audit verify`; empty if there is none."""
     notes: tuple[str, ...] = ()
-    """What could not be copied, or was missing before."""
+    """Images that could not be copied, or were missing before."""
 
 
 def make_backup(folder: Path, directory: Path) -> Manifest:
-    """Copy database and images. The database is as it was at one moment; the station is not held up.
+    """Copy database and images. The database is a snapshot of one moment; the station does not wait.
 
     Args:
-        folder: the records' folder.
-        directory: made by this; not there before. It lies beside as `.NAME.partial` until it is complete.
+        directory: must not exist; it is `.NAME.partial` beside it until it is complete.
 
     Raises:
-        RecordsError: there is something already, no space, or the disk failed; then no `directory` is left.
+        RecordsError: it exists, there is no space, or the disk failed; then no `directory` is left.
     """
     if os.path.lexists(directory):
         raise RecordsError(f"{directory} is there already", "name a new folder; a backup never changes another one")
@@ -72,18 +71,18 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
         raise
     except (OSError, sqlite3.Error) as error:
         _remove(partial)
-        raise in_words(error, str(directory)) from error
+        raise map_error(error, str(directory)) from error
     return manifest
 
 
 def read_manifest(directory: Path) -> Manifest:
-    """What a backup says of itself.
+    """Read a backup's manifest.
 
     Args:
         directory: as `make_backup` made it.
 
     Raises:
-        RecordsError: it is none, or not a whole one.
+        RecordsError: it is no backup, or an incomplete one.
     """
     try:
         return Manifest.model_validate_json((directory / MANIFEST_NAME).read_bytes())
@@ -92,18 +91,18 @@ def read_manifest(directory: Path) -> Manifest:
     except ValidationError as error:
         raise DamagedError(f"{directory / MANIFEST_NAME}: {error.errors()[0]['msg']}", "take another backup") from error
     except OSError as error:
-        raise in_words(error, str(directory)) from error
+        raise map_error(error, str(directory)) from error
 
 
 def copy_image(source: Path, target: Path, sha256: str) -> int:
-    """Copy an image, durably, if it is what its name says.
+    """Copy an image, durably, if its content matches its name.
 
     Returns:
         Its size in bytes.
 
     Raises:
-        FileNotFoundError: it is not there.
-        DamagedError: its content is another.
+        FileNotFoundError: it is missing.
+        DamagedError: its content does not match.
     """
     content = source.read_bytes()
     if hashlib.sha256(content).hexdigest() != sha256:
@@ -115,7 +114,7 @@ def copy_image(source: Path, target: Path, sha256: str) -> int:
 
 
 def hash_of(path: Path) -> str:
-    """A file's SHA-256, hexadecimal."""
+    """Return a file's SHA-256, hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK_BYTES):
@@ -124,11 +123,7 @@ def hash_of(path: Path) -> str:
 
 
 def integrity(connection: sqlite3.Connection) -> Iterator[str]:
-    """What SQLite finds wrong with a database, up to 100 faults.
-
-    Args:
-        connection: any.
-    """
+    """Return SQLite's integrity faults of a database, up to 100."""
     try:
         for (found,) in connection.execute("PRAGMA integrity_check(100)"):
             if found != "ok":
@@ -142,7 +137,7 @@ def integrity(connection: sqlite3.Connection) -> Iterator[str]:
 def _copied(folder: Path, partial: Path) -> Manifest:
     path, known = partial / FILE_NAME, read_head(folder)
     with reading(folder) as live, closing(sqlite3.connect(path)) as target:
-        plain(live).backup(target)  # in one step: a reader of the write-ahead log holds up nobody
+        plain(live).backup(target)  # in one step: a reader of the write-ahead log delays no other
         target.execute("PRAGMA journal_mode = DELETE")
         faults = list(integrity(target))
     if faults:
@@ -155,7 +150,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     _sync(path)
     return Manifest(
         made_utc_ms=utc_ms(),
-        sequence=max(SequenceMark(folder / MARK_NAME).value, last or 0),
+        sequence=max(HighWaterMark(folder / MARK_NAME).value, last or 0),
         inspections=inspections,
         images=images,
         size_bytes=size_bytes + path.stat().st_size,
@@ -166,12 +161,12 @@ def _copied(folder: Path, partial: Path) -> Manifest:
 
 
 def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
-    """The copied trail's last row, and whether rows are missing from it that were there before the copying."""
+    """Return the copied trail's last row, and whether it lacks rows that existed before the copy."""
     engine = open_engine(path, "ro")
     try:
         with engine.connect() as connection:
             head = newer_head(connection, None)
-            cut = known is not None and not holds(connection, known)
+            cut = known is not None and not has_row(connection, known)
     finally:
         engine.dispose()
     note = "the audit trail lacks rows that it had: see `station audit verify`"
@@ -179,7 +174,7 @@ def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
 
 
 def _copy_images(folder: Path, partial: Path) -> tuple[int, list[str]]:
-    """Copy what the copied database refers to; what the quota has removed since, it does not refer to any more."""
+    """Copy the images that the copied database refers to, without those that the quota has removed since."""
     engine = open_engine(partial / FILE_NAME, "rw")
     size_bytes, missing, damaged = 0, set[str](), list[str]()
     try:

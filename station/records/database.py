@@ -1,4 +1,4 @@
-"""The SQLite file: how it is opened, checked, brought up to date, and moved aside when it is damaged."""
+"""SQLite database file: opening, damage check, migration, and moving aside when it is damaged."""
 
 import json
 import math
@@ -15,19 +15,19 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool
 
+from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
-from station.records.failures import in_words
-from station.records.sequence_mark import sync_folder
+from station.records.high_water_mark import sync_folder
 
 FILE_NAME = "records.sqlite3"
 MIGRATIONS = Path(__file__).parent / "migrations"
 CHECK_S = 5.0
-"""A large database is checked no longer than this at a start; damage found later is told by SQLite itself."""
+"""Longest check of a large database at a start; SQLite itself reports damage found later."""
 BUSY_MS = 1000
 
 
 def records_folder(home: Path) -> Path:
-    """The records' folder.
+    """Return the records' folder.
 
     Args:
         home: the station's home folder.
@@ -36,11 +36,10 @@ def records_folder(home: Path) -> Path:
 
 
 def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
-    """Make an engine whose connections write ahead, durably, with real transactions.
+    """Make an engine with write-ahead logging, durable commits and real transactions.
 
     Args:
-        path: the database.
-        mode: read only, read and write, or made where it is missing.
+        mode: read only, read and write, or made if missing.
     """
     read_only = mode == "ro"
     engine = create_engine(
@@ -68,13 +67,13 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
 
 
 def check(path: Path) -> None:
-    """Look for damage, within `CHECK_S`.
+    """Check for damage, within `CHECK_S`.
 
     Args:
         path: the database, which exists.
 
     Raises:
-        DamagedError: something is wrong with it.
+        DamagedError: it is damaged.
         RecordsError: it cannot be read.
     """
     until_s = time.monotonic() + CHECK_S
@@ -85,9 +84,9 @@ def check(path: Path) -> None:
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_INTERRUPT:
             return
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
     if found != "ok":
-        raise in_words(_corrupt(found), str(path))
+        raise map_error(_corrupt(found), str(path))
 
 
 def _corrupt(found: str) -> sqlite3.DatabaseError:
@@ -97,11 +96,10 @@ def _corrupt(found: str) -> sqlite3.DatabaseError:
 
 
 def move_aside(folder: Path, *names: str) -> Path:
-    """Move a damaged database, and what belongs to it, out of the way.
+    """Move a damaged database, and the files that belong to it, out of the way.
 
     Args:
-        folder: the records' folder.
-        names: the files and folders in it; those that are missing are left out.
+        names: files and folders in it; missing ones are skipped.
 
     Returns:
         The new folder, named with date and time.
@@ -118,19 +116,18 @@ def move_aside(folder: Path, *names: str) -> Path:
 
 
 def stamp() -> str:
-    """The date and time as part of a file's name, never the same twice."""
+    """Return date and time as part of a file's name, never the same twice."""
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
 
 
 def migrate(engine: Engine, folder: Path) -> None:
-    """Bring the schema up to date, with a copy of the database made before.
+    """Migrate the schema to the newest version, after a copy of the database was made.
 
     Args:
-        engine: of the database.
-        folder: where `backups` lies.
+        folder: contains the folder `backups`.
 
     Raises:
-        SchemaError: it is a newer program's, or a migration failed; then it is as it was.
+        SchemaError: it is a newer program's, or a migration failed; then it is unchanged.
         RecordsError: it cannot be read or written.
     """
     from alembic import command  # noqa: PLC0415 (it takes long to load, and who only reads needs none of it)
@@ -159,7 +156,7 @@ def migrate(engine: Engine, folder: Path) -> None:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
     except Exception as error:
-        told = in_words(error, str(folder / FILE_NAME))
+        told = map_error(error, str(folder / FILE_NAME))
         if isinstance(told, (DiskFullError, ReadOnlyError, LockedError, DamagedError)):
             raise told from error
         kept = f"; a copy of it is {backup}" if backup else ""
@@ -170,7 +167,7 @@ def migrate(engine: Engine, folder: Path) -> None:
 
 
 def _backed_up(folder: Path, revision: str) -> Path:
-    """A whole copy of the database, durable before it is named."""
+    """Copy the whole database, durably before the copy gets its name."""
     backup = folder / "backups" / f"{stamp()}-form-{revision}.sqlite3"
     backup.parent.mkdir(exist_ok=True)
     size_bytes = (folder / FILE_NAME).stat().st_size
@@ -188,10 +185,7 @@ def _backed_up(folder: Path, revision: str) -> Path:
 
 @contextmanager
 def reading(folder: Path) -> Iterator[Connection]:
-    """A connection that cannot write, for another thread or process than the writer's.
-
-    Args:
-        folder: the records' folder.
+    """Open a connection that cannot write, for another thread or process than the writer's.
 
     Raises:
         RecordsError: there are no records, or they cannot be read.
@@ -205,11 +199,11 @@ def reading(folder: Path) -> Iterator[Connection]:
     except RecordsError:
         raise
     except Exception as error:
-        raise in_words(error, str(path)) from error
+        raise map_error(error, str(path)) from error
 
 
 def plain(connection: Connection) -> sqlite3.Connection:
-    """The driver's own connection, for what SQLAlchemy has no words for, or is too slow for.
+    """Return the driver's own connection, for what SQLAlchemy does not offer, or does too slowly.
 
     Args:
         connection: of an engine of `open_engine`.
@@ -221,7 +215,7 @@ def plain(connection: Connection) -> sqlite3.Connection:
 
 
 def _to_json(value: Any) -> str:
-    """JSON of any value: what has no JSON, as NaN, is null, so that no odd figure costs a record."""
+    """Return JSON of any value: what has no JSON, as NaN, becomes null, so that no odd value costs a record."""
     return json.dumps(_finite(value), default=_number, ensure_ascii=False, allow_nan=False)
 
 
@@ -236,6 +230,6 @@ def _finite(value: Any) -> Any:
 
 
 def _number(value: Any) -> Any:
-    """The numbers of numpy as Python's, anything else as text."""
+    """Convert numpy's numbers to Python's, anything else to text."""
     item = getattr(value, "item", None)
     return _finite(item()) if callable(item) else str(value)

@@ -1,10 +1,10 @@
-"""What can be wrong with the records: each with a code, a cause and a remedy."""
+"""Records errors, each with a code, a cause and a remedy."""
 
 from station.errors import StationError
 
 
 class RecordsError(StationError):
-    """The records could not do what they were asked."""
+    """The records could not carry out a request."""
 
     code = "records"
 
@@ -15,7 +15,7 @@ class RecordsError(StationError):
 
 
 class DiskFullError(RecordsError):
-    """No space is left, or less than the reserve."""
+    """The disk is full, or has less space than the reserve."""
 
     code = "disk_full"
 
@@ -27,43 +27,43 @@ class ReadOnlyError(RecordsError):
 
 
 class DiskError(RecordsError):
-    """The disk did not read or write."""
+    """A read or write of the disk failed."""
 
     code = "disk_error"
 
 
 class LockedError(RecordsError):
-    """Another program holds the database, or another station the folder."""
+    """Another program has the database open, or another station the folder."""
 
     code = "locked"
 
 
 class DamagedError(RecordsError):
-    """The database is damaged, or was taken away while the station ran."""
+    """The database is damaged, or was removed while the station ran."""
 
     code = "damaged"
 
 
 class SchemaError(RecordsError):
-    """The database is of a newer program, or could not be brought to this one's form."""
+    """The database is a newer program's, or its migration failed."""
 
     code = "schema"
 
 
 class SequenceError(RecordsError):
-    """No sequence number can be given that was surely never given before."""
+    """No sequence number can be given that was certainly never given before."""
 
     code = "sequence"
 
 
 class RecordsDeadlineError(RecordsError):
-    """Not done in time. What was asked is then not carried out, or withdrawn, except an outcome under way."""
+    """The deadline passed. The request is then not carried out, or withdrawn, except an outcome under way."""
 
     code = "deadline"
 
 
 class UnknownInspectionError(RecordsError):
-    """No inspection with this sequence was ever begun."""
+    """No inspection with this sequence exists."""
 
     code = "unknown_inspection"
 
@@ -75,6 +75,6 @@ class RecordsClosedError(RecordsError):
 
 
 class BadRecordError(RecordsError):
-    """What was to be recorded is malformed: a fault of the program."""
+    """The record is malformed: a fault of the program."""
 
     code = "bad_record"

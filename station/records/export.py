@@ -1,4 +1,4 @@
-"""Inspections as a table for other programs: CSV or Parquet, written as they are read, in constant memory."""
+"""Export of inspections as a table for other programs: CSV or Parquet, written in constant memory."""
 
 import csv
 import json
@@ -12,12 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from station.records.database import plain, reading
-from station.records.failures import in_words
+from station.records.error_mapping import map_error
+from station.records.high_water_mark import LARGEST
 from station.records.search import Query
-from station.records.sequence_mark import LARGEST
 
 WINDOW = 10_000
-"""Numbers read in one transaction, and rows of one Parquet row group at most."""
+"""Sequence numbers read in one transaction, and rows of one Parquet row group at most."""
 
 _LIST = "(SELECT json_group_array({0}) FROM (SELECT {0} FROM {1} WHERE {1}.sequence = i.sequence ORDER BY {2}))"
 _TIME = pa.timestamp("ms", tz="UTC")
@@ -80,18 +80,16 @@ Rows = Sequence[Sequence[Any]]
 
 
 def export(folder: Path, query: Query, target: Path) -> int:
-    """Write what a query finds, in order of number; the file is there when it is complete.
+    """Write the inspections that match a query, in order of number; the file appears when it is complete.
 
     Args:
-        folder: the records' folder.
-        query: what to write.
         target: with one of `SUFFIXES`; replaced.
 
     Returns:
-        How many inspections.
+        The number of inspections.
 
     Raises:
-        RecordsError: the records cannot be read, or the file not written; then `target` is as it was.
+        RecordsError: the records cannot be read, or the file not written; then `target` is unchanged.
     """
     partial = target.with_name(f".{target.name}.partial")
     open_writer = _csv_writer if target.suffix == ".csv" else _parquet_writer
@@ -104,14 +102,14 @@ def export(folder: Path, query: Query, target: Path) -> int:
                 number += len(rows)
         partial.replace(target)
     except OSError as error:
-        raise in_words(error, str(target)) from error
+        raise map_error(error, str(target)) from error
     finally:
         partial.unlink(missing_ok=True)
     return number
 
 
 def _windows(folder: Path, query: Query) -> Iterator[Rows]:
-    """The rows, a window of numbers at a time, so that no reader keeps the write-ahead log from being emptied."""
+    """Yield the rows, a window of numbers at a time, so that no reader blocks the truncation of the write-ahead log."""
     where, values = _conditions(query)
     statement = (
         f"SELECT {', '.join(column.sql for column in COLUMNS)} FROM inspections AS i"  # noqa: S608 (of constants)

@@ -1,4 +1,4 @@
-"""The first press in an inspection's record, where the fruit was pressed twice: the curve is that of the last press."""
+"""First press of a fruit that was pressed twice; the record's curve is that of the last press."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,10 @@ _FLAGS = {flag.value for flag in Flag}
 
 
 def first_press_measures(earlier: Sequence[Press], verdict: Verdict | None) -> dict[str, int | str]:
-    """What is kept of a press that was inconclusive; nothing where there was none.
+    """Return what the record stores of an inconclusive press; nothing if there was none.
 
     Args:
         earlier: the presses before the last one.
-        verdict: on the first.
     """
     if not earlier or verdict is None:
         return {}
@@ -31,11 +30,7 @@ def first_press_measures(earlier: Sequence[Press], verdict: Verdict | None) -> d
 
 
 def first_press(measures: Mapping[str, Any]) -> Press | None:
-    """The first press as it was measured, without what is the same for both; None where the fruit was pressed once.
-
-    Args:
-        measures: an inspection's.
-    """
+    """Return the measurements of the first press, without what both share; None if the fruit was pressed once."""
     if _PRESS not in measures:
         return None
     onset_mm, uncertainty_mm, points = json.loads(measures[_PRESS])
@@ -47,18 +42,10 @@ def first_press(measures: Mapping[str, Any]) -> Press | None:
 
 
 def first_press_findings(measures: Mapping[str, Any]) -> str:
-    """Why the first press did not decide, in sentences; empty where the fruit was pressed once.
-
-    Args:
-        measures: an inspection's.
-    """
+    """Return why the first press did not decide, in sentences; empty if the fruit was pressed once."""
     return str(measures.get(_FINDINGS) or "")
 
 
 def is_first_press(measure: str) -> bool:
-    """Whether a measure is the first press's, and has a line of its own.
-
-    Args:
-        measure: its name.
-    """
+    """Check whether a measure is the first press's, and has a line of its own."""
     return measure in {_FINDINGS, _PRESS}

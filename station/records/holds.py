@@ -1,4 +1,4 @@
-"""Holds: images that stay, whatever the quota says, until somebody releases them."""
+"""Holds: images that the quota does not remove until a person releases them."""
 
 from typing import Any, NamedTuple
 
@@ -6,11 +6,11 @@ from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, u
 
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 
 class Hold(NamedTuple):
-    """One that stands."""
+    """An active hold."""
 
     sequence: int | None
     lot: str | None
@@ -20,70 +20,64 @@ class Hold(NamedTuple):
     placed_utc_ms: int
 
     @property
-    def what(self) -> str:
-        """In words."""
+    def description(self) -> str:
+        """Describe the held thing."""
         return f"lot {self.lot}" if self.sequence is None else f"inspection {self.sequence}"
 
 
 def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Keep the images of an inspection or a lot. Idempotent: the first reason stands.
+    """Hold the images of an inspection or a lot. Idempotent: the first reason remains.
 
     Args:
-        connection: the writer's.
         thing: the inspection's sequence, or the lot's name.
-        reason: why.
-        by: who.
 
     Raises:
-        RecordsError: there is no such inspection or lot, or no reason.
+        RecordsError: there is no such inspection or lot, or no reason is given.
     """
     _given(reason)
-    standing = _standing(connection, thing)
-    if standing is not None:
-        return standing
+    active = _active(connection, thing)
+    if active is not None:
+        return active
     table = inspections.c
     condition = table.sequence == thing if isinstance(thing, int) else table.lot == thing
     if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
         raise RecordsError(f"there is no {_named(thing)}", "`station records list` shows what there is")
     connection.execute(insert(holds).values(**_key(thing), reason=reason, by=by, placed_utc_ms=utc_ms()))
-    held = _standing(connection, thing)
+    held = _active(connection, thing)
     if held is None:
         raise RuntimeError("a hold was inserted and is not there")
     return held
 
 
 def release(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Let the images go where the quota wants it; the hold itself is kept as history.
+    """Release images for the quota; the hold itself remains in the history.
 
     Args:
-        connection: the writer's.
         thing: as held.
-        reason: why.
-        by: who.
 
     Raises:
-        RecordsError: it is not held, or no reason.
+        RecordsError: it is not held, or no reason is given.
     """
     _given(reason)
-    standing = _standing(connection, thing)
-    if standing is None:
+    active = _active(connection, thing)
+    if active is None:
         raise RecordsError(f"{_named(thing)} is not on hold", "`station records holds` shows what is")
     connection.execute(
         update(holds)
         .where(_is(thing), holds.c.released_utc_ms.is_(None))
         .values(released_utc_ms=utc_ms(), released_by=by, release_reason=reason)
     )
-    return standing
+    return active
 
 
 def read_holds(connection: Connection) -> list[Hold]:
-    """Those that stand, oldest first."""
+    """Read the active holds, oldest first."""
     rows = connection.execute(select(*_COLUMNS).where(holds.c.released_utc_ms.is_(None)).order_by(holds.c.id))
     return [Hold(*row) for row in rows]
 
 
 def is_held() -> ColumnElement[bool]:
-    """Whether the inspection of the query around it is on hold."""
+    """Return the condition that the inspection of the surrounding query is on hold."""
     return exists().where(
         holds.c.released_utc_ms.is_(None),
         or_(holds.c.sequence == inspections.c.sequence, holds.c.lot == inspections.c.lot),
@@ -101,7 +95,7 @@ def _is(thing: int | str) -> ColumnElement[bool]:
     return holds.c.sequence == thing if isinstance(thing, int) else holds.c.lot == thing
 
 
-def _standing(connection: Connection, thing: int | str) -> Hold | None:
+def _active(connection: Connection, thing: int | str) -> Hold | None:
     row = connection.execute(select(*_COLUMNS).where(_is(thing), holds.c.released_utc_ms.is_(None))).one_or_none()
     return None if row is None else Hold(*row)
 

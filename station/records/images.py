@@ -1,4 +1,4 @@
-"""The images that are kept: PNG files named by their content, written by a thread of their own."""
+"""Image store: PNG files named by their content, written by a thread of their own."""
 
 import contextlib
 import hashlib
@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 
 import cv2
 
+from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
-from station.records.failures import in_words
+from station.records.high_water_mark import sync_folder
 from station.records.model import Image
 from station.records.retention import forget_missing, referred, remove_oldest_images
-from station.records.sequence_mark import sync_folder
+from station.records.write_requests import add_images
 from station.records.writer import Work
-from station.records.writing import add_images
 from station.settings.records import RecordsSettings
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ MB = 1_000_000
 _PARTIAL = ".partial"
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 _RECORDED_S = 30.0
-"""Longest wait for the writer; longer, and the images are given up."""
+"""Longest wait for the writer; after it the images are dropped."""
 
 
 class _Set(NamedTuple):
@@ -43,38 +43,35 @@ class _Set(NamedTuple):
     images: tuple[Image, ...]
 
 
-class _NotKeptError(Exception):
-    """Why an inspection's images are not kept."""
+class _NotStoredError(Exception):
+    """An inspection's images are not stored; the message gives the reason."""
 
 
 def image_path(folder: Path, sha256: str) -> Path:
-    """Where an image lies.
+    """Return the path of an image.
 
     Args:
-        folder: the records' folder.
         sha256: of the file's bytes.
     """
     return folder / FOLDER_NAME / sha256[:2] / f"{sha256}.png"
 
 
-def accepted_is_kept(sequence: int, share: float) -> bool:
-    """Whether the images of an accepted fruit are kept: evenly spread, and the same answer every time.
+def accepted_is_stored(sequence: int, share: float) -> bool:
+    """Check whether the images of an accepted fruit are stored: evenly spread, and the same answer every time.
 
     Args:
-        sequence: the inspection's.
         share: 0 to 1.
     """
     return math.floor(sequence * share) > math.floor((sequence - 1) * share)
 
 
 class ImageStore:
-    """Writes images behind the cycle's back; what cannot be written is given up and said so."""
+    """Background writer of images; images that cannot be written are dropped and reported."""
 
     def __init__(self, folder: Path, settings: RecordsSettings, submit: Callable[[Work[Any]], Future[Any]]) -> None:
         """Start the thread; it first reconciles files and rows.
 
         Args:
-            folder: the records' folder.
             settings: quota, reserve and queue.
             submit: of the writer.
         """
@@ -93,19 +90,19 @@ class ImageStore:
 
     @property
     def waiting(self) -> int:
-        """Inspections whose images wait for the disk or are being written."""
+        """Count inspections whose images wait for the disk or are being written."""
         return self._put - self._done
 
     def reserve(self) -> bool:
-        """Take a place in the queue, if there is one; then either `put` or `release` it."""
+        """Reserve a place in the queue, if there is one; then call either `put` or `release`."""
         return self._places.acquire(blocking=False)
 
     def release(self) -> None:
-        """Give a place back."""
+        """Return a reserved place."""
         self._places.release()
 
     def put(self, sequence: int, candidates: tuple[Image, ...], *, accepted: bool) -> None:
-        """Have one inspection's images written, in the place reserved."""
+        """Queue one inspection's images, in the place reserved."""
         self._put += 1
         self._queue.put(_Set(sequence, accepted, candidates))
 
@@ -114,7 +111,7 @@ class ImageStore:
         self.results["dropped"] += number
 
     def close(self, within_s: float) -> None:
-        """Write what waits, for so long at most, and end the thread. Idempotent; blocks."""
+        """Write the queue, for `within_s` at most, and end the thread. Idempotent; blocks."""
         self._queue.put(None)
         self._thread.join(within_s)
         self._stopping.set()
@@ -124,12 +121,12 @@ class ImageStore:
         with contextlib.suppress(OSError, RecordsError, TimeoutError):  # tried again before images are written
             self._reconcile()
         while (work := self._queue.get()) is not None and not self._stopping.is_set():
-            self._keep(work)
+            self._store(work)
             self._done += 1
             self.release()
 
-    def _keep(self, work: _Set) -> None:
-        """Files first, durable; then the rows that refer to them."""
+    def _store(self, work: _Set) -> None:
+        """Write the files first, durably; then the rows that refer to them."""
         rows: list[dict[str, Any]] = []
         try:
             if not self._counted:
@@ -142,12 +139,12 @@ class ImageStore:
                 self._write(image_path(self._folder, sha256), content)
                 rows.append({"kind": image.kind, "step": image.step, "sha256": sha256, "size_bytes": len(content)})
             state, left = "kept", 0
-        except _NotKeptError as error:
+        except _NotStoredError as error:
             state, left = f"dropped: {error}", len(work.images) - len(rows)
             self.results["dropped"] += left
         except Exception as error:  # noqa: BLE001 (an image must not cost the thread)
             left = len(work.images) - len(rows)
-            state = f"failed: {in_words(error, str(self._folder / FOLDER_NAME)).cause}"
+            state = f"failed: {map_error(error, str(self._folder / FOLDER_NAME)).cause}"
             self.results["failed"] += left
         if left and rows:
             state = f"{state}; {len(rows)} of {len(work.images)} kept"
@@ -160,10 +157,10 @@ class ImageStore:
 
     def _go_on(self) -> None:
         if self._stopping.is_set():
-            raise _NotKeptError("the station ended")
+            raise _NotStoredError("the station ended")
 
     def _write(self, path: Path, content: bytes) -> None:
-        """One durable file; nothing is done where it is there already."""
+        """Write one durable file; nothing is done if it exists already."""
         if path.exists():
             return
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -183,12 +180,12 @@ class ImageStore:
     def _make_space(self, needed_bytes: int, *, accepted: bool) -> None:
         """Remove the oldest of the accepted, then of the others, until the new ones fit into the quota.
 
-        They are removed as well where the disk is nearly full: no fruit goes uninspected for want of space that
-        images take. An accepted fruit's images never push out a rejected one's.
+        They are removed as well if the disk is nearly full: images must not take the space that inspections need. An
+        accepted fruit's images never displace a rejected one's.
         """
         quota_bytes = self._settings.images_quota_mb * MB
         if needed_bytes > quota_bytes:
-            raise _NotKeptError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
+            raise _NotStoredError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
         reserve_bytes = 2 * self._settings.free_reserve_mb * MB
         while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
             removed = self._record(lambda connection: remove_oldest_images(connection, accepted=True))
@@ -196,7 +193,7 @@ class ImageStore:
                 removed = self._record(lambda connection: remove_oldest_images(connection, accepted=False))
             if removed is None:
                 whose = "the quota is full of" if over else "the disk is nearly full, beside"
-                raise _NotKeptError(f"{whose} images of rejected fruit, or on hold")
+                raise _NotStoredError(f"{whose} images of rejected fruit, or on hold")
             freed_bytes, names = removed
             for name in names:
                 image_path(self._folder, name).unlink(missing_ok=True)
@@ -207,7 +204,7 @@ class ImageStore:
         return shutil.disk_usage(self._folder).free
 
     def _reconcile(self) -> None:
-        """Remove files that nothing refers to, as of a station that was killed, say what is missing, count the rest."""
+        """Remove files that no row refers to, as after a killed station, report missing ones, count the rest."""
         wanted = self._record(referred)
         found = set()
         for file in (self._folder / FOLDER_NAME).glob("*/*"):
@@ -228,7 +225,7 @@ class ImageStore:
 
 
 def _encoded(image: Image) -> bytes:
-    """The image as PNG, without loss."""
+    """Encode the image as PNG, without loss."""
     done, content = cv2.imencode(".png", image.pixels, _PNG)
     if not done:
         raise ValueError(f"no PNG can hold {image.pixels.dtype} of shape {image.pixels.shape}")

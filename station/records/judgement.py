@@ -1,4 +1,4 @@
-"""The judgement in an inspection's record: the area beside its limit, and the budget of its uncertainty."""
+"""Judgement in an inspection's record: the area with its limit, and its uncertainty budget."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,10 +11,10 @@ _LIMITS = "limit_factor"
 
 
 def judgement_measures(verdict: Verdict) -> dict[str, float | str]:
-    """What is kept of a verdict beside its reasons: shares of the area, each a relative standard uncertainty.
+    """Return what the record stores of a verdict beside its reasons: relative standard uncertainties.
 
     Args:
-        verdict: of a press that touched something; nothing is kept where its last threshold was not reached.
+        verdict: of a press that touched something; nothing is stored if its last threshold was not reached.
     """
     if not verdict.summary:
         return {}
@@ -25,37 +25,25 @@ def judgement_measures(verdict: Verdict) -> dict[str, float | str]:
 
 
 def limit_factor(measures: Mapping[str, Any]) -> float:
-    """By which the fruit's limits differ from its recipe's.
-
-    Args:
-        measures: an inspection's.
-    """
+    """Return the ratio of the fruit's limits to its recipe's."""
     return float(measures.get(_LIMITS) or 1.0)
 
 
 def is_judgement(measure: str) -> bool:
-    """Whether a measure is one of the judgement's.
-
-    Args:
-        measure: its name.
-    """
+    """Check whether a measure is one of the judgement's."""
     return measure in {_SENTENCE, _FACTOR, _COMBINED} or measure.startswith(_SHARE)
 
 
 def judgement_sentence(measures: Mapping[str, Any]) -> str:
-    """The area with its uncertainty beside the limit, a sentence; empty where the record has none.
-
-    Args:
-        measures: an inspection's.
-    """
+    """Describe the area with its uncertainty and its limit, in a sentence; empty if the record has none."""
     return str(measures.get(_SENTENCE) or "")
 
 
 def budget_rows(measures: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """The budget's table: each component with its relative standard uncertainty, then combined, then the guard band.
+    """Return the budget's relative standard uncertainties: each component, combined, and the guard band.
 
     Args:
-        measures: an inspection's; of one without a budget there are no rows.
+        measures: an inspection's; one without a budget gives no rows.
     """
     if _COMBINED not in measures or _FACTOR not in measures:
         return

@@ -1,4 +1,4 @@
-"""A lot's report for people: HTML in one file, or PDF on A4."""
+"""Lot report for people: HTML in one file, or PDF on A4."""
 
 import base64
 from datetime import UTC, datetime
@@ -12,7 +12,7 @@ from fpdf import FPDF
 from fpdf.enums import XPos, YPos
 
 from station.records.lot_summary import Example, LotSummary
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 _PICTURE_PX = 320
 _JPEG_QUALITY = 82
@@ -22,11 +22,7 @@ _MARGIN_MM, _WIDTH_MM = 15.0, 180.0
 
 
 def html_report(lot: LotSummary) -> str:
-    """A document that needs no network and no other file.
-
-    Args:
-        lot: what it shows.
-    """
+    """Make an HTML document that needs no network and no other file."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("station.records", "templates"),
         autoescape=True,
@@ -42,11 +38,7 @@ def html_report(lot: LotSummary) -> str:
 
 
 def pdf_report(lot: LotSummary) -> bytes:
-    """The same on A4.
-
-    Args:
-        lot: what it shows.
-    """
+    """Make the same report as PDF on A4."""
     pdf = FPDF(format="A4")
     fonts = files("matplotlib") / "mpl-data" / "fonts" / "ttf"
     for style, name in (("", "DejaVuSans.ttf"), ("B", "DejaVuSans-Bold.ttf")):
@@ -108,7 +100,7 @@ def _heading(pdf: FPDF, text: str) -> None:
 
 
 def _bars(pdf: FPDF, bars: list[dict[str, int]], height_mm: float, *, relative: bool) -> None:
-    """Stacked bars from the bottom, PASS first; each to its own sum, or all to the highest."""
+    """Draw stacked bars from the bottom, PASS first; each relative to its own sum, or all to the highest."""
     width_mm, bottom_mm = _WIDTH_MM / max(1, len(bars)), pdf.get_y() + height_mm
     highest = max((sum(bar.values()) for bar in bars), default=0)
     for index, bar in enumerate(bars):
@@ -122,7 +114,7 @@ def _bars(pdf: FPDF, bars: list[dict[str, int]], height_mm: float, *, relative: 
 
 
 def _examples(pdf: FPDF, examples: tuple[Example, ...]) -> None:
-    """A line each, with the picture where there is one."""
+    """Write a line for each example, with its picture if there is one."""
     for example in examples:
         picture = _jpeg(example)
         if picture is not None and pdf.will_page_break(28):
@@ -139,7 +131,7 @@ def _examples(pdf: FPDF, examples: tuple[Example, ...]) -> None:
 
 
 def _jpeg(example: Example) -> bytes | None:
-    """The picture, small; None where there is none that can be read."""
+    """Return the picture, small; None if there is none that can be read."""
     if example.image is None or (picture := cv2.imread(str(example.image))) is None:
         return None
     share = _PICTURE_PX / max(picture.shape[:2])
@@ -164,11 +156,10 @@ WAYS = {".html": lambda lot: html_report(lot).encode(), ".pdf": pdf_report}
 
 
 def write_report(lot: LotSummary, target: Path) -> None:
-    """Write a report, HTML or PDF by the file's ending.
+    """Write a report, HTML or PDF by the file's suffix.
 
     Args:
-        lot: what it shows.
-        target: ends in one of `WAYS`; replaced.
+        target: with one of the suffixes in `WAYS`; replaced.
 
     Raises:
         OSError: it cannot be written.

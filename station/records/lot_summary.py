@@ -1,4 +1,4 @@
-"""One lot in figures and examples: what its report shows. Read in constant memory."""
+"""Lot summary: the figures and examples of a lot's report, read in constant memory."""
 
 import json
 from collections import Counter
@@ -10,7 +10,7 @@ from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
 from station.records.search import Query, find_page
-from station.records.wording import sentence
+from station.records.texts import sentence
 
 BINS = 24
 EXAMPLES = 12
@@ -28,18 +28,18 @@ class Example:
     area_mm2: float | None
     areas_mm2: tuple[float | None, ...]
     image: Path | None
-    """Of its last step, where it is kept."""
+    """Of its last step, if it was stored."""
 
 
 @dataclass(frozen=True, slots=True)
 class LotSummary:
-    """One lot."""
+    """Figures of one lot."""
 
     name: str
     grower: str
     began_utc_ms: int
     ended_utc_ms: int
-    """Of its first and last inspection."""
+    """Times of its first and last inspection."""
     first: int
     last: int
     outcomes: dict[str, int]
@@ -60,15 +60,11 @@ class LotSummary:
 
     @property
     def total(self) -> int:
-        """Inspections with an outcome."""
+        """Return the number of inspections with an outcome."""
         return sum(self.outcomes.values())
 
     def share(self, outcome: str) -> float:
-        """Of one outcome.
-
-        Args:
-            outcome: its name.
-        """
+        """Return the share of one outcome."""
         return self.outcomes[outcome] / self.total if self.total else 0.0
 
 
@@ -76,7 +72,6 @@ def summarise(folder: Path, name: str) -> LotSummary:
     """Read a lot.
 
     Args:
-        folder: the records' folder.
         name: as the PLC gave it.
 
     Raises:
@@ -155,7 +150,7 @@ def _areas(ask: Any, name: str) -> tuple[tuple[float, int, int], ...]:
 
 
 def _examples(connection: Any, folder: Path, name: str) -> list[Example]:
-    """The last rejected ones."""
+    """Read the last rejected fruit."""
     ask = plain(connection).execute
     found = []
     for row in find_page(connection, Query(lot=name, outcome="FAIL"), EXAMPLES).rows:

@@ -1,4 +1,4 @@
-"""Lots as people or the packhouse's system tell of them: which grower's, from when to when."""
+"""Lots as people or the packhouse's system register them: grower, start and end."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from sqlalchemy import Connection, insert, select, update
 
 from station.records.errors import RecordsError
 from station.records.schema import lots
-from station.records.writing import tell, utc_ms
+from station.records.write_requests import queue_event, utc_ms
 
 LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""
@@ -25,16 +25,15 @@ class Lot(NamedTuple):
 
 
 def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> Lot:
-    """Tell of a lot's begin. Idempotent.
+    """Register a lot's start. Idempotent.
 
     Args:
-        connection: the writer's.
         name: as the PLC gives it with each trigger.
-        grower: whose fruit it is.
-        correct: put this grower in the place of the one told before.
+        grower: grower of the fruit.
+        correct: replace the grower registered before.
 
     Raises:
-        RecordsError: the name or grower is none, or the lot is another grower's.
+        RecordsError: the name or grower is invalid, or the lot is another grower's.
     """
     for what, text in (("lot", name), ("grower", grower)):
         if not text.strip() or not text.isprintable():
@@ -53,14 +52,14 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
         )
     else:
         _change(connection, known, grower=grower)
-    return _told(connection, name)
+    return _changed(connection, name)
 
 
 def end_lot(connection: Connection, name: str) -> Lot:
-    """Tell of a lot's end. Idempotent.
+    """Register a lot's end. Idempotent.
 
     Raises:
-        RecordsError: nobody told of its begin.
+        RecordsError: its start was not registered.
     """
     known = _known(connection, name)
     if known is None:
@@ -68,16 +67,15 @@ def end_lot(connection: Connection, name: str) -> Lot:
     if known.ended_utc_ms is not None:
         return known
     _change(connection, known, ended_utc_ms=utc_ms())
-    return _told(connection, name)
+    return _changed(connection, name)
 
 
 def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[Lot]:
-    """The lots told of, newest first.
+    """Read the registered lots, newest first.
 
     Args:
-        connection: any.
         limit: at most so many.
-        grower: of this one; of all by default.
+        grower: all growers by default.
         name: only the lot of this name.
     """
     query = select(*_COLUMNS).order_by(lots.c.id.desc()).limit(limit)
@@ -99,8 +97,8 @@ def _change(connection: Connection, lot: Lot, **values: object) -> None:
     connection.execute(update(lots).where(lots.c.name == lot.name).values(**values, revision=lot.revision + 1))
 
 
-def _told(connection: Connection, name: str) -> Lot:
-    """The lot as it is now, and told to other systems."""
+def _changed(connection: Connection, name: str) -> Lot:
+    """Return the lot in its present state, and queue it for other systems."""
     row = connection.execute(select(lots.c.id, *_COLUMNS).where(lots.c.name == name)).one()
-    tell(connection, "lot", row.id)
+    queue_event(connection, "lot", row.id)
     return Lot(*row[1:])

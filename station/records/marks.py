@@ -1,4 +1,4 @@
-"""What a person found of inspected fruit, good or bad: the truth that thresholds are proposed from."""
+"""Marks: the true quality of inspected fruit, good or bad, as a person found it; thresholds are proposed from them."""
 
 from typing import Literal, NamedTuple
 
@@ -7,7 +7,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.records.errors import UnknownInspectionError
 from station.records.schema import inspections, marks
-from station.records.writing import utc_ms
+from station.records.write_requests import utc_ms
 
 Mark = Literal["good", "bad"]
 
@@ -22,16 +22,14 @@ class Marked(NamedTuple):
 
 
 def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str) -> Marked | None:
-    """Mark a fruit, or take its mark away. Idempotent: the same mark again leaves the first one, with who gave it.
+    """Mark a fruit, or remove its mark. Idempotent: the same mark again leaves the first one, with its author.
 
     Args:
-        connection: the writer's.
-        sequence: the inspection's.
-        mark: None for none.
-        by: who found it so.
+        mark: None removes it.
+        by: the person's name.
 
     Returns:
-        What stood before; None where nothing did.
+        The mark before; None if there was none.
 
     Raises:
         UnknownInspectionError: there is no such inspection.
@@ -50,9 +48,5 @@ def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str
 
 
 def read_marked(connection: Connection) -> list[Marked]:
-    """All marks, in the order of the inspections.
-
-    Args:
-        connection: any.
-    """
+    """Read all marks, in the order of the inspections."""
     return [Marked(*row) for row in connection.execute(select(marks).order_by(marks.c.sequence))]

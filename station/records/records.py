@@ -1,4 +1,4 @@
-"""The records' door: asynchronous, each call with a deadline; below it one thread writes."""
+"""Records of the station: asynchronous calls, each with a deadline, on top of one writer thread."""
 
 import asyncio
 import contextlib
@@ -17,12 +17,11 @@ from station.channel.line import Outcome
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.database import FILE_NAME, reading
 from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
-from station.records.images import MB, accepted_is_kept
+from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
-from station.records.opening import Notice, Opened, lock_folder, open_records
-from station.records.reading import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
-from station.records.writer import Work
-from station.records.writing import (
+from station.records.open import Notice, Opened, lock_folder, open_records
+from station.records.queries import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
+from station.records.write_requests import (
     PENDING,
     acknowledge,
     add_counts,
@@ -33,19 +32,20 @@ from station.records.writing import (
     replace_alarms,
     withdraw,
 )
+from station.records.writer import Work
 from station.settings.records import RecordsSettings
 
 T = TypeVar("T")
 
 READING_S = 10.0
-"""Longest wait for an answer to a question."""
+"""Longest wait for a query's answer."""
 IMAGES_CLOSE_S = 5.0
-"""How long closing waits for images."""
+"""Longest wait for images when the records are closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How the records do, for metrics and readiness."""
+    """State of the records, for metrics and readiness."""
 
     writes: int
     """Transactions that were committed."""
@@ -63,16 +63,16 @@ class Status:
     last_write_age_s: float | None
     """By the monotonic clock; None before the first."""
     error: str
-    """Of the last write, where it failed; empty where it went well."""
+    """Error of the last write; empty if it succeeded."""
 
 
 class Records:
-    """One station's records. Make it with `open`."""
+    """One station's records. Make them with `open`."""
 
     def __init__(self, folder: Path, settings: RecordsSettings, boot: str) -> None:
         self.folder = folder
         self.notices: tuple[Notice, ...] = ()
-        """What the last `open` or `reopen` found."""
+        """Findings of the last `open` or `reopen`."""
         self.lost: tuple[int, ...] = ()
         """The inspections that it ended with `station_lost`."""
         self._settings = settings
@@ -84,16 +84,14 @@ class Records:
 
     @classmethod
     async def open(cls, folder: Path, settings: RecordsSettings, boot: str) -> Self:
-        """Open the records of a station, or begin them.
+        """Open the records of a station, or make them.
 
-        Brings the schema up to date, moves a damaged database aside, and ends what an earlier start of the station
-        left open: an inspection that was running, or whose outcome was never published, becomes NO_RESULT with
-        `station_lost`.
+        Migrates the schema, moves a damaged database aside, and ends the open inspections of an earlier start of the
+        station: one that was running, or whose outcome was never published, becomes NO_RESULT with `station_lost`.
 
         Args:
-            folder: made where missing; one station at a time.
-            settings: the quota, the reserve, the deadline.
-            boot: this start of the station, as in `StationState.boot`.
+            folder: made if missing; one station at a time.
+            boot: name of this start of the station, as in `StationState.boot`.
 
         Raises:
             RecordsError: they cannot be opened.
@@ -107,7 +105,7 @@ class Records:
         return records
 
     async def reopen(self) -> None:
-        """Close what is open and open it again, after a fault of the disk; not while an inspection runs.
+        """Close and open the records again, after a fault of the disk; not while an inspection runs.
 
         Raises:
             RecordsError: they still cannot be opened; every request is refused with that error until they can.
@@ -132,7 +130,7 @@ class Records:
         self._opened = None
 
     async def close(self) -> None:
-        """Finish what waits, images for `IMAGES_CLOSE_S` at most, and end the threads. Idempotent."""
+        """Finish the queue, images for `IMAGES_CLOSE_S` at most, and end the threads. Idempotent."""
         self._why_closed = RecordsClosedError("they are closed", "open them first")
         with contextlib.suppress(RuntimeError):  # the helper has ended
             await asyncio.get_running_loop().run_in_executor(self._helper, self._shut)
@@ -148,7 +146,7 @@ class Records:
             The sequence, higher than any given before, by any database in this folder.
 
         Raises:
-            RecordsError: nothing was begun, or what was is withdrawn.
+            RecordsError: nothing was begun, or it was withdrawn.
         """
         opened = self._get()
 
@@ -164,7 +162,7 @@ class Records:
             insert_trigger(connection, sequence, trigger, self._boot)
             return sequence
 
-        def withdraw_begun(future: Future[int]) -> None:
+        def withdraw_late(future: Future[int]) -> None:
             if not future.cancelled() and future.exception() is None:
                 opened.writer.submit(lambda connection: withdraw(connection, future.result()))
 
@@ -172,16 +170,16 @@ class Records:
         try:
             return await self._answer(future)
         except BaseException:  # the caller has gone, or will refuse the trigger
-            future.add_done_callback(withdraw_begun)
+            future.add_done_callback(withdraw_late)
             raise
 
     async def conclude(self, sequence: int, record: InspectionRecord) -> Outcome:
-        """Make an outcome durable. The first one stands: a repetition changes nothing.
+        """Make an outcome durable. The first one remains: a repetition changes nothing.
 
-        Images are written afterwards in the background, and dropped and said so where that cannot be done.
+        Images are written afterwards in the background, or dropped and reported.
 
         Returns:
-            What stands: this record's outcome, or the one that was published or concluded before.
+            The outcome in force: this record's, or the one that was published or concluded before.
 
         Raises:
             UnknownInspectionError: this sequence was not begun.
@@ -191,7 +189,7 @@ class Records:
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
         reserved = wanted and opened.images.reserve()
         state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
-        accepted = state if accepted_is_kept(sequence, self._settings.accepted_share) else "not wanted"
+        accepted = state if accepted_is_stored(sequence, self._settings.accepted_share) else "not wanted"
         future = opened.writer.submit(
             lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
         )
@@ -208,7 +206,7 @@ class Records:
         *,
         reserved: bool,
     ) -> None:
-        """Once an outcome is durable, have its images written."""
+        """Queue an inspection's images once its outcome is durable."""
         failed = done.cancelled() or done.exception() is not None
         state = None if failed else done.result()[1]
         if state == PENDING:
@@ -221,7 +219,7 @@ class Records:
             opened.images.release()
 
     async def published(self, outcome: Outcome) -> bool:
-        """Note what the PLC was told; it stands, also against what was judged. The first one stands: idempotent.
+        """Store that the PLC was given an outcome; it overrides the judgement. The first one remains: idempotent.
 
         An inspection that this database does not know, as one begun before a damaged database was moved aside, is
         recorded from the outcome itself.
@@ -237,10 +235,10 @@ class Records:
         return await self._ask(lambda connection: publish(connection, outcome, mark.value, self._boot))
 
     async def acknowledged(self, sequence: int) -> int:
-        """Note that the PLC has taken every published outcome up to this sequence. Idempotent.
+        """Store that the PLC has taken every published outcome up to this sequence. Idempotent.
 
         Returns:
-            How many were newly acknowledged.
+            The number of newly acknowledged outcomes.
 
         Raises:
             RecordsError: it may not be durable.
@@ -248,11 +246,11 @@ class Records:
         return await self._ask(lambda connection: acknowledge(connection, sequence))
 
     async def open_inspections(self) -> OpenInspections:
-        """What was begun and not acknowledged."""
+        """Return the inspections that began and were not acknowledged."""
         return await self._ask(read_open)
 
     async def inspection(self, sequence: int) -> FullRecord:
-        """All that is known of one inspection.
+        """Return all stored data of one inspection.
 
         Raises:
             UnknownInspectionError: there is no record of it.
@@ -260,23 +258,23 @@ class Records:
         return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
 
     async def totals(self, boot: str | None = None) -> dict[tuple[str, str, str], int]:
-        """How many outcomes the PLC was given, by fruit, outcome and first reason (`none` for PASS).
+        """Count the outcomes that the PLC was given, by fruit, outcome and first reason (`none` for PASS).
 
         Args:
-            boot: of the inspections begun by this start of the station; all by default.
+            boot: count the inspections that this start of the station began; all by default.
         """
         return await self._read(lambda connection: read_totals(connection, boot))
 
     async def save_alarms(self, active: Sequence[AlarmRow], log: Sequence[AlarmEntry] = ()) -> None:
-        """Replace the remembered alarms and append to their log, in one transaction."""
+        """Replace the stored alarms and append to their log, in one transaction."""
         await self._ask(lambda connection: replace_alarms(connection, active, log))
 
     async def load_alarms(self) -> tuple[AlarmRow, ...]:
-        """The alarms that were saved last."""
+        """Return the alarms that were saved last."""
         return await self._ask(read_alarms)
 
     async def count(self, by: Mapping[str, int]) -> dict[str, int]:
-        """Add to counters that outlive restarts and give all of them."""
+        """Add to counters that outlive restarts, and return all of them."""
         return await self._ask(lambda connection: add_counts(connection, by))
 
     async def note_event(self, name: str, details: Mapping[str, Any], sequence: int | None = None) -> None:
@@ -293,7 +291,7 @@ class Records:
         return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
     async def alarm_log(self, limit: int) -> tuple[AlarmEntry, ...]:
-        """What alarms did, newest first.
+        """Return the log of alarms, newest first.
 
         Args:
             limit: at most so many.
@@ -312,7 +310,7 @@ class Records:
         return await self._ask(work)
 
     def status(self) -> Status:
-        """How the records do; never waits."""
+        """Return the state of the records; never waits."""
         opened = self._opened
         path = self.folder / FILE_NAME
         files = [path, path.with_name(f"{FILE_NAME}-wal")]

@@ -1,4 +1,4 @@
-"""Inspections as text for a terminal: why was fruit 4,711 rejected?"""
+"""Inspection report for a terminal: curve, judgement and explanation as text."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,25 +9,17 @@ from station.channel.line import Outcome
 from station.records.first_press import first_press_findings, is_first_press
 from station.records.judgement import budget_rows, is_judgement, judgement_sentence
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
-from station.records.reading import Summary
-from station.records.wording import printable, sentence, size_sentence, sparkline
+from station.records.queries import Summary
+from station.records.texts import printable, sentence, size_sentence, sparkline
 
 
-def described(record: FullRecord) -> str:
-    """All that is known of one inspection.
-
-    Args:
-        record: as the records give it.
-    """
+def format_inspection(record: FullRecord) -> str:
+    """Describe one inspection in full."""
     return printable("\n".join(_described(record)))
 
 
-def listed(summaries: Sequence[Summary]) -> str:
-    """A line for each inspection.
-
-    Args:
-        summaries: in the order of the lines.
-    """
+def format_list(summaries: Sequence[Summary]) -> str:
+    """Return a line for each inspection."""
     rows = [("number", "begun (UTC)", "trigger", "lot", "grower", "fruit", "outcome", "s", "reasons", "curve")]
     rows += [
         (
@@ -61,7 +53,7 @@ def _described(record: FullRecord) -> Iterator[str]:
         yield _field("simulated", "a twin's device took part")
     yield _field("size", size_sentence(trigger.size))
     yield from _why(judged, standing)
-    yield _field("told the PLC", _told(record))
+    yield _field("told the PLC", _published_text(record))
     if trigger.recipe:
         yield from _recipe(trigger.recipe)
     if judged:
@@ -96,7 +88,7 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
             yield f"  {reason}: {sentence(reason)}"
 
 
-def _told(record: FullRecord) -> str:
+def _published_text(record: FullRecord) -> str:
     if record.standing is None or record.published_utc_ms is None:
         return "not yet"
     told = f"{record.standing.outcome} at {_time(record.published_utc_ms)} UTC"

@@ -1,17 +1,17 @@
-"""Which images go when space is wanted, and what is found of them after a crash."""
+"""Image retention: images removed for space, and lost images after a crash."""
 
 from sqlalchemy import Connection, delete, func, select
 
 from station.records.holds import is_held
 from station.records.schema import images, inspections
-from station.records.writing import add_event, add_images
+from station.records.write_requests import add_event, add_images
 
 
 def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:
-    """Forget the images of the oldest accepted, or the oldest other inspection that has some and is not on hold.
+    """Remove the images of the oldest accepted, or else the oldest other inspection that has some and is not on hold.
 
     Returns:
-        The freed bytes and the names of the files that nothing refers to any more; None where there is none.
+        The freed bytes and the names of the files that no row refers to any more; None if there is none.
     """
     kind = inspections.c.outcome == "PASS" if accepted else inspections.c.outcome != "PASS"
     oldest = connection.scalar(
@@ -33,16 +33,15 @@ def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int
 
 
 def referred(connection: Connection) -> dict[str, int]:
-    """The files that rows refer to, with their sizes."""
+    """Return the files that rows refer to, with their sizes."""
     query = select(images.c.sha256, func.max(images.c.size_bytes)).group_by(images.c.sha256)
     return {name: size for name, size in connection.execute(query)}  # noqa: C416 (rows are no pairs to dict)
 
 
 def forget_missing(connection: Connection, missing: frozenset[str]) -> None:
-    """Say of every inspection whose files are not there that they are lost; the events keep which they were.
+    """Mark every inspection whose files are missing as lost; the events store the files' names.
 
     Args:
-        connection: the writer's.
         missing: the files' names.
     """
     columns = images.c

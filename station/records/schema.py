@@ -1,4 +1,4 @@
-"""The tables. A change here needs a migration beside it: a test compares the two.
+"""Tables of the database. A change here needs a migration: a test compares the two.
 
 Times are UTC in ms as the machine's clock gave them, which may step; what is ordered is ordered by sequence or row.
 """
@@ -78,8 +78,8 @@ inspections = Table(
     CheckConstraint("published_utc_ms IS NULL OR outcome IS NOT NULL", name="published"),
     CheckConstraint("acknowledged_utc_ms IS NULL OR published_utc_ms IS NOT NULL", name="acknowledged"),
 )
-"""`judged` and what belongs to it are the station's own view; `outcome` and `standing` are what the PLC was told, or is
-to be told: the name, and the whole message."""
+"""`judged` and its columns are the station's own result; `outcome` and `standing` are published to the PLC, or will be:
+the name, and the whole message."""
 Index("ix_inspections_unacknowledged", inspections.c.sequence, sqlite_where=inspections.c.acknowledged_utc_ms.is_(None))
 Index("ix_inspections_lot", inspections.c.lot)
 Index("ix_inspections_lot_outcome", inspections.c.lot, inspections.c.outcome)
@@ -94,7 +94,7 @@ reasons = Table(
     Column("sequence", ForeignKey("inspections.sequence", ondelete="CASCADE"), primary_key=True, autoincrement=False),
     sqlite_with_rowid=False,
 )
-"""Every reason of what stands, to be found by; the order is in `standing`."""
+"""Every reason of the outcome in force, for searches; the order is in `standing`."""
 
 hours = Table(
     "hours",
@@ -103,7 +103,7 @@ hours = Table(
     Column("hour", Integer, nullable=False),
     Index("ix_hours_hour", "hour"),
 )
-"""Where the UTC hour of the begin (ms // 3,600,000) changes from one number to the next: a span goes on to the number
+"""Changes of the UTC hour of the begin (ms // 3,600,000) from one number to the next: a span goes on to the number
 before the next row's. So a time is found by number also where the clock stepped."""
 
 lots = Table(
@@ -117,7 +117,7 @@ lots = Table(
     Column("revision", Integer, nullable=False),
     Index("ix_lots_grower", "grower"),
 )
-"""What people or the packhouse's system told of a lot; the PLC gives its name alone, which is in `inspections`."""
+"""Lots as people or the packhouse's system register them; the PLC gives only the name, which is in `inspections`."""
 
 holds = Table(
     "holds",
@@ -133,7 +133,7 @@ holds = Table(
     Column("release_reason", Text),
     CheckConstraint("(sequence IS NULL) <> (lot IS NULL)", name="one_thing"),
 )
-"""Images that are not to be removed, of an inspection or of a whole lot, until they are released."""
+"""Images that must not be removed, of an inspection or of a whole lot, until they are released."""
 Index(
     "ix_holds_sequence",
     holds.c.sequence,
@@ -153,7 +153,7 @@ marks = Table(
     Column("marked_utc_ms", Integer, nullable=False),
     CheckConstraint("mark IN ('good', 'bad')", name="mark"),
 )
-"""What a person found of a fruit, to propose thresholds from; the audit trail has what it was before."""
+"""A fruit's true quality as a person found it, to propose thresholds from; the audit trail has earlier marks."""
 
 outbox = Table(
     "outbox",
@@ -164,8 +164,8 @@ outbox = Table(
     CheckConstraint("kind IN ('inspection', 'lot', 'audit')", name="kind"),
     sqlite_autoincrement=True,
 )
-"""What other systems are told, in order: of an inspection when it is published, a lot's or the audit trail's row. Kept
-for ever: some 15 bytes each, and who comes later begins with the first."""
+"""Events for other systems, in order: a published inspection, a lot's row or the audit trail's. Never removed: some 15
+bytes each, and a new destination begins with the first."""
 
 origins = Table(
     "origins",
@@ -173,8 +173,8 @@ origins = Table(
     Column("first_entry", Integer, primary_key=True, autoincrement=False),
     Column("id", Text, nullable=False),
 )
-"""Which database gave the entries from `first_entry` on: a new one after each restoring, so that a number given again
-is not taken for the one given before."""
+"""The database that numbered the entries from `first_entry` on: a new one after each restore, so that a number given
+again is not taken for the one given before."""
 
 curve_points = Table(
     "curve_points",
@@ -218,7 +218,7 @@ alarms = Table(
     Column("shelved_until_utc_ms", Integer),
     Column("shelved_by", Text, nullable=False, server_default=""),
 )
-"""Those not in their normal state."""
+"""Alarms that are not in their normal state."""
 
 alarms_log = Table(
     "alarms_log",

@@ -1,9 +1,9 @@
-"""Inspections found by lot, grower, fruit, time, outcome and reason, newest first, a page at a time.
+"""Search: inspections by lot, grower, fruit, time, outcome and reason, newest first, a page at a time.
 
-Each condition is a list of numbers in an index, which answers "the highest one not above this" with one look. A page is
-the intersection of such lists, by leaps ("leapfrog join", Veldhuizen, ICDT 2014, section 3): a condition that holds
-nowhere near is left behind in one leap, and nothing is counted, sorted or read twice. SQL alone would choose one index
-and read all that it names.
+Each condition is a list of numbers in an index, which finds "the highest one not above this" in one access. A page is
+the intersection of such lists, by leaps ("leapfrog join", Veldhuizen, ICDT 2014, section 3): numbers that a condition
+rules out are skipped in one leap, and nothing is counted, sorted or read twice. SQL alone would choose one index and
+read all that it names.
 """
 
 import heapq
@@ -19,9 +19,9 @@ from sqlalchemy import Connection
 from station.channel.line import OutcomeName, Reason
 from station.records.database import plain
 from station.records.errors import RecordsError
-from station.records.finding import HOUR_MS
-from station.records.reading import Summary, read_summaries
-from station.records.sequence_mark import LARGEST
+from station.records.high_water_mark import LARGEST
+from station.records.queries import Summary, read_summaries
+from station.records.search_index import HOUR_MS
 
 LARGEST_PAGE = 1000
 
@@ -31,42 +31,40 @@ Seek = Callable[[int], int | None]
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """What is looked for: all that is given has to hold."""
+    """Search conditions: all that are given have to be met."""
 
     lot: str | None = None
     grower: str | None = None
-    """Of the lot, as it was told with the lot's begin."""
+    """The lot's grower, as registered with its start."""
     from_utc_ms: int | None = None
     """Begun at this time or later."""
     to_utc_ms: int | None = None
     """Begun before this time."""
     outcome: OutcomeName | None = None
-    """What stands."""
+    """The outcome in force."""
     reason: Reason | None = None
-    """One of what stands, not only the first."""
+    """Any reason of the outcome in force, not only the first."""
     fruit: str | None = None
-    """The name of the recipe that it was inspected by, whatever its revision."""
+    """Name of the recipe, in any revision."""
 
 
 class Page(NamedTuple):
-    """Some of what was found, newest first."""
+    """One page of a result, newest first."""
 
     rows: tuple[Summary, ...]
     below: int | None
-    """What to ask with for the next page; None where this is the last."""
+    """Argument for the next page; None if this is the last."""
 
 
 def find_page(connection: Connection, query: Query, limit: int = 50, below: int | None = None) -> Page:
-    """One page.
+    """Return one page of a result.
 
     Args:
-        connection: any.
-        query: what is looked for.
         limit: at most so many, up to `LARGEST_PAGE`.
-        below: of the page before; None for the first.
+        below: of the page before; None for the first page.
 
     Raises:
-        RecordsError: the limit is none.
+        RecordsError: the limit is invalid.
     """
     if not 1 <= limit <= LARGEST_PAGE:
         raise RecordsError(f"a page of {limit} inspections", f"ask for 1 to {LARGEST_PAGE}")
@@ -76,11 +74,10 @@ def find_page(connection: Connection, query: Query, limit: int = 50, below: int 
 
 
 def find(connection: Connection, query: Query, highest: int = LARGEST) -> Iterator[int]:
-    """The numbers of what is found, highest first, as the database is now.
+    """Yield the matching numbers, highest first, in the database's present state.
 
     Args:
-        connection: any; in use until the last was taken.
-        query: what is looked for.
+        connection: in use until the last number was taken.
         highest: none above this one.
     """
     database = plain(connection)
@@ -95,7 +92,7 @@ def find(connection: Connection, query: Query, highest: int = LARGEST) -> Iterat
 
 
 def _common(lists: list[Seek], highest: int) -> int | None:
-    """The highest number that is in every list."""
+    """Return the highest number that is in every list."""
     while True:
         number = highest
         for seek in lists:
@@ -109,7 +106,7 @@ def _common(lists: list[Seek], highest: int) -> int | None:
 
 
 def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
-    """The lists, those that are likely to be short first; one at least names what is there."""
+    """Return the lists, those that are likely to be short first; at least one lists existing numbers only."""
     lists: list[Seek] = []
     if query.reason is not None:
         lists.append(_with_reason(database, query.reason, query.outcome))
@@ -147,7 +144,7 @@ def _seek(database: sqlite3.Connection, statement: str, *values: str) -> Seek:
 
 
 def _with_reason(database: sqlite3.Connection, reason: Reason, outcome: OutcomeName | None) -> Seek:
-    """Of one outcome, or of the two that have reasons."""
+    """Return the list of one outcome, or of the two that have reasons."""
     statement = (
         "SELECT sequence FROM reasons WHERE reason = ? AND outcome = ? AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
     )
@@ -172,7 +169,7 @@ def _lot_statement(lot: str, outcome: OutcomeName | None) -> str:
 
 
 def _of_grower(database: sqlite3.Connection, grower: str, outcome: OutcomeName | None) -> Seek:
-    """The lots' lists merged."""
+    """Merge the lots' lists."""
     chosen = (outcome,) if outcome else ()
     head = _lot_statement("lots.name", outcome)
     heads = database.execute(
@@ -184,7 +181,7 @@ def _of_grower(database: sqlite3.Connection, grower: str, outcome: OutcomeName |
 
 
 def _of_fruit(database: sqlite3.Connection, fruit: str) -> Seek:
-    """The lists of the recipe's revisions merged."""
+    """Merge the lists of the recipe's revisions."""
     head = (
         "SELECT sequence FROM inspections INDEXED BY ix_inspections_recipe_sha256 WHERE recipe_sha256 = {} "
         "AND sequence <= ? ORDER BY sequence DESC LIMIT 1"
@@ -199,7 +196,7 @@ def _of_fruit(database: sqlite3.Connection, fruit: str) -> Seek:
 
 
 def _merged(heads: Iterable[tuple[str, int]], find: Callable[[str, int], tuple[int] | None]) -> Seek:
-    """Lists as one: a heap of each one's highest number not above the last that was asked for."""
+    """Merge lists: a heap of each one's highest number not above the last query."""
     heap = [(-head, name) for name, head in heads]
     heapq.heapify(heap)
 
@@ -217,7 +214,7 @@ def _merged(heads: Iterable[tuple[str, int]], find: Callable[[str, int], tuple[i
 
 
 def _in_time(database: sqlite3.Connection, from_utc_ms: int, to_utc_ms: int | None) -> Seek:
-    """The spans of numbers begun in the hours asked for."""
+    """Return the spans of numbers begun in the given hours."""
     last_hour = 2**62 if to_utc_ms is None else (to_utc_ms - 1) // HOUR_MS
     spans = database.execute(
         "SELECT first_sequence, coalesce((SELECT next.first_sequence FROM hours AS next WHERE next.first_sequence > "
@@ -235,6 +232,6 @@ def _in_time(database: sqlite3.Connection, from_utc_ms: int, to_utc_ms: int | No
 
 
 def _began(database: sqlite3.Connection, number: int) -> int:
-    """When an inspection began; before all time where there is none with this number."""
+    """Return when an inspection began; before all time if there is none with this number."""
     row = database.execute("SELECT began_utc_ms FROM inspections WHERE sequence = ?", (number,)).fetchone()
     return -1 if row is None else row[0]

@@ -1,4 +1,4 @@
-"""The one thread that writes: it takes all requests that wait, and makes them durable with one commit."""
+"""Writer thread: takes all waiting requests, and makes them durable with one commit."""
 
 import contextlib
 import queue
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 
+from station.records.error_mapping import map_error
 from station.records.errors import (
     DamagedError,
     DiskError,
@@ -20,15 +21,14 @@ from station.records.errors import (
     RecordsClosedError,
     RecordsError,
 )
-from station.records.failures import in_words
 
 T = TypeVar("T")
 Work = Callable[[Connection], T]
-"""What a request does within the transaction, in the writer's thread. It may raise a `RecordsError`."""
+"""Part of the transaction, run in the writer's thread. It may raise a `RecordsError`."""
 
 LARGEST_BATCH = 128
 CONCERNING_ALL = (DamagedError, DiskError, DiskFullError, LockedError, ReadOnlyError)
-"""Faults of the disk or the file, after which a whole transaction is undone."""
+"""Faults of the disk or the file, which roll back the whole transaction."""
 
 
 class Writer:
@@ -45,8 +45,8 @@ class Writer:
 
         Args:
             connect: called in the thread, again after each failure.
-            before_commit: called in each transaction after its requests; what it raises fails them all.
-            after_commit: called after each commit, before the answers; it raises nothing.
+            before_commit: called in each transaction after its requests; if it raises, all of them fail.
+            after_commit: called after each commit, before the answers; never raises.
             place: the database's path, for messages.
 
         Raises:
@@ -70,13 +70,13 @@ class Writer:
 
     @property
     def waiting(self) -> int:
-        """Requests that wait."""
+        """Return the number of waiting requests."""
         return self._queue.qsize()
 
     def submit(self, work: Work[T]) -> Future[T]:
-        """Ask for a piece of work; cancelling the future withdraws it while it is not begun.
+        """Queue a request; cancelling the future withdraws it if it has not started.
 
-        What the answer to one piece asks for in turn, in the thread, is still done after `close`.
+        A request that an answer submits, in the thread, is still carried out after `close`.
 
         Args:
             work: runs in the thread.
@@ -93,7 +93,7 @@ class Writer:
         return future
 
     def close(self) -> None:
-        """Finish what waits and end the thread. Idempotent; blocks."""
+        """Finish the queue and end the thread. Idempotent; blocks."""
         with self._gate:
             if not self._closed:
                 self._closed = True
@@ -104,7 +104,7 @@ class Writer:
         try:
             self._connection = self._connect()
         except Exception as error:  # noqa: BLE001 (handed to the caller)
-            opened.set_exception(in_words(error, self._place))
+            opened.set_exception(map_error(error, self._place))
             return
         opened.set_result(None)
         last = False
@@ -119,7 +119,7 @@ class Writer:
         self._disconnect()
 
     def _carry_out(self, batch: list[tuple[Work[Any], Future[Any]]]) -> None:
-        """One transaction, and then the answers."""
+        """Run one transaction, and then answer its requests."""
         answers: list[Any] = []
         try:
             if self._connection is None:
@@ -127,8 +127,8 @@ class Writer:
             with self._connection.begin():
                 answers.extend(self._attempt(self._connection, work) for work, _ in batch)
                 self._before_commit(self._connection)
-        except Exception as error:  # noqa: BLE001 (told to all who asked)
-            told = in_words(error, self._place)
+        except Exception as error:  # noqa: BLE001 (raised to all callers)
+            told = map_error(error, self._place)
             answers = [told] * len(batch)
             self.error = str(told)
             self._disconnect()  # the next batch begins with a sound connection, if there can be one
@@ -145,12 +145,12 @@ class Writer:
                 future.set_result(answer)
 
     def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
-        """The work's result, or why it alone failed and was undone; what concerns all is raised."""
+        """Return the request's result, or the error for which it alone was rolled back; raise errors of the whole."""
         savepoint = connection.begin_nested()
         try:
             result = work(connection)
         except Exception as error:
-            told = in_words(error, self._place)
+            told = map_error(error, self._place)
             if isinstance(told, CONCERNING_ALL):
                 raise told from error  # SQLite may have undone all of it already, the savepoint too
             savepoint.rollback()

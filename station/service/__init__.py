@@ -1,1 +1,1 @@
-"""What the station does with its devices."""
+"""Station service: the process that inspects with the station's devices."""

@@ -1,4 +1,4 @@
-"""One grip without a judgement: reference, approach, width steps, and everything opened again."""
+"""Grip without a judgement: reference, approach, width steps, release."""
 
 import asyncio
 import contextlib
@@ -19,14 +19,13 @@ MakeMethod = Callable[[Sequence[Image]], Method]
 
 
 class BareGrip:
-    """A grip by a recipe's width steps.
+    """One grip by a recipe's width steps.
 
     Args:
-        cell: the devices, opened; nothing may be between the fingers when a grip begins.
-        recipe: width steps, speed, force, settle time and frames.
-        make_method: makes the measurement that finds the onset, for reference frames.
-        on_references: gets the reference frames, taken with nothing touching the gel.
-        on_step: gets each step as it is reached.
+        cell: the opened devices; nothing may be between the fingers when a grip begins.
+        make_method: makes the measurement method that finds the contact onset, from reference frames.
+        on_references: receives the reference frames, taken with nothing touching the gel.
+        on_step: receives each step.
     """
 
     def __init__(
@@ -42,14 +41,14 @@ class BareGrip:
         self._grip = Grip(cell, recipe)
 
     async def run(self) -> None:
-        """Grip once, let go, and go home. Not idempotent: each call grips.
+        """Grip once, release, and move home. Not idempotent: each call grips.
 
         Raises:
             GripError: no sound frame came, nothing was touched down to the recipe's smallest width, or the gripper
-                or the arm could not be brought back.
-            StationError: a device's own fault; by then the gripper is open and the arm home where they could be.
+                or the arm did not return.
+            StationError: a device's fault; the gripper is open and the arm home by then, if they could move.
         """
-        async with kept_healthy(self._cell.arm):
+        async with renewed_lease(self._cell.arm):
             try:
                 await self._press()
             except (StationError, asyncio.CancelledError) as error:
@@ -85,11 +84,11 @@ class BareGrip:
 
 
 @contextlib.asynccontextmanager
-async def kept_healthy(arm: Arm | None) -> AsyncIterator[None]:
-    """Renew the arm's lease for as long as this program's loop runs: if it hangs, the controller stops the arm.
+async def renewed_lease(arm: Arm | None) -> AsyncIterator[None]:
+    """Renew the arm's lease while this program's loop runs: if the loop hangs, the controller stops the arm.
 
     Args:
-        arm: None on a bench, where there is nothing to renew.
+        arm: None without an arm: nothing is renewed.
     """
 
     async def renew(arm: Arm) -> None:

@@ -20,33 +20,33 @@ START_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Dependency:
-    """One thing that inspecting needs."""
+    """One thing that an inspection needs."""
 
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
     """`degraded` still inspects."""
     age_s: float | None
-    """Since it was last heard; None where never."""
+    """Since its last sign of life; None if there was none."""
     detail: str = ""
     remedy: str = ""
-    """Empty only where ok."""
+    """Empty only if ok."""
 
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """Whether a trigger would be accepted, and why not."""
+    """Readiness for a trigger, with the reason if not ready."""
 
     ready: bool
     why: str
-    """One sentence with the remedy; empty where ready."""
+    """One sentence with the remedy; empty if ready."""
     dependencies: tuple[Dependency, ...]
 
 
 class Liveness:
-    """Fed by progress alone: what stands still for longer than it may makes the station not live."""
+    """Watchdog: a name without progress for longer than allowed makes the station not live."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Watch nothing yet.
+        """Monitor no name yet.
 
         Args:
             clock: monotonic, s.
@@ -56,32 +56,32 @@ class Liveness:
         self._last_s: dict[str, float] = {}
 
     def watch(self, name: str, within_s: float) -> None:
-        """Expect progress of this name, from now on, at least every so many seconds."""
+        """Monitor a name: from now on it has to make progress at least every `within_s` seconds."""
         self._within_s[name] = within_s
         self._last_s[name] = self._clock()
 
     def unwatch(self, name: str) -> None:
-        """Expect it no more."""
+        """Stop monitoring a name."""
         self._within_s.pop(name, None)
         self._last_s.pop(name, None)
 
     def progress(self, name: str) -> None:
-        """Something was got done; a name that is not watched is ignored."""
+        """Note progress; a name that is not monitored is ignored."""
         if name in self._last_s:
             self._last_s[name] = self._clock()
 
     def ages_s(self) -> dict[str, float]:
-        """How long ago each last made progress."""
+        """Return the time since each name's last progress."""
         now_s = self._clock()
         return {name: now_s - last_s for name, last_s in self._last_s.items()}
 
     def stuck(self) -> dict[str, float]:
-        """What makes no progress, with its age in s; empty while alive."""
+        """Return the names without progress, with their age in s; empty while alive."""
         return {name: age_s for name, age_s in self.ages_s().items() if age_s > self._within_s[name]}
 
 
 class HealthServer:
-    """Serves until it is closed; leaves no thread, task or port."""
+    """HTTP server of metrics and health; after `close` no thread, task or port is left."""
 
     def __init__(
         self,
@@ -92,14 +92,14 @@ class HealthServer:
         readiness: Callable[[], Readiness],
         version: Mapping[str, str],
     ) -> None:
-        """Name what is served; nothing is listened on yet.
+        """Set what is served; the port is not open yet.
 
         Args:
-            host: the address, or its name.
+            host: address or host name.
             port: TCP; 0 takes a free one.
             metrics: for /metrics.
             liveness: for /livez.
-            readiness: asked at each /readyz; must not wait.
+            readiness: called at each /readyz; must not block.
             version: for /version.
         """
         self._host = host

@@ -12,9 +12,9 @@ from station.inspection.second_press import together
 from station.records.first_press import first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
-from station.service.eye import Seen
+from station.service.active_recipes import ActiveRecipe
 from station.service.grip import GripStep
-from station.service.recipe_book import Active
+from station.service.vision_worker import MeasuredStep
 from station.vocabulary import OutcomeName, Reason
 
 
@@ -28,7 +28,7 @@ class Inspection:
     """From the trigger to the record."""
 
     trigger: Trigger
-    active: Active
+    active: ActiveRecipe
     limits: Deadlines
     mm_per_px: float
     calibration: str
@@ -56,7 +56,7 @@ class Inspection:
     """Where it has to go before the next closing; None where it stays."""
     steps: list[GripStep] = field(default_factory=list)
     """Captured, in order."""
-    seen: list[Seen] = field(default_factory=list)
+    seen: list[MeasuredStep] = field(default_factory=list)
     """Measured, in order."""
     earlier: list[Press] = field(default_factory=list)
     """Presses on this fruit that were inconclusive; `steps` and `seen` are those of the present one."""
@@ -185,7 +185,7 @@ class Inspection:
             images=self._images(),
         )
 
-    def _measured(self, seen: Seen, onset_mm: float) -> Measured:
+    def _measured(self, seen: MeasuredStep, onset_mm: float) -> Measured:
         contact = seen.contact
         area_mm2 = contact.area_px * self.mm_per_px**2
         return Measured(
@@ -198,7 +198,7 @@ class Inspection:
             changed_area_px=contact.changed_area_px,
         )
 
-    def _point(self, number: int, seen: Seen, onset_mm: float | None) -> CurvePoint:
+    def _point(self, number: int, seen: MeasuredStep, onset_mm: float | None) -> CurvePoint:
         width_mm = seen.step.move.width_mm
         return CurvePoint(
             step=number,

@@ -16,14 +16,14 @@ from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.records.model import Image
-from station.service.alarm_desk import AlarmDesk
-from station.service.calibrated import Calibrated
-from station.service.crew import CAMERA, GRIPPER, Crew
-from station.service.eye import Eye, Seen
+from station.service.active_calibration import ActiveCalibration
+from station.service.alarm_manager import AlarmManager
+from station.service.device_manager import CAMERA, GRIPPER, DeviceManager
 from station.service.grip import FRAME_DEADLINE_S, Grip, GripStep, NothingTouchedError, UnseenContactError, at_once
 from station.service.inspection import Inspection
 from station.service.metrics import Metrics
 from station.service.reference import ALARMS, BadReferenceError
+from station.service.vision_worker import MeasuredStep, VisionWorker
 from station.settings.arm import ArmSettings
 from station.settings.service import ServiceSettings
 from station.vocabulary import Reason
@@ -48,18 +48,18 @@ class Inspector:
 
     def __init__(
         self,
-        crew: Crew,
-        eye: Eye,
+        crew: DeviceManager,
+        eye: VisionWorker,
         settings: ServiceSettings,
         arm: ArmSettings,
-        alarms: AlarmDesk,
+        alarms: AlarmManager,
         metrics: Metrics,
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._crew, self._eye, self._settings, self._calibrated = crew, eye, settings, calibrated
         self._alarms, self._metrics, self._arm = alarms, metrics, arm
         self._reached: MoveResult | None = None
-        self._glanced: Seen | None = None
+        self._glanced: MeasuredStep | None = None
         self._examining: asyncio.Future[bool] | None = None
         self._goes_on = asyncio.Event()
         """Set when a measured step lets another one be made."""
@@ -104,7 +104,7 @@ class Inspector:
                 f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at them",
             )
             return Event.REFERENCE_BAD
-        self._crew.watches[GRIPPER].heard()
+        self._crew.monitors[GRIPPER].report_success()
         self._examining = asyncio.ensure_future(self._examined(now))
         return Event.REFERENCE_TAKEN
 
@@ -133,7 +133,7 @@ class Inspector:
     async def _examined(self, now: Inspection) -> bool:
         """Take the reference's frames, while nothing touches the gel, and examine them."""
         frames = await self._grip(now, self._count).sound_frames(now.active.recipe.imaging.reference_frames)
-        self._crew.watches[CAMERA].heard()
+        self._crew.monitors[CAMERA].report_success()
         now.reference_s = frames[-1].captured_s
         return await self._examine(now, frames)
 
@@ -155,7 +155,7 @@ class Inspector:
             self._alarms.clear(alarm)
         drift, most = looks.drift_levels, self._settings.reference.most_drift_levels
         halfway = f"the light differs from the golden reference's by {drift:.0f} grey levels; {most:g} are too many"
-        self._alarms.show(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else "")
+        self._alarms.update(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else "")
         self._metrics.reference(0.0, drift)
         now.measures["reference_drift_levels"] = round(drift, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
@@ -201,7 +201,7 @@ class Inspector:
         return self._off_middle(now, await self._eye.measure(step))
 
     @staticmethod
-    def _off_middle(now: Inspection, seen: Seen) -> Way | None:
+    def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
         """How far a measured contact is off the field's middle; None where there is none."""
         centroid_px = seen.contact.centroid_px
         return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
@@ -274,8 +274,8 @@ class Inspector:
         if reached is None:
             raise RuntimeError("a step is captured that was not reached")
         frames = await self._grip(now).sound_frames(recipe.imaging.frames_per_step)
-        self._crew.watches[CAMERA].heard()
-        self._crew.watches[GRIPPER].heard()
+        self._crew.monitors[CAMERA].report_success()
+        self._crew.monitors[GRIPPER].report_success()
         now.steps.append(GripStep(len(now.steps), reached, frames))
         held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
         if len(now.steps) > recipe.steps.number or held or now.next_width_mm <= 0:
@@ -344,14 +344,14 @@ class Inspector:
     def _look_ahead(self, frame: Frame) -> None:
         self._count(frame)
         if not frame.faults:
-            self._eye.look_ahead(frame)
+            self._eye.measure_ahead(frame)
 
     def _count(self, frame: Frame) -> None:
         for fault in frame.faults or ("good",):
             self._metrics.frame(fault)
 
     async def _touches(self, step: GripStep) -> bool:
-        self._crew.watches[CAMERA].heard()
-        self._crew.watches[GRIPPER].heard()
+        self._crew.monitors[CAMERA].report_success()
+        self._crew.monitors[GRIPPER].report_success()
         self._glanced = await self._eye.measure(step)
         return self._glanced.contact.is_firm

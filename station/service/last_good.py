@@ -1,4 +1,4 @@
-"""The configuration as it was when it was last good: what the station runs by while its file is broken."""
+"""Last good configuration: the station runs by it while its file is broken."""
 
 import hashlib
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from station.service.keeping import Kept
+from station.service.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.environment import CONFIG_VARIABLE, variable
 from station.settings.problems import SettingsError
@@ -16,17 +16,17 @@ _FOLDER = "last_good"
 
 
 def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = None) -> tuple[Configuration, str]:
-    """Read the configuration; where it is broken, take the last good one of the same file.
+    """Read the configuration; if it is broken, return the last good one of the same file.
 
-    A good one is kept in its home folder. Of a broken one the home folder is not known: it is looked for where the
-    environment says, beside the file, and at the default.
+    A good configuration is stored in its home folder. A broken one does not name its home folder: the folder of the
+    environment, the file's folder and the default are searched.
 
     Args:
-        file: the file that the user named; found as `load_configuration` does where None.
+        file: the file that the user named; None: found as `load_configuration` does.
         environ: the environment; the process's own by default.
 
     Returns:
-        The configuration, and what is wrong with its files now; empty where nothing is.
+        The configuration, and the error in its files; empty for none.
 
     Raises:
         SettingsError: it is broken, and there is no last good one.
@@ -37,26 +37,26 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
         configuration = load_configuration(file, environ)
     except SettingsError as error:
         for home in _homes(file, environ):
-            data = Kept(home).read(name)
+            data = StateFiles(home).read(name)
             if data is not None:
                 try:
                     return Configuration.model_validate_json(data), str(error)
                 except ValidationError:
                     continue
         raise
-    Kept(configuration.home).write(name, configuration.model_dump_json().encode())
+    StateFiles(configuration.home).write(name, configuration.model_dump_json().encode())
     return configuration, ""
 
 
 def _key(file: Path | None, environ: Mapping[str, str]) -> str:
-    """A name for where the configuration came from, so that two stations' are never mixed up."""
+    """Return a name for the configuration's source, so that those of two stations are never mixed up."""
     named = file or environ.get(CONFIG_VARIABLE) or ""
     place = str(Path(named).absolute()) if named else "default"
     return hashlib.sha256(place.encode()).hexdigest()[:16]
 
 
 def _homes(file: Path | None, environ: Mapping[str, str]) -> list[Path]:
-    """Where the home folder may be, likeliest first."""
+    """Return the possible home folders, likeliest first."""
     default = Configuration().home
     homes = [environ[variable(("home",))]] if environ.get(variable(("home",))) else []
     named = file or environ.get(CONFIG_VARIABLE)

@@ -1,7 +1,7 @@
-"""The station's metrics: what is counted and shown, in a registry of its own.
+"""Metrics of the station, in a registry of their own.
 
-Counters begin at 0 with each start of the station, as Prometheus expects; what has to last is in the records. An
-inspection is counted when the PLC is given its outcome, once, so that the counts of one start equal its records'.
+Counters begin at 0 with each start of the station, as Prometheus expects; lasting figures are in the records. An
+inspection is counted once, when the PLC gets its outcome, so that the counts of one start equal its records'.
 """
 
 import platform
@@ -32,17 +32,17 @@ DEADLINE_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05,
 
 
 class Metrics:
-    """What the station counts; every method is cheap and never raises for a value."""
+    """Counters and gauges of the station; every method is fast and never raises for a value."""
 
     def __init__(self, version: str, deadline_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         """Register everything in the table.
 
         Args:
             version: the program's.
-            deadline_s: of one inspection; the durations' buckets lie around it.
+            deadline_s: of one inspection; centre of the durations' buckets.
             clock: monotonic, s.
         """
-        disable_created_metrics()  # a series more for each counter, which nobody asks for
+        disable_created_metrics()  # an extra series for each counter, which is not needed
         self.registry = CollectorRegistry(auto_describe=False)
         ProcessCollector(registry=self.registry)
         self._clock = clock
@@ -72,13 +72,13 @@ class Metrics:
         phases_s: Mapping[str, float] | None = None,
         deadline_s: float | None = None,
     ) -> None:
-        """Count one inspection; call it when `Records.published` says that it is the first time.
+        """Count one inspection; call it when `Records.published` reports it for the first time.
 
         Args:
             fruit: the recipe's name, empty for none.
-            outcome: what the PLC was given.
-            phases_s: how long each phase took.
-            deadline_s: how long it might take, where that is still known.
+            outcome: as given to the PLC.
+            phases_s: duration of each phase.
+            deadline_s: of this inspection, where it is still known.
         """
         fruit = fruit or "none"
         reason = outcome.reasons[0] if outcome.reasons else "none"
@@ -104,11 +104,11 @@ class Metrics:
         self._of("frames", state=state).inc(number)
 
     def reference(self, age_s: float, drift_grey_levels: float) -> None:
-        """Tell the age of the reference in use, which grows from now on, and its distance from the golden one."""
+        """Set the age of the reference in use, which grows from now on, and its distance from the golden one."""
         self._reference = (self._clock() - age_s, drift_grey_levels)
 
     def reference_refused(self, alarm: str) -> None:
-        """Count a picture of the untouched gel that could not be a reference, by the alarm that tells why."""
+        """Count a picture of the untouched gel that was refused as reference, by its alarm."""
         self._of("references_refused", id=alarm).inc()
 
     def refused(self, reason: str) -> None:
@@ -120,11 +120,11 @@ class Metrics:
         self._of("unexpected").inc()
 
     def heard(self, link: str) -> None:
-        """Note a sign of life of a device, process or heartbeat; its age is shown from now on."""
+        """Note a sign of life of a device, process or heartbeat; its age is exported from now on."""
         self._heard_s[self._label("link", link)] = self._clock()
 
     def alarms(self, active: Iterable[tuple[str, str]]) -> None:
-        """Show these alarms, as id and priority, and no other, as active."""
+        """Export these alarms, as id and priority, and no other, as active."""
         shown = {(self._label("id", name), self._label("priority", priority)) for name, priority in active}
         self._active |= shown
         for name, priority in self._active:
@@ -135,7 +135,7 @@ class Metrics:
         self._of("waiting").set(outcomes)
 
     def restarted(self, process: str) -> None:
-        """Count a process that was started again."""
+        """Count a restart of a process."""
         self._of("restarts", process=process).inc()
 
     def ready(self, *, ready: bool) -> None:
@@ -143,22 +143,22 @@ class Metrics:
         self._of("ready").set(ready)
 
     def watch_records(self, status: Callable[[], Status]) -> None:
-        """Ask the records at each scrape: `Records.status`."""
+        """Read the records' state at each scrape: `Records.status`."""
         self._status = status
 
     def watch_calibration(self, figures: Callable[[], Sequence[float | None]]) -> None:
-        """Ask at each scrape for the calibration's age, the verification's age, and the drift: `Calibrated.figures`."""
+        """Read at each scrape the ages of calibration and verification, and the drift: `ActiveCalibration.figures`."""
         self._figures = figures
 
     def watch_outbox(self, status: Callable[[], OutboxStatus | None]) -> None:
-        """Ask at each scrape how far other systems are told."""
+        """Read the outbox's state at each scrape."""
         self._outbox = status
 
     def exposition(self, accept: str = "") -> tuple[bytes, str]:
-        """Everything, and the content type.
+        """Return all metrics, and the content type.
 
         Args:
-            accept: the client's header of that name; empty for Prometheus' text format.
+            accept: the client's `Accept` header; empty for Prometheus' text format.
         """
         encode, content_type = choose_encoder(accept)
         return encode(self.registry), content_type
@@ -168,7 +168,7 @@ class Metrics:
         return metric.labels(**{name: self._label(name, value) for name, value in labels.items()}) if labels else metric
 
     def _label(self, name: str, value: str) -> str:
-        """The value where the label may read it, else `other`: no caller can make the number of series grow."""
+        """Return the value if the label may have it, else `other`: no caller can make the number of series grow."""
         allowed = LABELS[name]
         if isinstance(allowed, frozenset):
             return str(value) if value in allowed else OTHER
@@ -179,7 +179,7 @@ class Metrics:
         return str(value)
 
     def _at_scrape(self) -> Iterator[Metric]:
-        """What is known only when it is asked for."""
+        """Yield the metrics that are read at the scrape."""
         now_s = self._clock()
         ages = GaugeMetricFamily(TABLE["link_age"].name, TABLE["link_age"].help, labels=["link"])
         for link, heard_s in tuple(self._heard_s.items()):
@@ -209,7 +209,7 @@ class _AtScrape(Collector):
 
 
 def _made(row: Row, around_deadline: tuple[float, ...], registry: CollectorRegistry) -> Any:
-    """What prometheus-client counts the row with."""
+    """Make the prometheus-client metric of a row."""
     match row.kind:
         case "counter":
             return Counter(row.name, row.help, row.labels, registry=registry)
@@ -226,7 +226,7 @@ Values = Mapping[str, Mapping[tuple[str, ...], float | None]]
 
 
 def _of_records(status: Status) -> Iterator[Metric]:
-    """The records' metrics."""
+    """Yield the records' metrics."""
     gauges: Values = {
         "records_queue": {(): status.queue},
         "records_images_queue": {(): status.images_waiting},
@@ -243,7 +243,7 @@ def _of_records(status: Status) -> Iterator[Metric]:
 
 
 def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
-    """How far other systems are told."""
+    """Yield the outbox's metrics."""
     now_utc_ms = time.time_ns() // 1_000_000
     told = status.destinations.items()
 

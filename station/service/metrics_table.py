@@ -1,4 +1,4 @@
-"""Every metric of the station in one table: the code, the document and the test are made from it.
+"""Table of all metrics: the source of the code, the document and the test.
 
 Names follow Prometheus' conventions ("Metric and label naming", prometheus.io/docs/practices/naming): seconds and
 bytes as base units, `_total` for counters. Lengths and areas are in mm and mm², as everywhere in the station.
@@ -13,7 +13,7 @@ from station.records import errors
 from station.service.reference import ALARMS as REFERENCE_ALARMS
 
 OTHER = "other"
-"""What a label reads whose value is not one of its own, or one too many."""
+"""Label value for a value that is not one of its own, or one too many."""
 
 LABELS: dict[str, frozenset[str] | int] = {
     "fruit": 64,
@@ -32,7 +32,7 @@ LABELS: dict[str, frozenset[str] | int] = {
     "version": 1,
     "python": 1,
 }
-"""What each label can read: these values, or so many different ones; all others are `other`."""
+"""Values of each label: these, or at most so many different ones; all others become `other`."""
 
 
 class Row(NamedTuple):
@@ -44,11 +44,11 @@ class Row(NamedTuple):
     labels: tuple[str, ...]
     help: str
     buckets: tuple[float, ...] = ()
-    """A histogram's upper bounds; empty where they follow the inspection's deadline."""
+    """A histogram's upper bounds; empty if they follow the inspection's deadline."""
     at_scrape: bool = False
-    """Asked for when it is scraped instead of being set."""
+    """Read at the scrape instead of being set."""
     known: tuple[tuple[str, ...], ...] = ()
-    """What its labels read from the start, at 0: what begins with its first event has no increase to show then."""
+    """Label values exported from the start, at 0: a series that begins with its first event has no increase then."""
 
 
 _MM2 = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0, 130.0, 160.0, 200.0, 260.0)
@@ -224,16 +224,12 @@ TABLE: dict[str, Row] = {
 
 
 def exposed_name(row: Row) -> str:
-    """The name as it is scraped.
-
-    Args:
-        row: the metric.
-    """
+    """Return the name as it is scraped."""
     return row.name + {"counter": "_total", "info": "_info"}.get(row.kind, "")
 
 
 def markdown() -> str:
-    """The table of docs/metrics.md."""
+    """Return the table of docs/metrics.md."""
     head = "| metric | type | labels | is |\n| --- | --- | --- | --- |\n"
     rows = [
         f"| `{exposed_name(row)}` | {row.kind} | {', '.join(f'`{label}`' for label in row.labels)} | {row.help} |\n"

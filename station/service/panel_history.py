@@ -1,4 +1,4 @@
-"""What the pages ask of the past, answered from the records."""
+"""History requests of the pages, answered from the records."""
 
 import json
 from dataclasses import asdict
@@ -38,10 +38,10 @@ from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.records.lots import Lot, end_lot, read_lots, start_lot
 from station.records.model import FullRecord
-from station.records.reading import Summary, read_inspection
+from station.records.queries import Summary, read_inspection
 from station.records.records import Records
 from station.records.search import Query, find_page
-from station.records.wording import sentence
+from station.records.texts import sentence
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_worker import PanelWorker
 
@@ -49,12 +49,11 @@ _LONGEST_AUDIT_VALUE = 2000
 
 
 class PanelHistory:
-    """Answers about inspections, lots, the audit trail, and files made of them.
+    """Requests about inspections, lots and the audit trail, and exports of them.
 
     Args:
-        records: opened, or to be opened.
-        worker: what blocks is done there.
-        jobs: what takes long is done there.
+        worker: runs what blocks.
+        jobs: runs what takes long.
     """
 
     def __init__(self, records: Records, worker: PanelWorker, jobs: PanelJobs) -> None:
@@ -62,7 +61,7 @@ class PanelHistory:
         self._folder = records.folder
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             FindInspections: self.find,
             GetInspection: self.inspection,
@@ -78,20 +77,20 @@ class PanelHistory:
         }
 
     async def find(self, request: FindInspections) -> InspectionPage:
-        """One page of a search, newest first."""
+        """Return one page of a search, newest first."""
         return await self._worker.do(lambda: self._find(request))
 
     async def inspection(self, request: GetInspection) -> InspectionView:
-        """One inspection whole."""
+        """Return one inspection in full."""
 
         def read() -> InspectionView:
             with reading(self._folder) as connection:
-                return _told(read_inspection(connection, request.sequence, self._folder))
+                return _inspection_view(read_inspection(connection, request.sequence, self._folder))
 
         return await self._worker.do(read)
 
     async def lots(self, request: ListLots) -> Lots:
-        """The last lots told of."""
+        """List the last lots."""
 
         def read() -> Lots:
             with reading(self._folder) as connection:
@@ -100,19 +99,19 @@ class PanelHistory:
         return await self._worker.do(read)
 
     async def start_lot(self, request: StartLot) -> LotView:
-        """Tell of a lot's begin, with its row of the trail."""
+        """Store a lot's start with its audit entry."""
         lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
         await self._note(request, "lot.told", {"grower": lot.grower})
         return _lot(lot)
 
     async def end_lot(self, request: EndLot) -> LotView:
-        """Tell of a lot's end, with its row of the trail."""
+        """Store a lot's end with its audit entry."""
         lot = await self._records.change(lambda connection: end_lot(connection, request.name))
         await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
         return _lot(lot)
 
     async def audit(self, request: ReadAudit) -> AuditRows:
-        """The last rows of the trail."""
+        """List the last rows of the audit trail."""
 
         def read() -> AuditRows:
             with reading(self._folder) as connection:
@@ -136,29 +135,29 @@ class PanelHistory:
         return await self._worker.do(read)
 
     async def start_export(self, request: StartExport) -> JobView:
-        """Write a table of inspections."""
+        """Start an export of inspections as a table."""
         folder = self._jobs.folder()
         target = folder / f"inspections.{request.form}"
         await self._note(request, "records.exported", request.search.model_dump(mode="json", exclude_none=True))
         return self._jobs.begin("export", folder, ["records", "export", str(target), *_options(request.search)])
 
     async def start_report(self, request: StartLotReport) -> JobView:
-        """Write a lot's report."""
+        """Start a lot's report."""
         _check_text(request.lot)
         folder = self._jobs.folder()
         arguments = ["records", "report", "--", request.lot, str(folder / f"lot.{request.form}")]
         return self._jobs.begin("lot_report", folder, arguments)
 
     async def job(self, request: GetJob) -> JobView:
-        """How a job does."""
-        return self._jobs.told(request.job)
+        """Return a job's state."""
+        return self._jobs.state(request.job)
 
     async def end_job(self, request: EndJob) -> JobView:
-        """Call a job off."""
+        """Cancel a job."""
         return await self._jobs.end(request.job)
 
     async def read_file(self, request: ReadJobFile) -> Chunk:
-        """A piece of a job's file."""
+        """Return a part of a job's file."""
         return await self._worker.do(lambda: self._jobs.read(request.job, request.name, request.offset))
 
     async def _note(self, request: StartLot | EndLot | StartExport, action: str, new: object) -> None:
@@ -189,7 +188,7 @@ def _lot(lot: Lot) -> LotView:
     return LotView(**lot._asdict())
 
 
-def _told(record: FullRecord) -> InspectionView:
+def _inspection_view(record: FullRecord) -> InspectionView:
     trigger, judged, standing, recipe = record.trigger, record.judged, record.standing, record.trigger.recipe
     reasons = standing.reasons if standing is not None else ()
     return InspectionView(
@@ -228,7 +227,7 @@ def _told(record: FullRecord) -> InspectionView:
 
 
 def _options(search: Search) -> list[str]:
-    """A search as options of the command line."""
+    """Return a search as options of the command line."""
     given = {
         "lot": search.lot,
         "grower": search.grower,

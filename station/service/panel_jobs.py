@@ -1,4 +1,4 @@
-"""What a page asks for and takes long: the station's own commands, each as a process that gives way to the cycle.
+"""Long jobs of the pages: the station's own commands, each in a process with less priority than the cycle.
 
 A thread would share Python's one interpreter lock with the cycle; a process shares only the processor, at the lowest
 priority.
@@ -22,8 +22,8 @@ from station.errors import StationError
 
 FOLDER = "panel_jobs"
 LONGEST_S = 1800.0
-KEPT = 8
-"""Jobs whose files are kept, the newest."""
+STORED_JOBS = 8
+"""Number of the newest jobs whose files are stored."""
 MOST_WAITING = 4
 _STOP_S = 5.0
 _LEAST_FREE_BYTES = 64 * 1024 * 1024
@@ -42,12 +42,12 @@ log = logging.getLogger(__name__)
 
 
 class JobError(StationError):
-    """A job that cannot be begun, or is not known."""
+    """A job that cannot start, or does not exist."""
 
 
 @dataclass(slots=True)
 class Job:
-    """One command on its way."""
+    """One command of the queue."""
 
     id: str
     kind: Kind
@@ -55,21 +55,21 @@ class Job:
     arguments: Sequence[str]
     of: int = 0
     state: Literal["waiting", "running", "done", "failed", "ended"] = "waiting"
-    told: str = ""
+    message: str = ""
     task: asyncio.Task[None] | None = field(default=None, repr=False)
 
     @property
     def open(self) -> bool:
-        """Whether it is not over."""
+        """Whether the job is not finished."""
         return self.state in {"waiting", "running"}
 
 
 class PanelJobs:
-    """Runs one job after the other.
+    """Queue that runs one job after the other.
 
     Args:
         home: the station's home folder.
-        command: what the arguments are given to.
+        command: the command line that gets the arguments.
     """
 
     def __init__(self, home: Path, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
@@ -78,7 +78,7 @@ class PanelJobs:
         self._turn = asyncio.Lock()
 
     def folder(self) -> Path:
-        """A new job's folder, whose name is its id.
+        """Make a new job's folder, whose name is its id.
 
         Raises:
             JobError: too many wait, or the disk is full.
@@ -98,28 +98,24 @@ class PanelJobs:
         return folder
 
     def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobView:
-        """Begin a job. Not idempotent.
+        """Queue a job. Not idempotent.
 
         Args:
-            kind: what it is.
-            folder: from `folder`; what it leaves there are its files.
+            folder: from `folder`; the job writes its files there.
             arguments: of the station's command line.
-            of: how much there is to do, where that is known.
+            of: number of steps, where it is known.
         """
         job = Job(folder.name, kind, folder, arguments, of)
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job), name=f"job {kind}")
         self._forget()
-        return self.told(job.id)
+        return self.state(job.id)
 
-    def told(self, job_id: str) -> JobView:
-        """How a job does.
-
-        Args:
-            job_id: its id.
+    def state(self, job_id: str) -> JobView:
+        """Return a job's state.
 
         Raises:
-            JobError: there is none.
+            JobError: there is no such job.
         """
         job = self._get(job_id)
         files = tuple(
@@ -128,21 +124,26 @@ class PanelJobs:
             if path.suffix in _MEDIA
         )
         return JobView(
-            job=job.id, kind=job.kind, state=job.state, done=self._done(job), of=job.of, message=job.told, files=files
+            job=job.id,
+            kind=job.kind,
+            state=job.state,
+            done=self._progress(job),
+            of=job.of,
+            message=job.message,
+            files=files,
         )
 
     def read(self, job_id: str, name: str, offset: int) -> Chunk:
-        """A piece of a job's file. Blocks.
+        """Return a part of a job's file. Blocks.
 
         Args:
-            job_id: of a job that is done.
-            name: the file's.
-            offset: bytes from its beginning.
+            job_id: of a finished job.
+            offset: bytes from the file's start.
 
         Raises:
             JobError: there is no such file.
         """
-        told = self.told(job_id)
+        told = self.state(job_id)
         if name not in {file.name for file in told.files}:
             raise JobError(f"there is no file {name} of this job; begin it again")
         try:
@@ -154,21 +155,17 @@ class PanelJobs:
             raise JobError(f"{name} cannot be read: {error.strerror}; begin the job again") from error
 
     async def end(self, job_id: str) -> JobView:
-        """Call a job off. Idempotent.
-
-        Args:
-            job_id: its id.
-        """
+        """Cancel a job. Idempotent."""
         job = self._get(job_id)
         if job.task is not None and job.open:
             job.task.cancel()
             await asyncio.gather(job.task, return_exceptions=True)
             if job.open:  # cancelled before it ran at all
                 job.state = "ended"
-        return self.told(job_id)
+        return self.state(job_id)
 
     async def close(self) -> None:
-        """End what runs. Idempotent."""
+        """End the running job. Idempotent."""
         for job_id in list(self._jobs):
             await self.end(job_id)
 
@@ -177,13 +174,13 @@ class PanelJobs:
             async with self._turn:
                 job.state = "running"
                 async with asyncio.timeout(LONGEST_S):
-                    code, words = await self._carry_out(job)
+                    code, words = await self._run_command(job)
             job.state = "failed" if code else "done"
-            job.told = words
+            job.message = words
         except TimeoutError:
-            job.state, job.told = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
+            job.state, job.message = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
         except OSError as error:
-            job.state, job.told = "failed", f"it could not be started: {error.strerror}"
+            job.state, job.message = "failed", f"it could not be started: {error.strerror}"
         except asyncio.CancelledError:
             job.state = "ended"
             raise
@@ -191,8 +188,8 @@ class PanelJobs:
             if job.state != "done":
                 shutil.rmtree(job.folder, ignore_errors=True)
 
-    async def _carry_out(self, job: Job) -> tuple[int, str]:
-        """Exit code and last words."""
+    async def _run_command(self, job: Job) -> tuple[int, str]:
+        """Return the exit code and the last output."""
         environment = {
             **{name: value for name, value in os.environ.items() if not name.startswith("STATION_")},
             "STATION_HOME": str(self._home),
@@ -217,8 +214,8 @@ class PanelJobs:
         words = stderr.decode("utf-8", "replace").strip().splitlines()
         return process.returncode or 0, words[-1][:1000] if process.returncode and words else ""
 
-    def _done(self, job: Job) -> int:
-        """Of a what-if, from the file that it appends to; its first line is a heading."""
+    def _progress(self, job: Job) -> int:
+        """Return a what-if's progress from the file that it appends to; the first line is a heading."""
         if job.state == "done":
             return job.of
         with contextlib.suppress(OSError):
@@ -232,13 +229,13 @@ class PanelJobs:
 
     def _forget(self) -> None:
         over = [job for job in self._jobs.values() if not job.open]
-        for job in over[: max(0, len(self._jobs) - KEPT)]:
+        for job in over[: max(0, len(self._jobs) - STORED_JOBS)]:
             shutil.rmtree(job.folder, ignore_errors=True)
             del self._jobs[job.id]
 
 
 async def _ended(process: asyncio.subprocess.Process) -> None:
-    """Whatever happens, the process and all that it has started are gone."""
+    """Kill the process and all that it started, whatever happens."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()

@@ -1,4 +1,4 @@
-"""The last lines of this process's log, kept for the maintenance page."""
+"""Ring buffer of this process's log, for the maintenance page."""
 
 import logging
 from collections import deque
@@ -6,17 +6,17 @@ from typing import Any, Self
 
 from station.channel.panel_maintenance_queries import LogLine
 
-KEPT = 1000
+STORED_LINES = 1000
 _LONGEST = 1000
 
 
 class LogRing(logging.Handler):
-    """Keeps what is logged, the oldest lines making room; attach it for as long as it is wanted, by `with`."""
+    """Log handler that stores the newest lines; it is attached inside `with`."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: deque[LogLine] = deque(maxlen=KEPT)
-        self._numbers: deque[int] = deque(maxlen=KEPT)
+        self._lines: deque[LogLine] = deque(maxlen=STORED_LINES)
+        self._numbers: deque[int] = deque(maxlen=STORED_LINES)
 
     def __enter__(self) -> Self:
         logging.getLogger().addHandler(self)
@@ -27,7 +27,7 @@ class LogRing(logging.Handler):
         self.close()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
+        """Store a line."""
         line = LogLine(
             utc_ms=round(1000 * record.created), level=record.levelname, logger=record.name, text=_text(record)
         )
@@ -35,11 +35,11 @@ class LogRing(logging.Handler):
         self._numbers.append(record.levelno)
 
     def last(self, number: int, level: str) -> tuple[LogLine, ...]:
-        """The newest lines, newest last.
+        """Return the newest lines, newest last.
 
         Args:
-            number: at most so many.
-            level: the least, by its name.
+            number: at most so many lines.
+            level: name of the lowest level.
         """
         least = logging.getLevelNamesMapping()[level]
         chosen = [line for line, found in zip(self._lines, self._numbers, strict=True) if found >= least]

@@ -1,4 +1,4 @@
-"""What the maintenance page asks: health, jogging in manual mode, the live image, the PLC's registers, the log."""
+"""Maintenance page's requests: health, jogging in manual mode, live image, PLC registers, log."""
 
 import asyncio
 import time
@@ -32,16 +32,16 @@ from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
 from station.records.audit import AuditEntry
-from station.service.calibrated import Calibrated
-from station.service.crew import GRIPPER, Crew
+from station.service.active_calibration import ActiveCalibration
+from station.service.audit_logger import AuditLogger
+from station.service.device_manager import GRIPPER, DeviceManager
 from station.service.health import Liveness
-from station.service.orders import Orders
 from station.service.panel_log import LogRing
 from station.service.panel_worker import PanelWorker
-from station.service.readiness import Gate
+from station.service.plc_commands import PlcCommands
+from station.service.readiness import Interlock
 from station.service.reference import GOLDEN, sharpness
 from station.service.service import Service
-from station.service.trail import Trail
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
 from station.vision.methods import make_method
@@ -54,55 +54,52 @@ JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
 FRAME_DEADLINE_S = 2.0
 REGISTERS_DEADLINE_S = 3.0
 _JOGGED = {State.IDLE, State.STOPPED, State.CARRIED}
-"""Where the cycle moves nothing by itself."""
+"""States in which the cycle moves nothing."""
 _SATURATED_LEVEL = 250
 _JPEG_QUALITY = 85
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 
 
 class NotNowError(StationError):
-    """What a person asks for is not done in this state; the message says what has to be done first."""
+    """A request that is refused in this state; the message gives what has to be done first."""
 
 
 class PanelMaintenance:
-    """Answers the maintenance page.
+    """Requests of the maintenance page.
 
     Args:
-        service: the cycle.
-        crew: the devices.
-        orders: the mode, and what the PLC interface told.
-        gate: what inspecting needs, with ages.
-        liveness: what has to make progress.
+        plc_commands: the mode, and the PLC interface's report.
+        interlock: the dependencies of an inspection, with ages.
+        liveness: the progress of tasks.
         calibrated: the scale, and the golden reference.
-        trail: told of everything that is moved.
-        home: where the golden reference of a sensor that is not calibrated lies.
-        worker: pictures are made there.
+        audit: gets every manual motion.
+        home: folder of the golden reference of a sensor that is not calibrated.
+        worker: makes pictures in its thread.
         log: the last lines.
-        versions: of the programs.
     """
 
     def __init__(
         self,
         service: Service,
-        crew: Crew,
-        orders: Orders,
-        gate: Gate,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
         liveness: Liveness,
-        calibrated: Calibrated,
-        trail: Trail,
+        calibrated: ActiveCalibration,
+        audit: AuditLogger,
         home: Path,
         worker: PanelWorker,
         log: LogRing,
         versions: Mapping[str, str],
     ) -> None:
-        self._service, self._crew, self._orders, self._gate = service, crew, orders, gate
-        self._liveness, self._calibrated, self._trail, self._home = liveness, calibrated, trail, home
+        self._service, self._devices, self._plc_commands, self._interlock = service, devices, plc_commands, interlock
+        self._liveness, self._calibrated, self._audit, self._home = liveness, calibrated, audit, home
         self._worker, self._log, self._versions = worker, log, dict(versions)
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             GetHealth: self.health,
             JogGripper: self.jog,
@@ -113,9 +110,9 @@ class PanelMaintenance:
         }
 
     def refusal(self) -> str:
-        """Why nothing may be moved by hand now, with what to do; empty where it may."""
-        service, facts, mode = self._service, STATES[self._service.state], self._orders.mode
-        if service.stop_asked:
+        """Return why nothing may be moved by hand now, with the remedy; empty if it may."""
+        service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
+        if service.stop_requested:
             return "The station is told to end."
         if facts.refusal is Refusal.BUSY:
             return "An inspection is under way: wait for its end."
@@ -123,25 +120,29 @@ class PanelMaintenance:
             return f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then."
         if service.state not in _JOGGED:
             return facts.sentence
-        if self._orders.kept_manual and not self._moving.locked():
-            return f"{self._orders.kept_manual} is under way: let it end, or call it off."
+        if self._plc_commands.kept_manual and not self._moving.locked():
+            return f"{self._plc_commands.kept_manual} is under way: let it end, or call it off."
         return ""
 
     async def health(self, _request: GetHealth) -> Health:
-        """How everything does."""
-        readiness, records, figures = self._gate.readiness(), self._service.ledger.records, self._calibrated.figures
+        """Return the health of all dependencies."""
+        readiness, records, figures = (
+            self._interlock.readiness(),
+            self._service.registry.records,
+            self._calibrated.figures,
+        )
         status = await self._worker.do(records.status)
         return Health(
             ready=readiness.ready,
             why=readiness.why,
-            mode=self._orders.mode,
+            mode=self._plc_commands.mode,
             state=STATES[self._service.state].sentence,
             jog_refused=self.refusal(),
             parts=tuple(
                 PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
                 for each in readiness.dependencies
             ),
-            devices=self._crew.names,
+            devices=self._devices.names,
             versions=self._versions,
             progress_age_s=self._liveness.ages_s(),
             records={
@@ -155,17 +156,17 @@ class PanelMaintenance:
             records_error=status.error,
             calibration_age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
-            simulated=self._crew.simulated,
+            simulated=self._devices.simulated,
         )
 
     async def jog(self, request: JogGripper) -> Jogged:
         """Move the fingers, or stop them.
 
         Raises:
-            NotNowError: it is not the time for it.
-            GripperError: they did not get there.
+            NotNowError: refused in this state.
+            GripperError: the fingers did not reach the width.
         """
-        gripper, width_mm = self._crew.cell.gripper, request.width_mm
+        gripper, width_mm = self._devices.cell.gripper, request.width_mm
         if (request.to == "width") != (width_mm is not None):
             raise StationError("to jog the gripper: expected a width where it is to go to one, and none elsewhere")
         self._check(request.actor, "jog", request.to)
@@ -177,13 +178,13 @@ class PanelMaintenance:
             if self._moving.locked():
                 raise NotNowError("the fingers move already: wait for them, or stop them")
             async with self._moving:
-                self._orders.kept_manual = "jogging"
+                self._plc_commands.kept_manual = "jogging"
                 try:
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
                 finally:
-                    self._orders.kept_manual = ""
-        self._crew.watches[GRIPPER].heard()
+                    self._plc_commands.kept_manual = ""
+        self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
@@ -191,13 +192,13 @@ class PanelMaintenance:
     async def set_leds(self, request: SetLeds) -> LedsSet:
         """Set the sensor's light; the next start of the camera sets its own again."""
         self._check(request.actor, "leds", "camera")
-        await self._crew.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
+        await self._devices.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
         self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
         return LedsSet()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
-        """The newest image; it is only measured while nothing is inspected."""
-        frame = await self._crew.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
+        """Return the newest image; it is measured only while nothing is inspected."""
+        frame = await self._devices.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
         active = self._service.active
         why = ""
         if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
@@ -208,16 +209,16 @@ class PanelMaintenance:
         return await self._worker.do(lambda: self._live(frame, segmentation, why))
 
     async def registers(self, _request: GetRegisters) -> Registers:
-        """The PLC's registers, asked for with the next beat; after a while what was told last."""
+        """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
         asked_s = time.monotonic()
-        self._orders.registers_wanted = True
-        while self._orders.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
+        self._plc_commands.registers_wanted = True
+        while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
             await asyncio.sleep(0.05)
-        told, at_s = self._orders.registers
+        told, at_s = self._plc_commands.registers
         return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
 
     async def log_lines(self, request: ReadLog) -> Log:
-        """The last lines of the log."""
+        """Return the last lines of the log."""
         return Log(lines=self._log.last(request.limit, request.level))
 
     def _check(self, actor: Actor, command: str, subject: str) -> None:
@@ -226,7 +227,7 @@ class PanelMaintenance:
             raise NotNowError(why)
 
     def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
-        self._trail.note(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+        self._audit.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
 
     def _live(self, frame: Frame, segmentation: Segmentation | None, why: str) -> LiveImage:
         image, contact = frame.image, None
@@ -252,7 +253,7 @@ class PanelMaintenance:
         )
 
     def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, str]:
-        """The contact against the golden reference, or why there is none measured."""
+        """Return the contact against the golden reference, or why none is measured."""
         path = self._calibrated.golden() or self._home / GOLDEN
         try:
             key = (path, path.stat().st_mtime_ns, segmentation)

@@ -1,4 +1,4 @@
-"""Stored images for the pages, and what the measurement makes of them, stage by stage."""
+"""Pictures for the pages: stored images, and the measurement's stages on them."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
 from station.records.model import FullRecord, StoredImage
-from station.records.reading import read_inspection
+from station.records.queries import read_inspection
 from station.service.panel_worker import PanelWorker
 from station.settings.problems import SettingsError
 from station.settings.recipe_form import parse_recipe
@@ -26,22 +26,22 @@ _JPEG_QUALITY = 88
 
 
 class PanelPictures:
-    """Answers with pictures.
+    """Requests for pictures.
 
     Args:
-        folder: the records' folder.
-        worker: what blocks is done there.
+        folder: of the records.
+        worker: runs what blocks.
     """
 
     def __init__(self, folder: Path, worker: PanelWorker) -> None:
         self._folder, self._worker = folder, worker
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {GetImage: self.image, GetStages: self.stages}
 
     async def image(self, request: GetImage) -> Picture:
-        """One stored image."""
+        """Return one stored image."""
 
         def read() -> Picture:
             return Picture(media_type="image/png", data=_file(image_path(self._folder, request.sha256)))
@@ -49,7 +49,7 @@ class PanelPictures:
         return await self._worker.do(read)
 
     async def stages(self, request: GetStages) -> Stages:
-        """One step measured again with its stages."""
+        """Measure one step again and return its stages."""
         return await self._worker.do(lambda: self._stages(request))
 
     def _stages(self, request: GetStages) -> Stages:
@@ -61,8 +61,8 @@ class PanelPictures:
             recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
         except SettingsError as error:
             raise RecordsError("its recipe is of a form that this program does not take", str(error)) from error
-        reference = _picture(_kept(record, "reference", None))
-        image = _picture(_kept(record, "step", request.step))
+        reference = _picture(_stored(record, "reference", None))
+        image = _picture(_stored(record, "step", request.step))
         if reference.shape != image.shape:
             raise RecordsError("its reference and this image differ in size", "look at another step")
         pictures: list[tuple[str, Picture]] = []
@@ -75,18 +75,18 @@ class PanelPictures:
         # A step is measured with the contact of the step before, and that one with its own: all of them again.
         tracker, previous = PressTracker(method, segmentation.robust.least_confidence), None
         for before in range(request.step):
-            previous = tracker.measure_step([_picture(_kept(record, "step", before))])
+            previous = tracker.measure_step([_picture(_stored(record, "step", before))])
         contact = method.measure(image, take, previous)
         return Stages(pictures=tuple(pictures), area_px=contact.area_px)
 
 
 def _gate_factor(record: FullRecord) -> float:
-    """By which the sensor's calibration had raised the gate in an inspection; 1 where it did not."""
+    """Return the factor by which the sensor's calibration raised the gate in an inspection; 1 for none."""
     factor = record.judged.measures.get("gate_factor") if record.judged is not None else None
     return float(factor or 1.0)
 
 
-def _kept(record: FullRecord, kind: str, step: int | None) -> StoredImage:
+def _stored(record: FullRecord, kind: str, step: int | None) -> StoredImage:
     for image in record.images:
         if image.kind == kind and image.step == step:
             return image

@@ -1,4 +1,4 @@
-"""What the pages ask about recipes, and a person's changes to them; the recipe store does the work."""
+"""Recipe requests of the pages, carried out by the recipe store."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -41,8 +41,8 @@ from station.inspection.sized_limits import SizedLimits
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
+from station.recipe_store.recipe_state import RecipeState
 from station.recipe_store.revision import ConflictError, Revision
-from station.recipe_store.standing import Standing
 from station.recipe_store.store import RecipeStore
 from station.records.database import plain, reading, records_folder
 from station.service.panel_jobs import PanelJobs
@@ -52,7 +52,7 @@ from station.settings.recipe import Recipe, shipped_folder
 from station.settings.recipe_form import content_sha256
 
 _REVISIONS = 20
-"""Of one page of a history."""
+"""Revisions on one page of a history."""
 _LONGEST_VALUE = 400
 _JUDGED = (
     "SELECT i.sequence, i.outcome, json_extract(i.measures, '$.onset_mm') FROM inspections i "
@@ -66,13 +66,12 @@ _POINTS = (
 
 
 class PanelRecipes:
-    """Answers about recipes, and changes them.
+    """Requests about recipes, and changes of them.
 
     Args:
-        home: the station's home folder.
         folder: the site's recipe files; None for those shipped.
-        worker: what blocks is done there.
-        jobs: a what-if is done there.
+        worker: runs what blocks.
+        jobs: runs what-ifs.
     """
 
     def __init__(self, home: Path, folder: Path | None, worker: PanelWorker, jobs: PanelJobs) -> None:
@@ -82,7 +81,7 @@ class PanelRecipes:
         self._records, self._worker, self._jobs = records_folder(home), worker, jobs
 
     def handlers(self) -> dict[type[Message], Handler]:
-        """What answers each request."""
+        """Return the handler of each request."""
         return {
             ListRecipes: self.recipes,
             GetRecipe: self.recipe,
@@ -100,7 +99,7 @@ class PanelRecipes:
         }
 
     async def recipes(self, _request: ListRecipes) -> Recipes:
-        """How all stand."""
+        """List the recipes with their states."""
 
         def read() -> Recipes:
             standings, problems = self._store.read()
@@ -116,12 +115,12 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def recipe(self, request: GetRecipe) -> RecipeView:
-        """One recipe's file, or one of its revisions."""
+        """Return one recipe's file, or one of its revisions."""
 
         def read() -> RecipeView:
-            row = _row(self._store.standing(request.name))
+            row = _row(self._store.state(request.name))
             if request.revision is None:
-                file = self._store.good_file(request.name)
+                file = self._store.valid_file(request.name)
                 text, recipe = file.text, file.recipe
             else:
                 revision = self._store.revision(request.name, request.revision)
@@ -131,10 +130,10 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def history(self, request: GetRecipeHistory) -> RecipeHistory:
-        """A page of a recipe's revisions."""
+        """Return a page of a recipe's revisions."""
 
         def read() -> RecipeHistory:
-            self._store.standing(request.name)
+            self._store.state(request.name)
             known = self._store.history(request.name)
             below = request.below or known[-1].revision + 1 if known else 1
             chosen = [place for place, each in enumerate(known) if each.revision < below][::-1]
@@ -145,17 +144,17 @@ class PanelRecipes:
         return await self._worker.do(read)
 
     async def compare(self, request: CompareRecipe) -> Changes:
-        """What differs between two forms of a recipe."""
+        """Return the differences between two forms of a recipe."""
 
         def read() -> Changes:
-            standing = self._store.standing(request.name)
+            standing = self._store.state(request.name)
             if request.old is not None:
                 old = _recipe(self._store.revision(request.name, request.old))
             elif standing.control is not None:
                 old = standing.control.recipe
             else:
                 raise BadInputError(f"recipe {request.name}: none of its revisions is approved; name one")
-            new = self._store.good_file(request.name).recipe
+            new = self._store.valid_file(request.name).recipe
             if request.new is not None:
                 new = _recipe(self._store.revision(request.name, request.new))
             return Changes(changes=_changes(old, new))
@@ -167,7 +166,7 @@ class PanelRecipes:
 
         def save() -> None:
             person = _person(request.actor, request.reason)
-            waiting = self._store.standing(request.name).submitted
+            waiting = self._store.state(request.name).submitted
             if waiting is not None and waiting.author != person.who:
                 raise ConflictError(
                     f"recipe {request.name}: revision {waiting.revision} of {waiting.author} waits for approval; let "
@@ -189,7 +188,7 @@ class PanelRecipes:
         return await self._change(request.name, lambda: self._store.approve(request.name, person, request.revision))
 
     async def reject(self, request: RejectRecipe) -> RecipeRow:
-        """Retire a draft; nothing else can be retired by this."""
+        """Retire a draft; no other revision can be retired here."""
 
         def reject() -> None:
             status = self._store.revision(request.name, request.revision).status
@@ -208,7 +207,7 @@ class PanelRecipes:
         return await self._change(request.name, lambda: self._editor.revert(request.name, person, request.revision))
 
     async def export(self, request: ExportRecipe) -> RecipeText:
-        """A recipe's text, to be imported again."""
+        """Return a recipe's text, to be imported again."""
         return RecipeText(text=await self._worker.do(lambda: self._editor.export_text(request.name, request.revision)))
 
     async def import_text(self, request: ImportRecipe) -> RecipeRow:
@@ -218,10 +217,10 @@ class PanelRecipes:
         return _row(standing)
 
     async def past_curves(self, request: GetPastCurves) -> PastCurves:
-        """The last judged curves of a recipe's fruit."""
+        """Return the last judged curves of a recipe's fruit."""
 
         def read() -> PastCurves:
-            recipe = self._store.good_file(request.name).recipe
+            recipe = self._store.valid_file(request.name).recipe
             with reading(self._records) as connection:
                 ask = plain(connection).execute
                 judged = ask(_JUDGED, (request.name, request.limit)).fetchall()
@@ -243,7 +242,7 @@ class PanelRecipes:
 
         def write() -> None:
             try:
-                draft.write_text(self._store.good_file(request.name).text, encoding="utf-8")
+                draft.write_text(self._store.valid_file(request.name).text, encoding="utf-8")
             except OSError as error:
                 raise StationError(f"{draft}: {(error.strerror or str(error)).lower()}; free space") from error
 
@@ -255,12 +254,12 @@ class PanelRecipes:
     async def _change(self, name: str, work: Callable[[], object]) -> RecipeRow:
         def change() -> RecipeRow:
             work()
-            return _row(self._store.standing(name))
+            return _row(self._store.state(name))
 
         return await self._worker.do(change)
 
 
-def _row(standing: Standing) -> RecipeRow:
+def _row(standing: RecipeState) -> RecipeRow:
     control, file, waiting = standing.control, standing.file, standing.submitted
     known = control.recipe if control else file.recipe if file else None
     return RecipeRow(
@@ -308,10 +307,12 @@ def _recipe(revision: Revision) -> Recipe:
 
 
 def _changes(old: Recipe, new: Recipe) -> tuple[Change, ...]:
-    return tuple(Change(path=each.path, old=_shown(each.old), new=_shown(each.new)) for each in differences(old, new))
+    return tuple(
+        Change(path=each.path, old=_value_text(each.old), new=_value_text(each.new)) for each in differences(old, new)
+    )
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     return shortened(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False), _LONGEST_VALUE)
 
 

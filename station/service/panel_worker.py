@@ -1,4 +1,4 @@
-"""One thread for what the pages ask: neither disk nor pictures hold the cycle up, and pages take one core at most."""
+"""Worker thread for page requests: disk and pictures do not delay the cycle, and pages use at most one core."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,24 +14,24 @@ MOST_WAITING = 32
 
 
 class PanelBusyError(StationError):
-    """Too much is asked for at once, or it takes too long."""
+    """Too many requests at once, or one takes too long."""
 
 
 class PanelWorker:
-    """Answers one question after the other. Close it at the end."""
+    """Runs one request after the other. Close it at the end."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "panel")
         self._waiting = 0
 
     async def do(self, work: Callable[[], T]) -> T:
-        """Have something done in the thread.
+        """Run a function in the thread.
 
         Args:
-            work: blocks, for a moment.
+            work: may block, for a moment.
 
         Raises:
-            PanelBusyError: it is not begun, or its end is not waited for; what is begun still comes to its end.
+            PanelBusyError: it is not started, or its end is not waited for; a started one runs to its end.
             StationError: as the work raises it.
         """
         if self._waiting >= MOST_WAITING:
@@ -49,5 +49,5 @@ class PanelWorker:
         self._waiting -= 1
 
     def close(self) -> None:
-        """End the thread, after what it is doing. Blocks so long."""
+        """End the thread after the work under way. Blocks until then."""
         self._thread.shutdown(cancel_futures=True)

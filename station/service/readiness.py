@@ -1,13 +1,13 @@
-"""Whether a trigger would be accepted now, and else why not: one sentence with the remedy."""
+"""Readiness for a trigger, or the reason against it: one sentence with the remedy."""
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipes
+from station.service.device_manager import DeviceManager
 from station.service.health import Dependency, Liveness, Readiness
-from station.service.lot import LotKeeper
-from station.service.orders import Orders
-from station.service.recipe_book import RecipeBook
+from station.service.lot_manager import LotManager
+from station.service.plc_commands import PlcCommands
 from station.service.service import Service
 from station.vocabulary import PackmlState, Refusal
 
@@ -15,39 +15,36 @@ PRODUCTION = 1
 _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 
-class Gate:
-    """Looks at everything that a trigger needs.
+class Interlock:
+    """Interlock: checks everything that a trigger needs.
 
     Args:
         boot: this start of the station.
-        service: the cycle.
-        crew: the devices.
-        orders: the mode, and a recipe's change under way.
-        book: the recipes there are.
-        lots: why a lot could not begin.
-        liveness: what has to make progress.
-        calibrated: whether the sensor is calibrated, and verified where that is demanded.
+        plc_commands: the mode, and a recipe change under way.
+        lots: why a lot cannot begin.
+        liveness: the progress of tasks.
+        calibrated: whether the sensor is calibrated, and verified where the site requires it.
     """
 
     def __init__(
         self,
         boot: str,
         service: Service,
-        crew: Crew,
-        orders: Orders,
-        book: RecipeBook,
-        lots: LotKeeper,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        recipes: ActiveRecipes,
+        lots: LotManager,
         liveness: Liveness,
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._boot, self._lots, self._calibrated = boot, lots, calibrated
-        self._service, self._crew, self._orders = service, crew, orders
-        self._book, self._liveness = book, liveness
+        self._service, self._devices, self._plc_commands = service, devices, plc_commands
+        self._recipes, self._liveness = recipes, liveness
 
     def refusal(self) -> tuple[Refusal | None, str]:
-        """Why no trigger is accepted, for the PLC and for a person; None and nothing where one is."""
+        """Return why no trigger is accepted, for the PLC and for a person; None and empty if one is."""
         service, facts = self._service, STATES[self._service.state]
-        if service.stop_asked:
+        if service.stop_requested:
             return Refusal.NOT_READY, "The station is told to end; start it again."
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.sentence
@@ -60,20 +57,20 @@ class Gate:
         if stuck := self._liveness.stuck():
             names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
             return Refusal.NOT_READY, f"No progress of {names}: restart the station if it stays."
-        if self._orders.recipe_changing:
+        if self._plc_commands.recipe_changing:
             return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
         if service.active is None:
-            numbers = ", ".join(map(str, self._book.numbers)) or "none: see `station recipes check`"
+            numbers = ", ".join(map(str, self._recipes.numbers)) or "none: see `station recipes check`"
             why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
             return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
         if why := self._calibrated.refusal():
             return Refusal.NOT_READY, why
-        if self._orders.mode != PRODUCTION:
+        if self._plc_commands.mode != PRODUCTION:
             return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
         return None, ""
 
     def state(self) -> StationState:
-        """The whole state, as the PLC interface gets it with every beat."""
+        """Return the whole state, as the PLC interface gets it with every beat."""
         service = self._service
         refusal, why = self.refusal()
         snapshot = None if service.active is None else service.active.snapshot
@@ -83,22 +80,22 @@ class Gate:
             ready=refusal is None,
             why_not_ready=why,
             packml_state=self._packml(),
-            mode=self._orders.mode,
+            mode=self._plc_commands.mode,
             recipe_number=0 if snapshot is None else snapshot.number,
             recipe_checksum=0 if snapshot is None else snapshot.checksum,
             error_code=service.alarms.alarms.error_code,
             alarms=service.alarms.alarms.word,
-            simulated=self._crew.simulated,
-            registers_wanted=self._orders.registers_wanted,
+            simulated=self._devices.simulated,
+            registers_wanted=self._plc_commands.registers_wanted,
         )
 
     def _packml(self) -> PackmlState | None:
-        """The state's own; on the way to an end that was asked for it is stopping, whatever is still done."""
+        """Return the state's own; while an orderly end is under way it is stopping, whatever still runs."""
         facts = STATES[self._service.state]
-        return PackmlState.STOPPING if self._service.stop_asked and not facts.may_exit else facts.packml
+        return PackmlState.STOPPING if self._service.stop_requested and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
-        """The same for supervisors, with every dependency's age."""
+        """Return the same for supervisors, with every dependency's age."""
         refusal, why = self.refusal()
         devices = [
             Dependency(
@@ -108,28 +105,31 @@ class Gate:
                 "" if watch.fault is None else str(watch.fault),
                 "" if watch.fault is None else "see the detail, and `station devices check`",
             )
-            for name, watch in self._crew.watches.items()
+            for name, watch in self._devices.monitors.items()
         ]
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
     def _records(self) -> Dependency:
-        fault, status = self._service.ledger.fault, self._service.ledger.records.status()
+        fault, status = self._service.registry.fault, self._service.registry.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
         return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
 
     def _line(self) -> Dependency:
-        age_s = self._orders.line_age_s
+        age_s = self._plc_commands.line_age_s
         if age_s is None:
             return Dependency(
                 "plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run"
             )
-        if trouble := self._orders.line_trouble():
+        if trouble := self._plc_commands.line_fault():
             return Dependency("plc", "fault", age_s, trouble, "see the detail")
         return Dependency("plc", "ok", age_s)
 
     def _trouble(self) -> str:
         if self._service.state not in _DEVICES_DECIDE:
             return ""
-        faults = [*self._crew.faults.values(), *([self._service.ledger.fault] if self._service.ledger.fault else [])]
+        faults = [
+            *self._devices.faults.values(),
+            *([self._service.registry.fault] if self._service.registry.fault else []),
+        ]
         return str(faults[0]) if faults else ""

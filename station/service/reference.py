@@ -1,4 +1,4 @@
-"""Whether a picture of the untouched gel may serve as the reference that everything is measured against."""
+"""Reference check: whether a picture of the untouched gel may be the reference of a measurement."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,24 +10,24 @@ import numpy as np
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.service.keeping import Kept
+from station.service.state_files import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Flag, Method
 from station.vision.methods import make_method
 
 _DETAIL_PX = (5.0, 15.0)
-"""Between these two blurs lies what a lens shows and fog hides: structure of the light, above the pixels' noise."""
+"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
 _SATURATED_LEVEL = 250
 GOLDEN = "golden_reference.png"
 
 
 ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
-"""What a reference is refused with."""
+"""Alarms that a refused reference raises."""
 
 
 class BadReferenceError(StationError):
-    """The picture cannot be a reference; the message says why and what to do."""
+    """The picture cannot be a reference; the message gives the reason and the remedy."""
 
     def __init__(self, alarm: AlarmId, text: str) -> None:
         super().__init__(text)
@@ -35,47 +35,47 @@ class BadReferenceError(StationError):
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
-    """What a reference looks like."""
+class ReferenceProperties:
+    """Properties of a reference."""
 
     sharpness: float
     """Root mean square of its detail, grey levels."""
     saturated_share: float
     drift_levels: float
-    """Root mean square of the light's change since the golden reference; 0 where there is none yet."""
+    """Root mean square of the light's change since the golden reference; 0 if there is none yet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prepared:
-    """A golden reference that others are compared with."""
+class PreparedReference:
+    """A golden reference, prepared for comparisons."""
 
     shape: tuple[int, ...]
     sharpness: float
     method: Method
     renewal: str
-    """How a person gets another one."""
+    """Instruction to make another one."""
 
 
-class Golden:
-    """The golden reference: the gel as it was when a person last saw that it was clean, kept in the home folder.
+class GoldenReference:
+    """Golden reference: the gel when a person last checked that it was clean, stored in the home folder.
 
-    A calibrated sensor's is its calibration's. Else the first reference that is taken becomes it; after a change of
-    gel, or once dirt was wiped off, its file is removed by a person and the next reference takes its place.
+    For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
+    the gel or its cleaning, a person removes the file and the next reference replaces it.
 
     Args:
-        kept: the home folder.
-        calibrated: tells the file of the calibration's; None where there is none.
+        state_files: state files of the home folder.
+        calibrated: returns the calibration's file; None if there is none.
     """
 
-    def __init__(self, kept: Kept, calibrated: Callable[[], Path | None] = lambda: None) -> None:
-        self._kept, self._calibrated = kept, calibrated
-        self._prepared: tuple[bytes, Segmentation, Prepared] | None = None
+    def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+        self._state_files, self._calibrated = state_files, calibrated
+        self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
 
-    def prepared(self, segmentation: Segmentation) -> Prepared | None:
-        """The golden reference, ready to be compared with; None where there is none that can be read.
+    def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
+        """Return the golden reference, prepared for comparisons; None if there is none that can be read.
 
         Args:
-            segmentation: the recipe's method, which looks for a contact between it and another reference.
+            segmentation: of the recipe; finds a contact between the golden and another reference.
         """
         data, renewal = self._read()
         if data is None:
@@ -88,37 +88,37 @@ class Golden:
             self._prepared = (
                 data,
                 segmentation,
-                Prepared(image.shape, sharpness(image), make_method([image], segmentation), renewal),
+                PreparedReference(image.shape, sharpness(image), make_method([image], segmentation), renewal),
             )
         return self._prepared[2]
 
-    def keep_first(self, image: Image) -> None:
-        """Make a picture the golden reference where there is none yet.
+    def store_first(self, image: Image) -> None:
+        """Store a picture as the golden reference if there is none yet.
 
         Args:
             image: shape (height, width, 3), dtype uint8, BGR.
         """
         if self._read()[0] is None:
-            self._kept.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+            self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
 
     def _read(self) -> tuple[bytes | None, str]:
-        """Its file's content, and how a person gets another one."""
+        """Return its file's content, and the instruction to make another one."""
         calibrated = self._calibrated()
-        if calibrated is not None and (data := self._kept.read(str(calibrated))) is not None:
+        if calibrated is not None and (data := self._state_files.read(str(calibrated))) is not None:
             return data, "calibrate"
-        return self._kept.read(GOLDEN), f"remove {GOLDEN} from the home folder"
+        return self._state_files.read(GOLDEN), f"remove {GOLDEN} from the home folder"
 
 
-def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) -> Looks:
-    """Judge what is to be a reference.
+def check_reference(image: Image, golden: PreparedReference | None, settings: ReferenceSettings) -> ReferenceProperties:
+    """Check a candidate reference.
 
     Args:
         image: the median of frames taken with nothing touching the gel, shape (height, width, 3), dtype uint8.
-        golden: the golden reference; None where there is none yet.
-        settings: what is good enough.
+        golden: None if there is none yet.
+        settings: limits for a good reference.
 
     Raises:
-        BadReferenceError: it cannot serve.
+        BadReferenceError: it is not good enough.
     """
     saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
     if saturated > settings.saturated_share:
@@ -129,7 +129,7 @@ def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) 
         )
     detail = sharpness(image)
     if golden is None or golden.shape != image.shape:
-        return Looks(detail, saturated, 0.0)
+        return ReferenceProperties(detail, saturated, 0.0)
     contact = golden.method.measure(image)
     drift = contact.drift_levels or 0.0
     share = detail / golden.sharpness
@@ -151,11 +151,11 @@ def examine(image: Image, golden: Prepared | None, settings: ReferenceSettings) 
             "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
             f"gel; if the gel was changed, {golden.renewal}",
         )
-    return Looks(detail, saturated, drift)
+    return ReferenceProperties(detail, saturated, drift)
 
 
 def sharpness(image: Image) -> float:
-    """Root mean square of the detail between two scales, grey levels.
+    """Return the root mean square of the detail between two scales, grey levels.
 
     Args:
         image: shape (height, width, 3), dtype uint8.

@@ -1,4 +1,4 @@
-"""The station's service: carries the cycle's actions out, and answers whoever asks for inspections."""
+"""Inspection service: carries out the cycle's actions, and answers requests for inspections."""
 
 import asyncio
 import contextlib
@@ -14,19 +14,19 @@ from station.inspection.states import STATES, State
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
-from station.service.alarm_desk import AlarmDesk
-from station.service.calibrated import Calibrated
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipe
+from station.service.alarm_manager import AlarmManager
 from station.service.conductor import Conductor, Happened, Work, event_of
-from station.service.crew import Crew
+from station.service.device_manager import DeviceManager
 from station.service.health import Liveness
 from station.service.inspection import Inspection, utc_ms
+from station.service.inspection_registry import InspectionRegistry
 from station.service.inspector import Inspector
-from station.service.ledger import Ledger
 from station.service.metrics import Metrics
-from station.service.outcome_watch import OutcomeWatch
+from station.service.outcome_monitor import OutcomeMonitor
 from station.service.pacing import RECORD_NO_RESULT_S, Pacing, late_now
-from station.service.recipe_book import Active
-from station.service.triggers import Pending, Triggers
+from station.service.recent_triggers import PendingTrigger, RecentTriggers
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
 
@@ -35,75 +35,72 @@ _LEASE_S = 2.0
 
 
 class Service:
-    """The cycle's performer, and the line's side of it.
+    """Performer of the cycle, and server of the line's requests.
 
     Args:
-        configuration: the site's.
-        records: opened.
-        crew: the devices; told of inspections.
+        devices: the devices; gets the start and end of inspections.
         inspector: carries out what needs the devices.
-        alarms: the desk.
-        metrics: counts.
-        liveness: fed with the cycle's progress.
+        alarms: raised and cleared by the cycle.
+        liveness: gets the cycle's progress.
         versions: of the programs, for the records.
-        calibrated: the scale that areas are told by.
+        calibrated: the scale that areas are reported in.
     """
 
     def __init__(
         self,
         configuration: Configuration,
         records: Records,
-        crew: Crew,
+        devices: DeviceManager,
         inspector: Inspector,
-        alarms: AlarmDesk,
+        alarms: AlarmManager,
         metrics: Metrics,
         liveness: Liveness,
         versions: Mapping[str, str],
-        calibrated: Calibrated,
+        calibrated: ActiveCalibration,
     ) -> None:
         self._settings, self._calibrated = configuration.service, calibrated
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
-        self._crew, self._inspector = crew, inspector
+        self._devices, self._inspector = devices, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
         self.conductor = Conductor(self)
-        self.triggers = Triggers()
-        self.ledger = Ledger(records, self.triggers, crew, versions)
-        self.pacing = Pacing(configuration, crew.cell)
-        self.active: Active | None = None
+        self.triggers = RecentTriggers()
+        self.registry = InspectionRegistry(records, self.triggers, devices, versions)
+        self.pacing = Pacing(configuration, devices.cell)
+        self.active: ActiveRecipe | None = None
         """The recipe that the next fruit is inspected with."""
         self.reset_wanted = self._settings.automatic_reset
         """Whether a stopped station makes itself ready."""
-        self.stop_asked = False
-        """The process is told to end."""
+        self.stop_requested = False
+        """The end of the process was requested."""
         self.stop_wanted = False
         """A person has stopped the station, until the next reset."""
         self.on_published: Callable[[Outcome], None] = lambda _: None
-        """Told of what the PLC was told, once."""
-        self._pending: Pending | None = None
+        """Called once with every outcome that the PLC was given."""
+        self._pending: PendingTrigger | None = None
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
         self._background: set[asyncio.Task[None]] = set()
-        self._told_late: State | None = None
-        self._outcomes = OutcomeWatch(alarms)
+        self._late_in: State | None = None
+        self._outcomes = OutcomeMonitor(alarms)
 
     @property
     def state(self) -> State:
-        """Where the cycle is."""
+        """Return the cycle's state."""
         return self.conductor.state
 
-    # What the line asks.
+    # Requests of the line.
 
     async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> BeginReply:
-        """Begin an inspection, or say why not. The same request again, before its outcome was told, begins none.
+        """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
 
         Args:
             request: the trigger.
             refusal: why none may begin now.
-            lot: that the fruit belongs to.
+            lot: of the fruit.
         """
         async with self._beginning:
             if (same := self.triggers.repeated(request)) is not None:
-                return self._begun(same)
+                return self._accepted(same)
             if refusal is not None or self.active is None:
                 return self._refused(refusal or Refusal.NOT_READY)
             trigger = Trigger(
@@ -112,39 +109,39 @@ class Service:
                 lot,
                 utc_ms(),
                 self.active.snapshot,
-                self._crew.simulated,
+                self._devices.simulated,
                 request.fruit_length_mm_x10,
                 request.size_class,
             )
             limits = self.pacing.limits(self.active.recipe)
             now = Inspection(trigger, self.active, limits, *self._calibrated.in_force, self._resolution_mm)
-            self._pending = Pending(request, now)
+            self._pending = PendingTrigger(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()
 
     async def published(self, outcome: Outcome) -> None:
-        """Note durably what the PLC was told, and count it, once; a fruit that is still inspected is called off by it.
+        """Store that the PLC was given an outcome, and count it, once; a fruit still under inspection is cancelled.
 
         Args:
-            outcome: what stands from now on.
+            outcome: the final one.
         """
-        first = await self.ledger.records.published(outcome)
+        first = await self.registry.records.published(outcome)
         self.triggers.published(outcome)
         if first:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
             self._metrics.inspection(fruit, outcome, *known)
-            self._outcomes.saw(outcome)
+            self._outcomes.add(outcome)
             self.on_published(outcome)
-        running = self.ledger.running
+        running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
 
-    # What the cycle asks: see `Performer`.
+    # Actions of the cycle: see `Performer`.
 
     def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
-        """Carry an action of the cycle out."""
+        """Carry out an action of the cycle."""
         match action:
             case Action.OPEN_JAWS:
                 return self._inspector.open_jaws
@@ -153,7 +150,7 @@ class Service:
             case Action.CHECK_DEVICES:
                 return self._check
             case Action.CLOSE_UNFINISHED:
-                return self.ledger.close_unfinished
+                return self.registry.close_unfinished
             case Action.RECOVER_ARM:
                 return self._recover_arm
             case Action.RECORD_TRIGGER:
@@ -164,7 +161,7 @@ class Service:
             case Action.REFUSE_TRIGGER:
                 self._refuse(because)
                 return None
-            case Action.READ_DEVICES:  # the watches read for ever, and `tick` tells when all are well
+            case Action.READ_DEVICES:  # the monitors read for ever, and `tick` posts the event when all are healthy
                 return None
             case _:
                 pass
@@ -176,9 +173,9 @@ class Service:
                 self._inspector.close_as_no_result(now, because.event, because.why)
                 return None
             case Action.RECORD:
-                return partial(self.ledger.conclude, now)
+                return partial(self.registry.conclude, now)
             case Action.PUBLISH:
-                self.ledger.tell(now)
+                self.registry.deliver(now)
                 return None
             case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
                 return partial(self._inspector.place, now)
@@ -187,52 +184,52 @@ class Service:
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
-        await self._crew.halt()
+        await self._devices.halt()
 
     def raise_alarm(self, told: Raise, why: str) -> None:
-        """Raise an alarm of the cycle's."""
+        """Raise an alarm of the cycle."""
         self.alarms.raise_(told.alarm, why)
 
     def failed(self, fault: StationError) -> None:
-        """Let the device's watch know before the cycle asks how the devices do."""
-        self._crew.failed(fault)
+        """Report a fault to the device's monitor before the cycle reads the devices' state."""
+        self._devices.report_fault(fault)
 
     def refused(self, state: State, event: Event) -> None:
-        """Count what the table does not list; a trigger among it is answered."""
+        """Count an event that the table does not list; a trigger among them is answered."""
         self._metrics.unexpected()
         if event is Event.TRIGGER and self._pending is not None and not self._pending.is_answered:
             self._pending.answer(self._refused(STATES[state].refusal or Refusal.NOT_READY))
 
     def entered(self, state: State, after: State, took_s: float) -> None:
-        """Keep the phases' times, and what hangs on a state."""
-        self._told_late = None
+        """Store the phase's time, and do what depends on the new state."""
+        self._late_in = None
         if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
-        self._crew.use(by_inspection=inspecting_now)
+        self._devices.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
             self.reset_wanted = False
         if state is State.IDLE:
             self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
-        if state is State.STOPPED and self.reset_wanted and not (self.stop_asked or self.stop_wanted):
+        if state is State.STOPPED and self.reset_wanted and not (self.stop_requested or self.stop_wanted):
             self.conductor.post(Event.RESET)
 
     def tick(self) -> None:
-        """Feed the watchdogs, and tell the cycle what time alone brings."""
+        """Feed the watchdogs, and give the cycle the events of elapsed time."""
         self._liveness.progress(CYCLE)
         if not self._liveness.stuck():
-            self._crew.renew_health(_LEASE_S)
-        self._tell_late()
-        if self.stop_asked and self.state in {State.IDLE, *UNJUDGED} and self._told_late is None:
-            self._told_late = self.state
+            self._devices.renew_health(_LEASE_S)
+        self._report_late()
+        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+            self._late_in = self.state
             self.conductor.post(Event.STOP, "the station is told to end")
 
     def device_changed(self, fault: StationError | None) -> None:
-        """A watch has found a device to be otherwise than before.
+        """Handle a monitor's report that a device's state has changed.
 
         Args:
-            fault: what is wrong from now on, None for nothing.
+            fault: from now on; None for no fault.
         """
         if fault is not None:
             self.conductor.post(event_of(fault), str(fault))
@@ -240,15 +237,15 @@ class Service:
     # The actions.
 
     async def _check(self) -> Event:
-        if self.stop_asked or self.stop_wanted:
+        if self.stop_requested or self.stop_wanted:
             return Event.STOP
-        for fault in (*self._crew.faults.values(), self.ledger.fault):
+        for fault in (*self._devices.faults.values(), self.registry.fault):
             if fault is not None:
                 raise fault
         return Event.READY
 
     async def _recover_arm(self) -> Event:
-        await self._crew.play_again()
+        await self._devices.restart_program()
         return Event.RECOVERED
 
     async def _record_trigger(self) -> Event | None:
@@ -256,7 +253,7 @@ class Service:
         if pending is None:
             raise RuntimeError("no trigger is waiting")
         try:
-            await self.ledger.begin(pending)
+            await self.registry.begin(pending)
         except RecordsError:
             pending.answer(self._refused(Refusal.RECORDS_FULL))
             raise
@@ -270,7 +267,7 @@ class Service:
         self._take_on(pending)
 
     def _refuse(self, because: Happened) -> None:
-        """Nothing comes of the trigger: refused where it is not durable yet, else accepted and closed."""
+        """End a trigger without an inspection: refused if it is not durable yet, else accepted and closed."""
         pending, self._pending = self._pending, None
         if pending is None:
             return
@@ -287,16 +284,16 @@ class Service:
         self._background.add(closing)
         closing.add_done_callback(self._background.discard)
 
-    def _take_on(self, pending: Pending) -> None:
+    def _take_on(self, pending: PendingTrigger) -> None:
         now = pending.inspection
         now.accepted_s = time.monotonic()
         self.triggers.accepted(pending.request, now)
-        self.ledger.accepted(now)
-        pending.answer(self._begun(now))
+        self.registry.accepted(now)
+        pending.answer(self._accepted(now))
 
     # Small parts.
 
-    def _begun(self, now: Inspection) -> BeginReply:
+    def _accepted(self, now: Inspection) -> BeginReply:
         left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
         if now.accepted_s is not None:
             left_s -= time.monotonic() - now.accepted_s
@@ -306,16 +303,16 @@ class Service:
         self._metrics.refused(refusal)
         return BeginReply(refusal=refusal)
 
-    def _tell_late(self) -> None:
-        if self._now is None or self._told_late is self.state:
+    def _report_late(self) -> None:
+        if self._now is None or self._late_in is self.state:
             return
         found = late_now(self._now, self.state, self.conductor.in_state_s)
         if found is not None:
-            self._told_late = self.state
+            self._late_in = self.state
             what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
             why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
             self.conductor.post(found.event, why)
 
     async def _close_refused(self) -> None:
-        with contextlib.suppress(RecordsError):  # which the ledger keeps, and the next clearing tries again
-            await self.ledger.close_unfinished()
+        with contextlib.suppress(RecordsError):  # the registry still has it, and the next clearing tries again
+            await self.registry.close_unfinished()

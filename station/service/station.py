@@ -1,4 +1,4 @@
-"""The station's process: everything put together, begun and ended in order."""
+"""Station process: makes all parts, starts them, and ends them in order."""
 
 import asyncio
 import contextlib
@@ -12,31 +12,31 @@ from pathlib import Path
 from station.channel.server import ChannelServer
 from station.errors import StationError
 from station.inspection.states import STATES
-from station.outbox.lag import Lag
+from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
 from station.records.records import Records
-from station.service.alarm_desk import AlarmDesk
-from station.service.alarm_orders import AlarmOrders
-from station.service.calibrated import Calibrated
-from station.service.crew import Crew
-from station.service.eye import Eye
+from station.service.active_calibration import ActiveCalibration
+from station.service.active_recipes import ActiveRecipes
+from station.service.alarm_commands import AlarmCommands
+from station.service.alarm_manager import AlarmManager
+from station.service.audit_logger import FLUSH_S, AuditLogger
+from station.service.device_manager import DeviceManager
 from station.service.health import HealthServer, Liveness
+from station.service.housekeeping import UPKEEP, Housekeeping
 from station.service.inspector import Inspector
-from station.service.keeping import Kept
-from station.service.line_server import LineServer
-from station.service.lot import LotKeeper
+from station.service.lot_manager import LotManager
 from station.service.metrics import Metrics
-from station.service.orders import Orders
-from station.service.panel import Panel
-from station.service.panel_rooms import PanelRooms
-from station.service.readiness import Gate
-from station.service.recipe_book import RecipeBook
-from station.service.reference import Golden
+from station.service.panel_pages import PanelPages
+from station.service.panel_server import PanelServer
+from station.service.plc_commands import PlcCommands
+from station.service.plc_interface_server import PlcInterfaceServer
+from station.service.readiness import Interlock
+from station.service.reference import GoldenReference
 from station.service.service import CYCLE, Service
-from station.service.starting import ended, started
-from station.service.trail import FLUSH_S, Trail
-from station.service.upkeep import UPKEEP, Upkeep
+from station.service.startup_audit import end_entry, start_entries
+from station.service.state_files import StateFiles
+from station.service.vision_worker import VisionWorker
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
@@ -53,7 +53,7 @@ class Station:
 
     Args:
         configuration: the site's, or its last good form.
-        broken: what was wrong with the configuration's files; empty for nothing.
+        broken: the error of the configuration's files; empty for none.
     """
 
     def __init__(self, configuration: Configuration, broken: str = "") -> None:
@@ -62,138 +62,140 @@ class Station:
         self._stop = asyncio.Event()
         self.service: Service | None = None
         """The cycle, once `run` has put it together."""
-        self.book: RecipeBook | None = None
+        self.recipes: ActiveRecipes | None = None
         """The recipes in force, likewise."""
 
     def stop(self) -> None:
-        """Ask for an orderly end; asking again changes nothing."""
+        """Request an orderly end; a second call changes nothing."""
         self._stop.set()
 
     async def run(self, on_started: Callable[[int], None]) -> None:
-        """Run until `stop` is called; by then the running inspection has its outcome and the jaws are open.
+        """Run until `stop` is called; then the running inspection gets its outcome and the jaws open before it returns.
 
         Args:
-            on_started: told the port of metrics and health once all is served. Devices may still be away.
+            on_started: gets the port of metrics and health once everything is served. Devices may still be away.
 
         Raises:
-            StationError: the station cannot even begin: an address is in use.
+            StationError: the station cannot start: an address is in use.
         """
         async with contextlib.AsyncExitStack() as stack:
-            tasks, port = await self._put_together(stack)
+            tasks, port = await self._build(stack)
             on_started(port)
             notify("READY=1")
-            await self._until_asked(tasks)
+            await self._until_stop(tasks)
             await self._end()
 
-    async def _put_together(self, stack: contextlib.AsyncExitStack) -> tuple[tuple[asyncio.Task[None], ...], int]:
+    async def _build(self, stack: contextlib.AsyncExitStack) -> tuple[tuple[asyncio.Task[None], ...], int]:
         configuration, settings = self._configuration, self._configuration.service
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
-        kept, alarms = Kept(configuration.home), AlarmDesk(metrics)
-        calibrated = Calibrated(configuration, lambda: crew.cell.camera.description.serial)
-        eye = Eye(Golden(kept, calibrated.golden), settings.reference)
+        kept, alarms = StateFiles(configuration.home), AlarmManager(metrics)
+        calibrated = ActiveCalibration(configuration, lambda: devices.cell.camera.description.serial)
+        eye = VisionWorker(GoldenReference(kept, calibrated.golden), settings.reference)
         stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
-        trail = Trail(records)
-        stack.push_async_callback(self._note_end, trail)
-        _ask_at_each_scrape(metrics, configuration, records, calibrated)
+        audit = AuditLogger(records)
+        stack.push_async_callback(self._note_end, audit)
+        _register_scrapes(metrics, configuration, records, calibrated)
 
         def device_changed(name: str, fault: StationError | None) -> None:
-            alarms.device(name, crew.watches[name].told_fault)
+            alarms.set_device_fault(name, devices.monitors[name].reported_fault)
             service.device_changed(fault)
 
         def progress(name: str) -> None:
             liveness.progress(name)
-            if crew.watches[name].fault is None:
+            if devices.monitors[name].fault is None:
                 metrics.heard(name)
 
-        crew = Crew(configuration, device_changed, progress)
-        inspector = Inspector(crew, eye, settings, configuration.arm, alarms, metrics, calibrated)
+        devices = DeviceManager(configuration, device_changed, progress)
+        inspector = Inspector(devices, eye, settings, configuration.arm, alarms, metrics, calibrated)
         self.service = service = Service(
-            configuration, records, crew, inspector, alarms, metrics, liveness, versions, calibrated
+            configuration, records, devices, inspector, alarms, metrics, liveness, versions, calibrated
         )
         try:
             await records.reopen()
-            await alarms.recall(records)
+            await alarms.restore(records)
         except RecordsError as error:
-            service.ledger.fault = error
-        self.book = book = RecipeBook(configuration.recipes_folder, kept)
+            service.registry.fault = error
+        self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
-        lots = LotKeeper(service, book, trail)
-        await asyncio.to_thread(lots.recall)
-        trail.note(*started(self.boot, configuration, kept, versions, self._broken))
-        orders = Orders(service, crew, book, lots, trail, metrics, kept)
-        orders.recall()
-        gate = Gate(self.boot, service, crew, orders, book, lots, liveness, calibrated)
-        alarm_orders = AlarmOrders(alarms, trail)
-        panel = Panel(gate, service, crew, lots, book, orders, records, alarm_orders, trail, calibrated)
-        upkeep = Upkeep(
+        lots = LotManager(service, book, audit)
+        await asyncio.to_thread(lots.restore)
+        audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
+        orders = PlcCommands(service, devices, book, lots, audit, metrics, kept)
+        orders.restore_stop()
+        interlock = Interlock(self.boot, service, devices, orders, book, lots, liveness, calibrated)
+        alarm_orders = AlarmCommands(alarms, audit)
+        panel = PanelServer(interlock, service, devices, lots, book, orders, records, alarm_orders, audit, calibrated)
+        upkeep = Housekeeping(
             service,
-            crew,
-            gate,
+            devices,
+            interlock,
             orders,
             book,
-            trail,
+            audit,
             metrics,
             liveness,
             calibrated,
-            panel.trouble,
-            Lag(configuration.outbox, configuration.home).trouble,
+            panel.hmi_fault,
+            OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
             broken=self._broken,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,
         )
-        line = LineServer(
-            _made_room_for(line_endpoint(configuration.handshake, configuration.home)),
+        line = PlcInterfaceServer(
+            _with_folder(line_endpoint(configuration.handshake, configuration.home)),
             service,
             orders,
-            gate,
+            interlock,
             lots,
             alarm_orders,
         )
         tasks = [self._begin(stack, line.serve(), "line server")]
-        rooms = PanelRooms(configuration, records, service, crew, orders, gate, liveness, calibrated, trail, versions)
-        await self._serve(stack, panel, rooms)
+        pages = PanelPages(
+            configuration, records, service, devices, orders, interlock, liveness, calibrated, audit, versions
+        )
+        await self._serve(stack, panel, pages)
         health = HealthServer(
-            configuration.metrics.host, configuration.metrics.port, metrics, liveness, gate.readiness, versions
+            configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
         )
         port = await health.start()
         stack.push_async_callback(health.close)
-        await self._open_devices(stack, crew, rooms)
+        await self._open_devices(stack, devices, pages)
         tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
-        self._begin(stack, alarms.keep(records), "alarms' records")
-        self._begin(stack, trail.keep(), "audit trail")
-        self._watch_progress(stack, liveness, (*crew.watches, CYCLE, UPKEEP))
+        self._begin(stack, alarms.store_changes(records), "alarms' records")
+        self._begin(stack, audit.run(), "audit trail")
+        self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, UPKEEP))
         return tuple(tasks), port
 
     @staticmethod
-    async def _open_devices(stack: contextlib.AsyncExitStack, crew: Crew, rooms: PanelRooms) -> None:
-        """What a person moves at the panel ends before the devices are let go."""
-        stack.push_async_callback(crew.close)
-        await stack.enter_async_context(rooms)
-        await crew.open()
+    async def _open_devices(stack: contextlib.AsyncExitStack, devices: DeviceManager, pages: PanelPages) -> None:
+        """Open the devices; manual motions from the panel end before the devices are closed."""
+        stack.push_async_callback(devices.close)
+        await stack.enter_async_context(pages)
+        await devices.open()
 
-    async def _serve(self, stack: contextlib.AsyncExitStack, panel: Panel, rooms: PanelRooms) -> None:
-        await panel.recall()
+    async def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
+        await panel.restore()
         stack.push_async_callback(panel.close)
-        endpoint = _made_room_for(panel_endpoint(self._configuration.hmi, self._configuration.home))
-        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **rooms.handlers}).serve(), "panel server")
+        endpoint = _with_folder(panel_endpoint(self._configuration.hmi, self._configuration.home))
+        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **pages.handlers}).serve(), "panel server")
 
     def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
         for name in names:
             liveness.watch(name, self._configuration.service.progress_s)
         self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
 
-    async def _note_end(self, trail: Trail) -> None:
-        """The trail's last row of this start, as far as it can be written in time."""
-        trail.note(ended(self.boot, asked=self._stop.is_set()))
+    async def _note_end(self, audit: AuditLogger) -> None:
+        """Write the last audit entry of this start, if it can be written in time."""
+        audit.log(end_entry(self.boot, requested=self._stop.is_set()))
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(FLUSH_S):
-                await trail.flush()
+                await audit.flush()
 
-    async def _until_asked(self, needed: tuple[asyncio.Task[None], ...]) -> None:
-        """Wait for the order to end; a task that nothing works without and that ended by a bug ends the process."""
+    async def _until_stop(self, needed: tuple[asyncio.Task[None], ...]) -> None:
+        """Wait for the request to end; a required task that ends by a bug ends the process."""
         asked = asyncio.create_task(self._stop.wait(), name="order to end")
         try:
             done, _ = await asyncio.wait({asked, *needed}, return_when=asyncio.FIRST_COMPLETED)
@@ -205,11 +207,11 @@ class Station:
             await asyncio.gather(asked, return_exceptions=True)
 
     async def _end(self) -> None:
-        """Let the running inspection come to its outcome, the jaws open and the arm go home."""
+        """End the running inspection with its outcome, open the jaws and move the arm home."""
         service = self.service
         if service is None:
             return
-        service.stop_asked = True
+        service.stop_requested = True
         limit_s = self._configuration.service.clean_up_deadline_s
         try:
             async with asyncio.timeout(limit_s):
@@ -229,15 +231,15 @@ class Station:
         return task
 
 
-def _made_room_for(endpoint: str) -> str:
-    """The endpoint, with its folder made where it is a socket file; only this user may reach it there."""
+def _with_folder(endpoint: str) -> str:
+    """Return the endpoint, and make the folder of a socket file; only this user may access it."""
     if endpoint.startswith("ipc://"):
         Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     return endpoint
 
 
-def _ask_at_each_scrape(
-    metrics: Metrics, configuration: Configuration, records: Records, calibrated: Calibrated
+def _register_scrapes(
+    metrics: Metrics, configuration: Configuration, records: Records, calibrated: ActiveCalibration
 ) -> None:
     metrics.watch_calibration(lambda: calibrated.figures)
     metrics.watch_records(records.status)

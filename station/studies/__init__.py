@@ -1,1 +1,1 @@
-"""Experiments on the twin: the one room where the simulated world and the measurement meet, offline."""
+"""Offline experiments: measurement methods on the simulated world; the only package that imports both."""

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 Decisions = npt.NDArray[np.bool_]
-"""Whether the fruit passed; shape (parts, operators, repeats)."""
+"""True for a passed fruit; shape (parts, operators, repeats)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +24,9 @@ class OperatorAgreement:
     repeated: int
     """Parts with the same decision in every repeat."""
     right: int | None
-    """Parts with the right decision in every repeat; None where the truth is not known."""
+    """Parts with the right decision in every repeat; None if the truth is not known."""
     kappa: float | None
-    """With the truth; None where it is not known or either never varies."""
+    """Cohen's kappa against the truth; None if it is not known or either never varies."""
     misses: tuple[int, int] | None
     """Damaged fruit passed, of how many decisions on damaged ones."""
     false_alarms: tuple[int, int] | None
@@ -46,12 +46,12 @@ class Agreement:
 
 
 def agreement(passed: Decisions, operators: Sequence[str], good: npt.NDArray[np.bool_] | None = None) -> Agreement:
-    """Compare decisions with each other, and with the truth where it is known.
+    """Compare decisions with each other, and with the truth if it is known.
 
     Args:
         passed: shape (parts, operators, repeats).
         operators: their names.
-        good: the truth, shape (parts,); None where it is not known.
+        good: the truth, shape (parts,); None if it is not known.
     """
     rows = tuple(_operator(name, passed[:, place], good) for place, name in enumerate(operators))
     between = tuple(

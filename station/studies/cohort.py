@@ -1,4 +1,4 @@
-"""Who is in a study: the paper's fruit, each with a flesh, a skin and a place of its own, and the images of its press.
+"""Cohort of a study: the paper's fruit, each with its own flesh, skin and place, and the images of its press.
 
 Source of all numbers of the paper: Computers and Electronics in Agriculture 235 (2025) 110397.
 """
@@ -20,7 +20,7 @@ RESULT_CLOSINGS_MM: dict[Kind, tuple[float, ...]] = {
     Kind.RASPBERRY: (8.0, 12.0, 16.0),
     Kind.RUBBER_BALL: (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0),
 }
-"""Where the paper shows results; the ball's are its widths from 41 to 35 mm, with the first contact at 42."""
+"""Closings of the paper's results; the ball's are its widths from 41 to 35 mm, with the first contact at 42."""
 PAPER_FAILURES: dict[Kind, int] = {Kind.STRAWBERRY: 6, Kind.BLUEBERRY: 8, Kind.RASPBERRY: 18}
 """Of 30 each: 20.0, 26.7 and 60.0 %, called pronounced fluctuations of the area over closing."""
 FRUITS = tuple(str(kind) for kind in RESULT_CLOSINGS_MM)
@@ -47,7 +47,7 @@ class Member:
     noise_seed: int
 
     def press(self) -> PressSequence:
-        """Draw the images: five of the untouched gel, then one at each closing."""
+        """Render the images: five of the untouched gel, then one at each closing."""
         return render_press(self.fruit, self.noise_seed, self.closings_mm, PressOptions(pose=self.pose, step_s=_STEP_S))
 
 

@@ -1,4 +1,4 @@
-"""When a sample counts as failed, and how sure a share of failures is. The paper gives no definition in numbers."""
+"""Failure definition of a sample, and the interval of a failure rate. The paper gives no definition in numbers."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -18,7 +18,7 @@ DEFINITION = (
 
 
 class Cause(StrEnum):
-    """Why a sample failed."""
+    """Cause of a sample's failure."""
 
     NO_CONTACT = "no_contact"
     FALLING_AREA = "falling_area"
@@ -37,10 +37,10 @@ def failures(
 
     Args:
         closings_mm: true closing of each image, in ascending order.
-        areas: measured, any unit, 0 for none.
+        areas: measured, any unit, 0 for no contact.
         true_areas: in the same unit.
-        result_closings_mm: where results are shown; the nearest image counts.
-        from_mm: leave out the images more than half a step before this closing; all count where None.
+        result_closings_mm: closings of the results; the nearest image counts.
+        from_mm: leave out the images more than half a step before this closing; None: all count.
 
     Returns:
         All causes that apply; empty for a sample that did not fail.
@@ -61,22 +61,17 @@ def failures(
 
 
 def image_at(closings_mm: Sequence[float], result_closings_mm: Sequence[float]) -> list[int]:
-    """The image nearest to each of the results' closings.
-
-    Args:
-        closings_mm: of the images.
-        result_closings_mm: where results are shown.
-    """
+    """Return the image nearest to each of the results' closings."""
     closings = np.asarray(closings_mm, float)
     return [int(np.argmin(np.abs(closings - wanted))) for wanted in result_closings_mm]
 
 
 def interval(count: int, of: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a share, after Clopper and Pearson (Biometrika 26 (1934) 404): never too narrow.
+    """Return the 95 % interval of a share, after Clopper and Pearson (Biometrika 26 (1934) 404): never too narrow.
 
     Args:
-        count: how many have it.
-        of: how many were looked at, at least 1.
+        count: number of cases.
+        of: number of trials, at least 1.
     """
     low = float(betaincinv(count, of - count + 1, 0.025)) if count else 0.0
     high = float(betaincinv(count + 1, of - count, 0.975)) if count < of else 1.0

@@ -1,4 +1,4 @@
-"""The figures of a study, in the manner of the paper's; each takes one study, or two to be seen side by side."""
+"""Figures of a study, in the manner of the paper's; each takes one study, or two to compare."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -21,16 +21,15 @@ from station.vision.press import PressTracker
 _MM2 = MM_PER_PX**2
 _GOOD, _BAD, _TRUTH, _QUIET = "#1f4e79", "#b3261e", "#222222", "#8a8a86"
 _SHOWN = ("image", "amplified", "difference", "denoised", "segmented")
-"""Of a method's stages; where there is an amplified difference it takes the difference's place."""
+"""Stages of a method; an amplified difference, if there is one, replaces the difference."""
 _COLUMNS = 8
 _DPI = 110
 
 
 def press_sheet(study: Study, number: int) -> bytes:
-    """Images of one press: as seen, the difference, denoised and segmented with the true edge (cf. its Fig. 13).
+    """Draw one press's images: original, difference, denoised, and segmented with the true edge (cf. its Fig. 13).
 
     Args:
-        study: whose cohort and method.
         number: of the sample, from 0.
 
     Returns:
@@ -68,7 +67,7 @@ def press_sheet(study: Study, number: int) -> bytes:
 
 
 def one_curve(studies: Sequence[Study], number: int) -> bytes:
-    """Area over closing of one sample beside the truth (cf. its Fig. 14).
+    """Plot area over closing of one sample with the truth (cf. its Fig. 14).
 
     Args:
         studies: one or two of the same cohort.
@@ -91,7 +90,7 @@ def one_curve(studies: Sequence[Study], number: int) -> bytes:
 
 
 def cohort_curves(studies: Sequence[Study]) -> bytes:
-    """Area over closing of all samples: those that did not fail, and those that did (cf. its Figs. 21 to 32).
+    """Plot area over closing of all samples: those that did not fail, and those that did (cf. its Figs. 21 to 32).
 
     Args:
         studies: one or two of the same cohort; a row each.
@@ -128,7 +127,7 @@ def cohort_curves(studies: Sequence[Study]) -> bytes:
 
 
 def areas_at_results(studies: Sequence[Study]) -> bytes:
-    """Measured over true area of every sample at the results' closings.
+    """Plot measured over true area of every sample at the results' closings.
 
     Args:
         studies: one or two of the same cohort; a row each.
@@ -170,7 +169,7 @@ def _scatter(axis: Axes, study: Study, closing_mm: float) -> None:
 
 
 def _dress(axis: Axes, study: Study) -> None:
-    """Labels, the first contact and the results' closings."""
+    """Draw labels, the contact onset and the results' closings."""
     axis.axvline(0, color=_QUIET, linewidth=0.8, linestyle="--")
     if len(study.result_closings_mm) <= 4:
         for closing_mm in study.result_closings_mm:
@@ -187,14 +186,14 @@ def _grid(axis: Axes) -> None:
 
 
 def _spread(closings_mm: Sequence[float]) -> list[int]:
-    """The last image before the contact and seven after it, evenly."""
+    """Return the last image before the contact and seven after it, evenly."""
     touching = [place for place, closing in enumerate(closings_mm) if closing > 0]
     chosen = np.linspace(0, len(touching) - 1, min(_COLUMNS - 1, len(touching))).round().astype(int)
     return [max(0, touching[0] - 1), *(touching[place] for place in chosen)]
 
 
 def _small(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """A picture at a quarter of the sensor's size, in RGB."""
+    """Shrink a picture to a quarter of the sensor's size, in RGB."""
     size = (120, 160)
     small = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
     return np.asarray(cv2.cvtColor(small, cv2.COLOR_GRAY2RGB if small.ndim == 2 else cv2.COLOR_BGR2RGB), np.uint8)
@@ -211,11 +210,10 @@ def _saved(figure: Figure, kind: str) -> bytes:
 
 
 def typical(study: Study, *, failed: bool) -> SampleResult | None:
-    """The sample of median width among those that failed, or did not; None where there is none.
+    """Return the sample of median width among those that failed, or did not; None if there is none.
 
     Args:
-        study: the study.
-        failed: which of the two.
+        failed: choose among the failed ones.
     """
     those = [s for s, causes in zip(study.samples, study.causes, strict=True) if bool(causes) == failed]
     return sorted(those, key=lambda sample: sample.width_mm)[len(those) // 2] if those else None

@@ -1,4 +1,4 @@
-"""The folder of one study: each sample is stored as soon as it is measured, whole or not at all."""
+"""Study folder: each sample is stored atomically as soon as it is measured."""
 
 import contextlib
 import hashlib
@@ -22,11 +22,11 @@ _DRAWN_BY = (
     ),
 )
 _MEASURED_BY = {"paper": ("vision/paper.py", "vision/methods.py"), "robust": ("vision",)}
-"""Below the package: what decides a sample's numbers."""
+"""Code that decides a sample's numbers, relative to the package."""
 
 
 class Identity(BaseModel):
-    """What a study's samples have in common; two that differ in it are never mixed."""
+    """Common properties of a study's samples; samples of different studies are never mixed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -38,11 +38,7 @@ class Identity(BaseModel):
 
 
 def identity_of(task: Task) -> Identity:
-    """The study that a sample belongs to.
-
-    Args:
-        task: any of its samples.
-    """
+    """Return the identity of the study that a sample belongs to."""
     root = Path(station.__file__).parent
     digest = hashlib.sha256(segmentation_of(task.fruit, task.method).model_dump_json().encode())
     for name in (*_DRAWN_BY, *_MEASURED_BY[task.method]):
@@ -56,11 +52,10 @@ class StudyFolder:
     """The folder `DIR` of `station study`."""
 
     def __init__(self, folder: Path, identity: Identity) -> None:
-        """Open the folder of a study, or begin one.
+        """Open or make the folder of a study.
 
         Args:
             folder: an empty or new one, or this study's own.
-            identity: the study's.
 
         Raises:
             BadInputError: it holds something else, is no folder, or cannot be written.
@@ -99,7 +94,7 @@ class StudyFolder:
             raise BadInputError(f"{self.folder}: holds another study ({words}); name a new folder with --out")
 
     def stored(self, number: int) -> SampleResult | None:
-        """Read a sample; None where it is not there or cannot be understood, so that it is measured again.
+        """Read a sample; None if it is missing or cannot be read: it is then measured again.
 
         Args:
             number: of the sample, from 0.
@@ -111,18 +106,15 @@ class StudyFolder:
         return found if found.number == number else None
 
     def store(self, sample: SampleResult) -> None:
-        """Keep a sample.
-
-        Args:
-            sample: as measured.
+        """Store a sample.
 
         Raises:
-            StationError: the disk is full or the folder has become unwritable; nothing half-written stays.
+            StationError: the disk is full or the folder has become unwritable; no half-written file remains.
         """
         self.write(f"samples/{self._place(sample.number).name}", sample.model_dump_json().encode())
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file in one stroke.
+        """Write a file atomically.
 
         Args:
             name: path below the folder.

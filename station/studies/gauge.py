@@ -12,9 +12,9 @@ import numpy.typing as npt
 from scipy.special import fdtrc
 
 POOLED_FROM = 0.25
-"""An interaction whose significance is weaker is pooled with the equipment's."""
+"""An interaction of weaker significance is pooled with the equipment's."""
 SPREAD = 6.0
-"""Standard deviations that a variation spans against the tolerance; 99.73 % of a normal distribution."""
+"""Standard deviations in a variation's span, compared with the tolerance; 99.73 % of a normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Component:
     sigma: float
     """Standard deviation, in the measurement's unit."""
     study_percent: float
-    """Of the total variation; the components' squares add up, not they themselves."""
+    """Of the total variation; the components' squares add up, not the components."""
     contribution_percent: float
     """Of the total variance."""
     tolerance_percent: float | None
@@ -50,19 +50,19 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """What a gauge study says."""
+    """Result of a gauge study."""
 
     sources: tuple[Source, ...]
     pooled: bool
     """The interaction was pooled with the equipment's variation."""
     components: tuple[Component, ...]
-    """Named EV, AV, INT (not where pooled), GRR, PV and TV."""
+    """Named EV, AV, INT (if not pooled), GRR, PV and TV."""
     distinct_categories: int
-    """ndc; at least 5 are asked for."""
+    """ndc; at least 5 are required."""
     tolerance: float | None
 
     def component(self, name: str) -> Component:
-        """One component by its name.
+        """Return one component by its name.
 
         Args:
             name: EV, AV, INT, GRR, PV or TV.
@@ -119,7 +119,7 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
 
 
 def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]:
-    """The analysis of variance, with the interaction pooled where it is not significant."""
+    """Compute the analysis of variance, with the interaction pooled if it is not significant."""
     parts, operators, repeats = table.shape
     mean = table.mean()
     of_parts, of_operators = table.mean(axis=(1, 2)), table.mean(axis=(0, 2))
@@ -148,7 +148,7 @@ def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]
 
 
 def _tested(source: Source, against: Source) -> Source:
-    """A source with its F and significance; without them where there is nothing to compare with."""
+    """Return a source with its F and significance; without them if there is nothing to compare with."""
     if against.mean_square <= 0:
         return source
     f = source.mean_square / against.mean_square

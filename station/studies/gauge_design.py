@@ -1,4 +1,4 @@
-"""A gauge study on the twin: how many of what are measured how often, and what is told of it."""
+"""Gauge study on the twin: its design, and its report."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ _MEASURED = "and the sensor, its light and the method: as measured"
 
 @dataclass(frozen=True, slots=True)
 class TwinDesign:
-    """A gauge study on the twin."""
+    """Design of a gauge study on the twin."""
 
     fruit: str
     parts: int
@@ -36,11 +36,11 @@ class TwinDesign:
     seed: int
     jobs: int
     dummies: bool = False
-    """Balls in a jig in place of the fruit, whose recipe and tolerance stay."""
+    """Balls in a jig instead of the fruit, with the fruit's recipe and tolerance."""
 
     @property
     def tasks(self) -> list[GaugeTask]:
-        """All measurements, in the order of the table."""
+        """Return all measurements, in the order of the table."""
         return [
             GaugeTask(self.fruit, self.seed, part, operator, repeat)
             for part in range(self.parts)
@@ -50,11 +50,10 @@ class TwinDesign:
 
 
 def study_on_twin(design: TwinDesign, tolerance: float | None, on_done: Callable[[], None]) -> GaugeStudy:
-    """Make all measurements and analyse them; the same for any number of processes.
+    """Carry out all measurements and analyse them; the result is the same for any number of processes.
 
     Args:
-        design: which.
-        tolerance: in mm²; None for the difference of true areas between good and damaged fruit.
+        tolerance: in mm²; None: the difference of true areas between good and damaged fruit.
         on_done: called after each measurement.
 
     Raises:

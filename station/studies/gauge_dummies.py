@@ -1,9 +1,9 @@
-"""A gauge study of the gauge alone: firm balls in a jig, pressed down to a stop, in place of fruit.
+"""Gauge study without fruit: firm balls in a jig, pressed down to a stop.
 
-A fruit laid in anew shows another true area, and the gripper's counts meet it at another closing. Neither is the fault
-of what looks at the gel, so both are held as a metrologist would hold them: the jig keeps the ball's place, and a stop
-in it, on which the jaws come to rest, the width. Then an operator's habit and gripper zero change nothing; what is left
-of an operator is the sensor unit. Every repeat takes the ball out and lays it in again.
+A fruit laid in anew shows another true area, and the gripper's counts meet it at another closing. Neither is the
+sensor's fault, so both are fixed as a metrologist would fix them: the jig fixes the ball's place, and a stop in it,
+against which the jaws close, the width. Then an operator's habit and gripper zero change nothing; the only difference
+left between operators is the sensor unit. Every repeat takes the ball out and lays it in again.
 """
 
 from dataclasses import replace
@@ -24,17 +24,16 @@ SMALLEST_MM, LARGEST_MM = 20.0, 38.0
 PLAY_MM, STOP_MM = 0.05, 0.02
 """Standard deviations of the ball's place in the jig and of the width at the stop; our estimates."""
 DUMMY_TRUTHS = ("Jig and stop: true areas at the width as it was",)
-"""What the true areas vary with."""
+"""Causes of variation of the true areas."""
 _MOST_READINGS = 5
 _CLOSINGS_MM = np.arange(0.5, 10.0, 0.5)
 
 
 def ball_of(task: GaugeTask, parts: int) -> Fruit:
-    """The ball; sizes are evenly apart.
+    """Return the ball; sizes are evenly spaced.
 
     Args:
-        task: whose part.
-        parts: how many there are, at least 2.
+        parts: number of balls, at least 2.
     """
     return _ball(SMALLEST_MM + (LARGEST_MM - SMALLEST_MM) * task.part / (parts - 1))
 
@@ -45,10 +44,10 @@ def _ball(across_mm: float) -> Fruit:
 
 @cache
 def stop_mm(fruit: str) -> float:
-    """How far the stop lets each ball be pressed, mm: until the largest shows the recipe's last area limit.
+    """Return the closing at the stop, mm: there the largest ball shows the recipe's last area limit.
 
-    So the areas end where the decision falls. Beyond a strawberry's, a smooth body leaves the gel no background, and
-    the method flags more and more of them.
+    So the areas end at the decision. Beyond a strawberry's area, a smooth ball leaves no background on the gel, and the
+    method flags more and more of them.
 
     Args:
         fruit: the recipe's name.
@@ -59,14 +58,14 @@ def stop_mm(fruit: str) -> float:
 
 
 def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
-    """Press a ball down to its stop and measure that one step as the fruit's recipe does.
+    """Press a ball down to its stop and measure that one step by the fruit's recipe.
 
-    What the method itself flags is no reading: the ball is laid in and pressed again, and the refusals are counted. The
-    fifth is taken as it is; a contact that was not found has 0 mm².
+    A flagged measurement is no reading: the ball is laid in and pressed again, and the refusals are counted. The fifth
+    is accepted in any case; a contact that was not found has 0 mm².
 
     Args:
-        task: which ball, who and how often; its fruit names the recipe.
-        parts: how many balls there are.
+        task: the ball, the operator and the repeat; its fruit names the recipe.
+        parts: number of balls.
 
     Returns:
         The measurement with the truth of `DUMMY_TRUTHS`.

@@ -1,4 +1,4 @@
-"""The plots of a gauge study, as AIAG's MSA has them."""
+"""Plots of a gauge study, as in AIAG's MSA."""
 
 from io import BytesIO
 
@@ -17,10 +17,7 @@ _DPI = 110
 
 
 def components_plot(gauge: Gauge) -> bytes:
-    """Bars of each kind of variation, against the total and the tolerance.
-
-    Args:
-        gauge: as analysed.
+    """Plot bars of each kind of variation, against the total and the tolerance.
 
     Returns:
         A PNG.
@@ -50,10 +47,7 @@ def components_plot(gauge: Gauge) -> bytes:
 
 
 def measurements_plot(table: Crossed) -> bytes:
-    """Every measurement by part, the operators' means by part, and the ranges of the repeats.
-
-    Args:
-        table: the measurements.
+    """Plot every measurement by part, the operators' means by part, and the ranges of the repeats.
 
     Returns:
         A PNG.

@@ -1,4 +1,4 @@
-"""The report of a gauge study that people read: one HTML file with its plots inside."""
+"""Report of a gauge study: one HTML file with its plots inside."""
 
 from station.studies.gauge import Gauge
 from station.studies.gauge_figures import components_plot, measurements_plot
@@ -19,11 +19,7 @@ GOOD, BEARABLE = 10.0, 30.0
 
 
 def verdict(gauge: Gauge) -> tuple[str, str]:
-    """What AIAG says of such a gauge, as a class of the page's style and in words.
-
-    Args:
-        gauge: as analysed.
-    """
+    """Return AIAG's judgement of such a gauge, as a class of the page's style and in words."""
     grr = gauge.component("GRR")
     percent, of = (
         (grr.study_percent, "the total variation")
@@ -38,11 +34,7 @@ def verdict(gauge: Gauge) -> tuple[str, str]:
 
 
 def render(study: GaugeStudy) -> str:
-    """Make an HTML document that needs no network and no other file to be read.
-
-    Args:
-        study: as analysed.
-    """
+    """Make an HTML document that needs no network and no other file."""
     gauge = study.gauge
     agreed = study.agreement
     operators = [] if agreed is None else [
@@ -73,7 +65,7 @@ def render(study: GaugeStudy) -> str:
 
 
 def tolerance_percents(gauge: Gauge) -> list[float]:
-    """EV, AV, INT and GRR in per cent of the tolerance; 0 for an interaction that is pooled.
+    """Return EV, AV, INT and GRR in per cent of the tolerance; 0 for a pooled interaction.
 
     Args:
         gauge: analysed with a tolerance.

@@ -1,4 +1,4 @@
-"""The measurements of a gauge study, and the CSV file that they are read from and written to."""
+"""Measurement table of a gauge study, read from and written to CSV."""
 
 import csv
 import math
@@ -28,30 +28,30 @@ class Measurement(NamedTuple):
     repeat: str
     area_mm2: float
     outcome: str = ""
-    """PASS, FAIL or NO_RESULT; empty where it was not recorded."""
+    """PASS, FAIL or NO_RESULT; empty if it was not recorded."""
     reference: str = ""
-    """PASS for a part known to be good, FAIL for a damaged one; empty where that is not known."""
+    """PASS for a part known to be good, FAIL for a damaged one; empty if unknown."""
 
 
 class Crossed(NamedTuple):
-    """The measurements as a full table."""
+    """Complete crossed table of measurements."""
 
     parts: tuple[str, ...]
     operators: tuple[str, ...]
     areas_mm2: npt.NDArray[np.float64]
     """Shape (parts, operators, repeats)."""
     passed: Decisions | None
-    """Same shape; None where an outcome is missing."""
+    """Same shape; None if an outcome is missing."""
     good: npt.NDArray[np.bool_] | None
-    """Shape (parts,); None where a reference is missing."""
+    """Shape (parts,); None if a reference is missing."""
 
 
 def crossed(measurements: Sequence[Measurement], place: str) -> Crossed:
     """Order measurements by part and operator.
 
     Args:
-        measurements: in any order; repeats keep theirs.
-        place: what a message names as their source.
+        measurements: in any order; repeats keep their order.
+        place: name of their source, for messages.
 
     Raises:
         BadInputError: not every operator measured every part equally often, at least two of each; or a part has two
@@ -98,7 +98,7 @@ def read_measurements(path: Path) -> list[Measurement]:
         path: of the CSV file, UTF-8, with a header.
 
     Raises:
-        BadInputError: it cannot be read, or a line is not what it has to be; the message names the line.
+        BadInputError: it cannot be read, or a line is invalid; the message names the line.
     """
     try:
         if path.stat().st_size > _LARGEST_BYTES:
@@ -156,10 +156,10 @@ def _area(path: Path, line: int, text: str) -> float:
 
 
 def written(measurements: Sequence[Measurement]) -> bytes:
-    """The same file's content.
+    """Return the same file's content.
 
     Args:
-        measurements: in the order in which they are to be written.
+        measurements: in the order of the rows.
     """
     text = StringIO(newline="")
     table = csv.writer(text)

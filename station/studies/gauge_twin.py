@@ -1,7 +1,8 @@
-"""A gauge study on the twin: the same fruit laid in, gripped and judged again and again, as the station does it.
+"""Gauge study with fruit: the same fruit laid in, gripped and judged repeatedly on the twin.
 
-An operator is what differs when somebody else sets the cell up on another day: another sensor unit, another zero of the
-gripper, another habit of laying fruit in, and each fruit laid in anew. A repeat grips the same fruit where it lies.
+An operator represents all that differs when another person sets the cell up on another day: another sensor unit,
+another zero of the gripper, another habit of laying fruit in, and each fruit laid in anew. A repeat grips the same
+fruit in its place.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +29,7 @@ PART_TRUTHS = (
     "Fruit placed again: true areas at the true closing",
     "and the gripper's counts: true areas at the closing as the station counts it",
 )
-"""What the true areas of a measured fruit vary with, each with all before it."""
+"""Causes of variation of a measured fruit's true areas, each together with all before it."""
 
 
 class GaugeTask(NamedTuple):
@@ -42,46 +43,38 @@ class GaugeTask(NamedTuple):
 
     @property
     def names(self) -> tuple[str, str, str]:
-        """Part, operator and repeat as the table has them."""
+        """Return part, operator and repeat as in the table."""
         return f"{self.part + 1}", "ABCDEFGHIJKLMNOPQRSTUVWXYZ"[self.operator], f"{self.repeat + 1}"
 
 
 class Simulated(NamedTuple):
-    """One measurement of the twin's, with what is true of it."""
+    """One measurement on the twin, with the truth."""
 
     measurement: Measurement
     truths_mm2: tuple[float, ...]
-    """True areas, from the least of what varies to the most."""
+    """True areas, from the fewest causes of variation to all."""
     refused: int = 0
-    """Readings before this one that were flagged and made again."""
+    """Number of flagged readings before this one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What one operator brings."""
+    """Properties of one operator."""
 
     unit: int | None
     """Seed of the sensor's light; None for the unit that the optics were fitted on."""
     zero_mm: float
-    """By how much every width is read too large."""
+    """Error of every width reading; positive reads too large."""
     habit: Pose
 
 
 def part_of(task: GaugeTask) -> Fruit:
-    """The fruit: every second one is bruised.
-
-    Args:
-        task: whose part.
-    """
+    """Return the fruit: every second one is bruised."""
     return replace(member(task.fruit, task.seed, task.part).fruit, bruised=task.part % 2 == 1)
 
 
 def setup_of(task: GaugeTask) -> Setup:
-    """What the operator brings; the first has the fitted unit.
-
-    Args:
-        task: whose operator.
-    """
+    """Return the operator's properties; the first has the fitted unit."""
     generator = np.random.default_rng([task.seed, 101, task.operator])
     x_px, y_px = generator.normal(0.0, _HABIT_PX, 2)
     turn_deg = float(generator.normal(0.0, _HABIT_DEG))
@@ -91,11 +84,7 @@ def setup_of(task: GaugeTask) -> Setup:
 
 
 def pose_of(task: GaugeTask) -> Pose:
-    """How the operator laid the part in.
-
-    Args:
-        task: whose part and operator.
-    """
+    """Return the pose in which the operator laid the part."""
     habit = setup_of(task).habit
     generator = np.random.default_rng([task.seed, 102, task.part, task.operator])
     return Pose(
@@ -109,12 +98,12 @@ def pose_of(task: GaugeTask) -> Pose:
 def measure_part(task: GaugeTask) -> Simulated:
     """Grip a part once, by its recipe, and judge it.
 
-    The gripper closes count by count to the first contact, then by the recipe's steps until the judge stops it: that
-    press has the outcome. Where it ended before one step beyond the last damage threshold it goes on to there, so that
-    the area at that threshold, which is the judge's own, is known; one that was never seen is 0 mm².
+    The gripper closes count by count to the contact onset, then by the recipe's steps until the judge stops it: that
+    press gives the outcome. If it ended before one step beyond the last damage threshold it continues to there, so that
+    the area at that threshold, which is the judge's own, is known; without a contact it is 0 mm².
 
     Args:
-        task: which part, who and how often.
+        task: the part, the operator and the repeat.
 
     Returns:
         The measurement with the truths of `PART_TRUTHS`.
@@ -137,7 +126,7 @@ def measure_part(task: GaugeTask) -> Simulated:
 
 
 def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
-    """True areas at the deciding closing, mean over the paper's 30 sizes: of sound fruit, and of the same ones bruised.
+    """Return true areas at the deciding closing, mean over the paper's 30 sizes: sound fruit, and the same bruised.
 
     Their difference is the tolerance.
 

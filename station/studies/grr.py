@@ -1,4 +1,4 @@
-"""One run of `station grr`: measurements, analysed, and the folder of results."""
+"""Gauge study of `station grr`: measurements, analysed, and the folder of results."""
 
 import contextlib
 import errno
@@ -18,7 +18,7 @@ from station.studies.gauge_table import Crossed, Measurement, crossed, written
 
 
 class Origin(NamedTuple):
-    """The same study, with a part of what varies in it."""
+    """The same study with a part of the causes of variation."""
 
     name: str
     gauge: Gauge
@@ -34,10 +34,10 @@ class GaugeStudy:
     table: Crossed
     gauge: Gauge
     agreement: Agreement | None
-    """None where outcomes were not recorded."""
+    """None if outcomes were not recorded."""
     origins: Sequence[Origin] = ()
-    """Where the variation comes from: true areas, of which more and more varies, and last the measured ones; empty
-    where no truth is known."""
+    """Origin of the variation: true areas with more and more causes, and last the measured ones; empty if no truth is
+    known."""
 
 
 def analysed(
@@ -46,13 +46,13 @@ def analysed(
     """Analyse areas and outcomes.
 
     Args:
-        title: what the report is called, and what a message names as the source.
+        title: of the report; also the source named in messages.
         facts: names and values for the report.
         measurements: all of them.
-        tolerance: in mm²; None where none is given.
+        tolerance: in mm²; None for no tolerance.
 
     Raises:
-        BadInputError: the measurements do not make a full table.
+        BadInputError: the measurements do not make a complete table.
     """
     table = crossed(measurements, title)
     gauge = analyse(table.areas_mm2, tolerance)
@@ -61,13 +61,13 @@ def analysed(
 
 
 def check_folder(out: Path) -> None:
-    """Say so before the work where the results could not be stored.
+    """Check before the work that the results can be stored.
 
     Args:
         out: the folder for the results.
 
     Raises:
-        BadInputError: there is something, or it cannot be made.
+        BadInputError: it is not empty, or it cannot be made.
     """
     try:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -80,15 +80,13 @@ def check_folder(out: Path) -> None:
 
 
 def store(study: GaugeStudy, page: str, out: Path) -> None:
-    """Write `measurements.csv`, `grr.json` and `report.html`, all or nothing.
+    """Write `measurements.csv`, `grr.json` and `report.html`, all or none.
 
     Args:
-        study: as analysed.
-        page: the report.
-        out: the folder; empty or not there.
+        out: the folder; empty or missing.
 
     Raises:
-        StationError: the disk is full or the folder cannot be written; nothing is left.
+        StationError: the disk is full or the folder cannot be written; no file is left.
     """
     files = {
         "measurements.csv": written(study.measurements),
@@ -116,11 +114,7 @@ def store(study: GaugeStudy, page: str, out: Path) -> None:
 
 
 def summary(study: GaugeStudy) -> dict[str, object]:
-    """What `grr.json` holds.
-
-    Args:
-        study: as analysed.
-    """
+    """Return the content of `grr.json`."""
     gauge = study.gauge
     return {
         "parts": len(study.table.parts),

@@ -1,4 +1,4 @@
-"""The report of a study that people read: one HTML file with its figures inside."""
+"""Study report: one HTML file with its figures inside."""
 
 import base64
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ PAPER_SAMPLES = 30
 
 
 def environment() -> jinja2.Environment:
-    """Where this room's templates are found."""
+    """Return the environment of this package's templates."""
     return jinja2.Environment(
         loader=jinja2.PackageLoader("station.studies", "templates"),
         autoescape=True,
@@ -29,7 +29,7 @@ def environment() -> jinja2.Environment:
 
 
 def data_uri(picture: bytes) -> str:
-    """A picture inside the document.
+    """Return a picture as a data URI.
 
     Args:
         picture: the content of a PNG or a JPEG.
@@ -39,11 +39,11 @@ def data_uri(picture: bytes) -> str:
 
 
 def share(count: int, of: int) -> str:
-    """A share in words with its 95 % interval.
+    """Describe a share with its 95 % interval.
 
     Args:
-        count: how many.
-        of: how many were looked at.
+        count: number of cases.
+        of: number of trials.
     """
     low, high = interval(count, of)
     return f"{count / of:.1%} ({low:.1%} to {high:.1%})"
@@ -51,9 +51,6 @@ def share(count: int, of: int) -> str:
 
 def write_report(study: Study) -> None:
     """Write `report.html` into the study's folder.
-
-    Args:
-        study: as judged.
 
     Raises:
         BadInputError: the folder is no longer the study's.
@@ -94,7 +91,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
 
 
 def _failures(study: Study) -> list[tuple[str, str, str]]:
-    """Rows of: what, here, in the paper."""
+    """Return rows of name, value here, value in the paper."""
     number = len(study.samples)
     paper = PAPER_FAILURES.get(study.request.kind)
     later = sum(map(bool, study.later_causes))
@@ -115,7 +112,7 @@ def _failures(study: Study) -> list[tuple[str, str, str]]:
 
 
 def _figures(study: Study) -> list[tuple[str, str]]:
-    """Captions and data URIs."""
+    """Return captions and data URIs."""
     found: list[tuple[str, bytes]] = [
         ("Area over closing of every sample; dotted: the results' closings.", figures.cohort_curves([study])),
         (

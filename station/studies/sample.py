@@ -1,4 +1,4 @@
-"""One sample of a study, measured: what a worker is asked for and what it answers."""
+"""Sample of a study: a worker's task and its result."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from station.vision.press import PressTracker
 
 
 class Task(NamedTuple):
-    """What a worker is asked for."""
+    """Task of a worker."""
 
     fruit: str
     method: str
@@ -40,7 +40,7 @@ class SampleResult(BaseModel):
 
 
 def segmentation_of(fruit: str, method: str) -> Segmentation:
-    """How a study measures: the shipped recipe's parameters, with the method asked for.
+    """Return a study's segmentation: the shipped recipe's parameters, with the requested method.
 
     Args:
         fruit: the recipe's name.
@@ -50,11 +50,7 @@ def segmentation_of(fruit: str, method: str) -> Segmentation:
 
 
 def measure_sample(task: Task) -> SampleResult:
-    """Draw a sample's press and measure its images as the steps of one press, on one thread.
-
-    Args:
-        task: which sample, and how.
-    """
+    """Render a sample's press and measure its images as the steps of one press, on one thread."""
     cv2.setNumThreads(1)
     one = member(task.fruit, task.seed, task.number)
     press = one.press()

@@ -1,4 +1,4 @@
-"""One run of `station study`: a cohort pressed on the twin and measured, resumed where it was interrupted."""
+"""Study run of `station study`: a cohort pressed on the twin and measured, resumed after an interruption."""
 
 import csv
 import json
@@ -23,7 +23,7 @@ LARGEST_COHORT = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Which cohort, how it is measured, and where the results go."""
+    """Cohort, method and result folder of a study."""
 
     fruit: str
     samples: int
@@ -36,43 +36,42 @@ class Request:
 
     @property
     def kind(self) -> Kind:
-        """The fruit, as the twin names it."""
+        """Return the twin's kind of the fruit."""
         return Kind(self.fruit)
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A cohort as it was measured."""
+    """A measured cohort."""
 
     request: Request
     samples: tuple[SampleResult, ...]
     causes: tuple[frozenset[Cause], ...]
-    """Of each sample, by the study's definition; empty where it did not fail."""
+    """Causes of each sample's failure, by the study's definition; empty if it did not fail."""
     later_causes: tuple[frozenset[Cause], ...]
-    """The same, looking only from the first result's closing on."""
+    """The same, only from the first result's closing on."""
 
     @property
     def result_closings_mm(self) -> tuple[float, ...]:
-        """Where results are shown."""
+        """Return the closings of the results."""
         return RESULT_CLOSINGS_MM[self.request.kind]
 
     @property
     def failed(self) -> int:
-        """How many samples."""
+        """Return the number of failed samples."""
         return sum(map(bool, self.causes))
 
 
 def run_study(request: Request, on_begin: Callable[[int], None], on_done: Callable[[], None]) -> Study:
-    """Measure what is not stored yet, and write the summary.
+    """Measure the samples that are not stored yet, and write the summary.
 
     Args:
-        request: which cohort.
-        on_begin: told how many samples were there already.
+        on_begin: called with the number of stored samples.
         on_done: called after each new one.
 
     Raises:
         BadInputError: the folder is another study's or cannot be written, or the cluster does not answer.
-        StationError: a write or a worker failed; what was measured by then is kept.
+        StationError: a write or a worker failed; the samples measured by then are stored.
     """
     tasks = [Task(request.fruit, request.method, request.seed, number) for number in range(request.samples)]
     folder = StudyFolder(request.out, identity_of(tasks[0]))
@@ -100,8 +99,7 @@ def judged(request: Request, samples: Sequence[SampleResult]) -> Study:
     """Judge each sample.
 
     Args:
-        request: which cohort.
-        samples: all of it, in order.
+        samples: all of them, in order.
     """
     closings = RESULT_CLOSINGS_MM[request.kind]
 
@@ -117,11 +115,7 @@ def judged(request: Request, samples: Sequence[SampleResult]) -> Study:
 
 
 def summary(study: Study) -> dict[str, object]:
-    """What `summary.json` holds; the same for the same cohort, method and program.
-
-    Args:
-        study: as judged.
-    """
+    """Return the content of `summary.json`; the same for the same cohort, method and program."""
     request, samples = study.request, study.samples
     number = len(samples)
     low, high = interval(study.failed, number)
@@ -145,7 +139,7 @@ def summary(study: Study) -> dict[str, object]:
 
 
 def _result(study: Study, place: int) -> dict[str, float]:
-    """Areas over the truth in the images at one of the results' closings."""
+    """Return the ratio of areas to the truth in the images at one of the results' closings."""
     images = [image_at(sample.closings_mm, study.result_closings_mm)[place] for sample in study.samples]
     areas = np.array([sample.areas_px[at] for sample, at in zip(study.samples, images, strict=True)])
     truth = np.array([sample.true_areas_px[at] for sample, at in zip(study.samples, images, strict=True)])
@@ -162,21 +156,12 @@ def _result(study: Study, place: int) -> dict[str, float]:
 
 
 def found_before_touch(sample: SampleResult) -> bool:
-    """Whether an area was found in an image in which nothing touches.
-
-    Args:
-        sample: as measured.
-    """
+    """Check whether an area was found in an image without contact."""
     return any(area > 0 and closing <= 0 for area, closing in zip(sample.areas_px, sample.closings_mm, strict=True))
 
 
 def rising(study: Study, sample: SampleResult) -> bool:
-    """Whether the area rises strictly from the image at one result's closing to the next.
-
-    Args:
-        study: the sample's.
-        sample: as measured.
-    """
+    """Check whether the area rises strictly from the image at one result's closing to the next."""
     areas = [sample.areas_px[at] for at in image_at(sample.closings_mm, study.result_closings_mm)]
     return all(after > before for before, after in pairwise(areas))
 

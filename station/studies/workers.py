@@ -1,4 +1,4 @@
-"""Where a study's samples are measured: on this machine's cores, or on a Dask cluster's.
+"""Workers of a study: processes on this machine, or a Dask cluster.
 
 A sample's numbers depend on its task alone, so neither the place nor the number of workers changes them.
 """
@@ -25,18 +25,17 @@ _CLUSTER_TIMEOUT_S = 10
 
 
 def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: int) -> Iterator[Answer]:
-    """Work in processes of this machine; they end when the iteration does, however it ends.
+    """Work in processes of this machine; they end with the iteration.
 
     Args:
-        work: what is done with a task; a function of a module.
-        tasks: what it is done with.
+        work: function of a module, applied to each task.
         jobs: number of processes, at least 1.
 
     Yields:
-        The answers as they come.
+        The answers in order of completion.
 
     Raises:
-        StationError: a process was killed from outside, as by a machine short of memory.
+        StationError: a process was killed from outside, as by a lack of memory.
     """
     if jobs == 1 or len(tasks) < 2:
         yield from map(work, tasks)
@@ -78,14 +77,13 @@ def _tied_to(parent: int) -> None:
 
 
 def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
-    """Measure on a Dask cluster whose workers have this same program installed.
+    """Measure on a Dask cluster whose workers have the same version of this program installed.
 
     Args:
-        tasks: which samples.
         address: of the scheduler, such as `tcp://10.0.0.5:8786`.
 
     Raises:
-        BadInputError: Dask is not installed here, or nobody answers at the address.
+        BadInputError: Dask is not installed here, or the address does not answer.
         StationError: the cluster failed while it measured.
     """
     try:
@@ -107,7 +105,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
 
 
 def _check_workers(client, address: str, task: Task) -> None:  # noqa: ANN001 (of an optional library)
-    """Refuse a cluster without workers, or whose workers would measure otherwise than this program."""
+    """Refuse a cluster without workers, or whose workers would measure differently from this program."""
     try:
         identities = client.run(identity_of, task)
     except Exception as error:

@@ -1,1 +1,1 @@
-"""What another recipe would have done: stored inspections judged again, and limits proposed from marked fruit."""
+"""Draft evaluation (what-if): stored inspections judged by another recipe, and limits proposed from marked fruit."""

@@ -1,4 +1,4 @@
-"""A draft against what people found of the fruit: both errors before and after, what is now right, what now wrong."""
+"""Comparison of a draft with people's marks: both errors before and after, corrected and new errors."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,13 +20,13 @@ class Compared:
     passed: tuple[int, int]
     """Bad ones that passed, before and after."""
     now_right: tuple[int, ...]
-    """Sequences of fruit that went the wrong way and would go the right one."""
+    """Sequences of fruit that were sorted wrongly and would be sorted rightly."""
     now_wrong: tuple[int, ...]
     undecided: int
-    """Marked fruit of which nobody can know."""
+    """Marked fruit without a known result by the draft."""
 
     def figures(self) -> dict[str, Any]:
-        """The figures by name, each error with its 95 % interval."""
+        """Return the figures by name, each error with its 95 % interval."""
         figures: dict[str, Any] = {
             "good": self.good,
             "bad": self.bad,
@@ -42,7 +42,7 @@ class Compared:
         return figures
 
     def lines(self) -> list[str]:
-        """The comparison in sentences."""
+        """Describe the comparison in sentences."""
         lines = [
             f"{name}: {self._share(counts[0], of)} before, {self._share(counts[1], of)} after"
             for name, counts, of in (
@@ -66,14 +66,14 @@ class Compared:
 
 
 def compared(results: Iterable[Replayed], marks: Mapping[int, Mark]) -> Compared | None:
-    """Hold a draft's outcomes against the marks.
+    """Compare a draft's outcomes with the marks.
 
     Args:
         results: of a what-if.
-        marks: what people found, by the inspections' sequence.
+        marks: people's marks, by the inspections' sequence.
 
     Returns:
-        None where no fruit of the results is marked.
+        None if no fruit of the results is marked.
     """
     marked = [(each, marks[each.sequence] == "good") for each in results if each.sequence in marks]
     decided = [(each, good) for each, good in marked if each.after != "UNDECIDABLE"]

@@ -1,7 +1,7 @@
-"""A limit from fruit that people found good and bad, for what either error costs, with what is unsure about it.
+"""Limits from fruit marked good and bad: the limit of least cost, and its uncertainty.
 
 Each fruit is one number: the least limit, for a fruit of the reference length, by which the judge would pass it. So a
-limit's two errors on the marked fruit are counts, and nothing is assumed of how fruit are distributed.
+limit's two errors on the marked fruit are counts, and no distribution of the fruit is assumed.
 """
 
 import math
@@ -28,41 +28,41 @@ _LARGEST_GROWTH_MM2_PER_MM = 500.0
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """What the line's errors cost."""
+    """Costs of the line's errors."""
 
     false_accept: float
-    """Of a damaged fruit that passes, in sound fruit that are diverted."""
+    """Cost of a false accept, in units of one false reject."""
     damaged_share: float
-    """Of the line's fruit, above 0 and below 1: how often there is a damaged one to pass."""
+    """Share of damaged fruit on the line, above 0 and below 1."""
 
     def of(self, false_accepts: float, false_rejects: float) -> float:
-        """Of an average fruit of the line, in sound fruit that are diverted.
+        """Return the cost of an average fruit of the line, in units of one false reject.
 
         Args:
             false_accepts: share of the damaged fruit that pass.
-            false_rejects: share of the sound fruit that do not.
+            false_rejects: share of the sound fruit that do not pass.
         """
         return self.damaged_share * self.false_accept * false_accepts + (1 - self.damaged_share) * false_rejects
 
 
 @dataclass(frozen=True, slots=True)
 class MarkedFruit:
-    """What one marked fruit's press says about a limit at a closing."""
+    """A marked fruit's constraint on the limit at a closing."""
 
     good: bool
     passes_from_mm2: float
-    """The least limit by which it passes, as its own size has it; infinite where none does."""
+    """The least limit by which it passes, at its own size; infinite if none does."""
     area_mm2: float | None
-    """The area itself; None where the closing was not reached."""
+    """The area itself; None if the closing was not reached."""
     length_mm: float | None
-    """The length that its limits are for; None where the recipe does not go by the size, or it is not known."""
+    """The length that its limits are for; None if the recipe does not use the size, or it is not known."""
     at_least: bool = False
     """The judge ended its steps before the closing: the limit is this or a larger one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Where a value lies with `CONFIDENCE`; None where the fruit are too few to say."""
+    """Confidence interval of a value, at `CONFIDENCE`; None if there are too few fruit."""
 
     low: float | None
     high: float | None
@@ -70,7 +70,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Exponent:
-    """How the area goes with the length, as the marked fruit have it."""
+    """Exponent of the area in the length, from the marked fruit."""
 
     value: float
     standard_error: float
@@ -78,17 +78,17 @@ class Exponent:
 
 
 def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool) -> MarkedFruit | None:
-    """What a press says about the limit at a closing; None where a fault ended it before, or it touched nothing.
+    """Return a press's constraint on the limit at a closing; None if a fault ended it before, or it touched nothing.
 
-    What the judge doubts for other reasons than a limit is diverted whatever the limit is. A fruit whose steps the
-    judge ended before has at least the area that was measured; it would be wrong to leave out the worst of the bad.
-    A good one of them is taken as diverted, a bad one as passed by any larger limit: the less favourable.
+    A press that the judge rejects for other reasons than a limit is diverted by every limit. A fruit whose steps the
+    judge ended before has at least the measured area; leaving out the worst of the bad fruit would be wrong. Of these,
+    a good one counts as diverted, a bad one as passed by any larger limit: the less favourable case.
 
     Args:
         press: as stored.
         recipe: that it was pressed by.
-        closing_mm: where the limit is looked for.
-        good: how the fruit is marked.
+        closing_mm: of the limit.
+        good: the fruit's mark.
     """
     limits = sized_limits(press, recipe)
     evidence = Evidence(press, limits)
@@ -106,7 +106,7 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool)
 
 
 def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
-    """The exponent of the area in the length: one slope for good and bad fruit, each with a level of its own.
+    """Fit the exponent of the area in the length: one slope for good and bad fruit, each with its own level.
 
     Args:
         fruit: marked ones.
@@ -133,12 +133,12 @@ def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
 
 
 def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: float) -> tuple[Values, Values]:
-    """The least limits by which fruit pass, for a fruit of the reference length.
+    """Return the least limits by which fruit pass, converted to a fruit of the reference length.
 
     Args:
         fruit: marked ones.
         exponent: of the area in the length.
-        reference_mm: for which a recipe's limits are written.
+        reference_mm: of the recipe's limits.
 
     Returns:
         Of the good, and of the bad, mm², each in the order given.
@@ -154,7 +154,7 @@ def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: fl
 
 
 def errors(good: Values, bad: Values, limits: Values) -> tuple[Counts, Counts]:
-    """How many good fruit each limit diverts, and how many bad ones it passes.
+    """Count the good fruit that each limit diverts, and the bad ones that it passes.
 
     Args:
         good: least limits by which they pass, mm².
@@ -166,7 +166,7 @@ def errors(good: Values, bad: Values, limits: Values) -> tuple[Counts, Counts]:
 
 
 def choose(good: Values, bad: Values, costs: Costs) -> float:
-    """The limit of the least cost on the marked fruit; of limits that cost the same, the middle of the widest gap.
+    """Return the limit of the least cost on the marked fruit; of equal ones, the middle of the widest gap.
 
     Args:
         good: least limits by which they pass, mm²; at least one of them finite.
@@ -185,7 +185,7 @@ def choose(good: Values, bad: Values, costs: Costs) -> float:
 
 
 def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] | None:
-    """Errors on fruit that the limit was not chosen on: each is left out once, and judged by the limit of the others.
+    """Count errors on fruit that the limit was not chosen on: each is left out once, and judged by the others' limit.
 
     Args:
         good: least limits by which they pass, mm².
@@ -203,11 +203,11 @@ def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] 
 
 
 def rate_interval(happened: int, number: int) -> Interval:
-    """Where a rate lies (Clopper and Pearson, Biometrika 26 (1934) 404).
+    """Return the confidence interval of a rate (Clopper and Pearson, Biometrika 26 (1934) 404).
 
     Args:
-        happened: how often.
-        number: of how many.
+        happened: number of cases.
+        number: number of trials.
     """
     if not number:
         return Interval(None, None)
@@ -216,7 +216,7 @@ def rate_interval(happened: int, number: int) -> Interval:
 
 
 def fewest_fruit(rate: float) -> int:
-    """How many fruit without an error show that no more than a rate of them err.
+    """Return the number of fruit without an error that shows an error rate of at most `rate`.
 
     Args:
         rate: above 0 and below 1.
@@ -225,7 +225,7 @@ def fewest_fruit(rate: float) -> int:
 
 
 def _without_limits(recipe: Recipe, closing_mm: float) -> Recipe:
-    """The recipe with nothing to fail a fruit whose measurement is trusted up to a closing."""
+    """Return the recipe without limits for a fruit whose measurement is reliable up to a closing."""
     last = recipe.damage.area[-1]
     area = (last.model_copy(update={"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}),)
     damage = {"area": area, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}

@@ -1,4 +1,4 @@
-"""Which fruit a person found good or bad: a CSV table beside the station."""
+"""Mark table: CSV file of fruit that a person found good or bad."""
 
 import csv
 from io import StringIO
@@ -17,7 +17,7 @@ def read_marks(path: Path) -> dict[int, Mark]:
         path: the file; further columns are ignored.
 
     Raises:
-        BadInputError: it cannot be read, lacks a column, marks a fruit twice, or has another word or number.
+        BadInputError: it cannot be read, lacks a column, marks a fruit twice, or has an invalid word or number.
     """
     try:
         with path.open("rb") as file:

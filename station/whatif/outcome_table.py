@@ -1,4 +1,4 @@
-"""What a draft would have changed, counted."""
+"""Outcome table of a draft: counts of changed outcomes."""
 
 import csv
 import io
@@ -15,39 +15,39 @@ AFTER = (*BEFORE, "UNDECIDABLE")
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """All results of one draft."""
+    """Counts of all results of one draft."""
 
     pairs: Counter[tuple[str, str]]
-    """How many had this outcome before and have that after."""
+    """Number by outcome before and outcome after."""
     undecidable: Counter[str]
-    """Why, without its figures."""
+    """Reasons, without their figures."""
     unfaithful: int
-    """Those whose stored outcome is not that of their own recipe judged again: of an older judge, or of a fault."""
+    """Inspections whose own recipe now gives another outcome than the stored one: by an older judge, or a fault."""
     newly_rejected: int
     newly_passed: int
     measured_again: int
-    """Of how many the stored images were measured by the draft."""
+    """Number of inspections whose stored images were measured by the draft."""
 
     @property
     def total(self) -> int:
-        """How many were judged again."""
+        """Return the number of inspections judged again."""
         return self.pairs.total()
 
     @property
     def decided(self) -> int:
-        """How many of them have a verdict by the draft."""
+        """Return the number of them with a verdict by the draft."""
         return self.total - sum(self.pairs[before, "UNDECIDABLE"] for before in BEFORE)
 
     def rejects_before(self) -> int:
-        """Of those decided, how many were not passed then."""
+        """Return the number of decided ones that did not pass before."""
         return sum(number for (before, after), number in self.pairs.items() if before != "PASS" and after in BEFORE)
 
     def rejects_after(self) -> int:
-        """Of those decided, how many would not be passed by the draft."""
+        """Return the number of decided ones that the draft does not pass."""
         return sum(number for (_, after), number in self.pairs.items() if after in {"FAIL", "NO_RESULT"})
 
     def summary(self) -> dict[str, Any]:
-        """The figures by name."""
+        """Return the figures by name."""
         return {
             "inspections": self.total,
             "decided": self.decided,
@@ -84,7 +84,7 @@ def counted(results: Iterable[Replayed]) -> Counted:
 
 
 def as_csv(results: Sequence[Replayed]) -> str:
-    """Every result that is not the same as before, as a table.
+    """Return every changed result, as a table.
 
     Args:
         results: in the order of the rows.

@@ -1,4 +1,4 @@
-"""The what-if's page: one HTML file with its pictures inside, to be read without network and without the station."""
+"""Report of a what-if: one HTML file with its pictures inside, readable without network and station."""
 
 import base64
 import json
@@ -31,41 +31,37 @@ _WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
-    """One fruit on the page."""
+class FruitView:
+    """View of one fruit."""
 
     result: Replayed
     curve: str
     """An SVG picture's points: x,y x,y …"""
     again: str
-    """Likewise, of the areas that the draft measures in the stored images; empty where it measures as then."""
+    """Likewise, of the areas that the draft measures in the stored images; empty if it measures as before."""
     limits: tuple[tuple[float, float, str], ...]
     """x, y and `own` or `draft` of every area limit."""
     picture: str
-    """A data URI of its last image with the contact's outline; empty where none was kept."""
+    """A data URI of its last image with the contact's outline; empty if none was stored."""
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """All that the page shows."""
+    """Content of the report."""
 
     title: str
     facts: Sequence[tuple[str, str]]
     changes: Sequence[Difference]
     counted: Counted
     against: Compared | None
-    """What people found of the fruit; None where none is marked."""
-    shown: Sequence[Shown]
+    """Comparison with people's marks; None if no fruit is marked."""
+    shown: Sequence[FruitView]
     changed: int
-    """How many change sides, shown or not."""
+    """Number of fruit that change sides, shown or not."""
 
 
 def render(page: Page) -> str:
-    """Make the HTML document.
-
-    Args:
-        page: what it shows.
-    """
+    """Make the HTML document."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("station.whatif", "templates"),
         autoescape=True,
@@ -77,22 +73,22 @@ def render(page: Page) -> str:
     return template.render(page=page, before=BEFORE, after=AFTER, wide=_WIDE, high=_HIGH, edge=_EDGE)
 
 
-def shown(
+def fruit_views(
     connection: Connection, folder: Path, results: Sequence[Replayed], own: Recipe | None, draft: Recipe
-) -> list[Shown]:
-    """Look up what the page shows of some fruit.
+) -> list[FruitView]:
+    """Read the views of some fruit.
 
     Args:
         connection: of the records.
         folder: the records' folder.
         results: the fruit, in the page's order.
-        own: the recipe of then, for its limits; None where they had several.
+        own: the inspections' own recipe, for its limits; None if they had several.
         draft: the recipe that was tried.
     """
-    return [_shown(connection, folder, result, own, draft) for result in results]
+    return [_fruit_view(connection, folder, result, own, draft) for result in results]
 
 
-def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> Shown:
+def _fruit_view(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> FruitView:
     rows = connection.exec_driver_sql(
         "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm IS NOT NULL "
         "AND area_mm2 IS NOT NULL ORDER BY step",
@@ -113,11 +109,11 @@ def _shown(connection: Connection, folder: Path, result: Replayed, own: Recipe |
     )
     placed = tuple((*place(closing_mm, area_mm2), whose) for closing_mm, area_mm2, whose in limits)
     measuring = draft.segmentation if result.areas_mm2 else None
-    return Shown(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
+    return FruitView(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
 
 
 def _picture(connection: Connection, folder: Path, sequence: int, draft: Segmentation | None) -> str:
-    """The last step's image, with its stored outline where the mask was kept, and the draft's where one measures."""
+    """Return the last step's image, with its stored outline if the mask was stored, and the draft's if it measures."""
     rows = connection.exec_driver_sql(
         "SELECT kind, step, sha256 FROM images WHERE sequence = ? ORDER BY step, id",
         (sequence,),
@@ -146,7 +142,7 @@ def _picture(connection: Connection, folder: Path, sequence: int, draft: Segment
 def _followed(
     reference: cv2.typing.MatLike, steps: Sequence[cv2.typing.MatLike | None], segmentation: Segmentation
 ) -> Contact | None:
-    """The last step's contact, measured as the last of its press; None where an image is no longer kept."""
+    """Measure the last step's contact as the last of its press; None if an image is not stored any more."""
     tracker = PressTracker(
         make_method([np.asarray(reference, np.uint8)], segmentation), segmentation.robust.least_confidence
     )
@@ -172,11 +168,11 @@ def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
 
 
 def as_json(counted: Counted, against: Compared | None) -> str:
-    """The figures as a file.
+    """Return the figures as a file.
 
     Args:
         counted: all results.
-        against: the marked ones; None where there are none.
+        against: of the marked fruit; None if there are none.
     """
     figures = {**counted.summary(), "marked": None if against is None else against.figures()}
     return json.dumps(figures, indent=2, ensure_ascii=False) + "\n"

@@ -1,4 +1,4 @@
-"""What was judged already, in a file that grows: a run that was ended goes on, and a second one costs little."""
+"""Progress file of a what-if: its results until now, so that it can be interrupted and repeated quickly."""
 
 import json
 import os
@@ -18,11 +18,11 @@ FILE_NAME = "replayed.jsonl"
 
 
 class ProgressFile:
-    """One draft's results, a line each; the first line says whose. Open it with `with`.
+    """One draft's results, a line each; the first line identifies the draft. Open it with `with`.
 
     Args:
-        folder: made where missing.
-        draft: the recipe that is tried.
+        folder: made if missing.
+        draft: the tried recipe.
     """
 
     def __init__(self, folder: Path, draft: Recipe) -> None:
@@ -37,7 +37,7 @@ class ProgressFile:
         self._descriptor = -1
 
     def __enter__(self) -> Self:
-        """Read what is there.
+        """Read the stored results.
 
         Raises:
             BadInputError: the file is of another draft or program, or cannot be written.
@@ -77,7 +77,7 @@ class ProgressFile:
         """Append results.
 
         Raises:
-            StationError: the disk does not take them; what was appended before stays.
+            StationError: they cannot be written; earlier results remain.
         """
         fresh = list(results)
         self._append([asdict(each) for each in fresh])

@@ -1,4 +1,4 @@
-"""The limit proposed from marked fruit, closing by closing, and what is said of it."""
+"""Proposed limits from marked fruit, one for each closing, with their figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ from station.whatif.limits import (
 from station.whatif.stored import StoredPress
 
 _KNOWN_SHARE = 0.9
-"""A closing that fewer of the good fruit reached is not proposed: what the others show there is not known."""
+"""Share of the good fruit that has to reach a closing; else it is not proposed: the others' areas there are unknown."""
 _SURE = 2.0
-"""Standard errors by which the fruit's own exponent has to differ from the recipe's to take its place."""
+"""Standard errors by which the fruit's own exponent has to differ from the recipe's to replace it."""
 _CURVE_POINTS = 80
 _RATES_TO_SHOW = (0.05, 0.01)
-"""Shares of damaged fruit passed, of which is told how many marked ones would show them."""
+"""False accept rates for which the report gives the number of marked fruit that would show them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class Proposal:
     closing_mm: float
     fruit: tuple[MarkedFruit, ...]
     unknown: int
-    """Marked fruit that say nothing about this closing."""
+    """Marked fruit without a constraint at this closing."""
     exponent: float
-    """For the draft; 0 where the recipe does not go by the size."""
+    """For the draft; 0 if the recipe does not use the size."""
     found_exponent: Exponent | None
     good: Values
     bad: Values
@@ -52,11 +52,7 @@ class Proposal:
     """Good fruit diverted and bad ones passed, each by the limit of the others; None with too few."""
 
     def cost(self, costs: Costs) -> float:
-        """Of an average fruit, on fruit that the limit was not chosen on; of the worst where they are too few.
-
-        Args:
-            costs: of the errors.
-        """
+        """Return the cost of an average fruit, cross-validated; the worst case if there are too few fruit."""
         diverted, passed = self.left_out or (len(self.good), len(self.bad))
         return costs.of(passed / len(self.bad), diverted / len(self.good))
 
@@ -64,13 +60,13 @@ class Proposal:
 def proposals(
     stored: Sequence[StoredPress], marked: Mapping[int, Mark], own: Mapping[str, Recipe], recipe: Recipe, costs: Costs
 ) -> list[Proposal]:
-    """A limit for each closing that enough of the fruit reached, the cheapest first.
+    """Propose a limit for each closing that enough of the fruit reached, the cheapest first.
 
     Args:
         stored: the marked presses.
         marked: good or bad, by their sequence.
         own: the recipes that they were pressed by, by their hash.
-        recipe: whose limit is looked for.
+        recipe: the limit is proposed for it.
         costs: of the errors.
     """
     closings = {*recipe.steps.result_closings_mm, *(each.closing_mm for each in recipe.damage.area)}
@@ -115,11 +111,10 @@ def _at(
 
 
 def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
-    """A proposal's figures by name.
+    """Return a proposal's figures by name.
 
     Args:
-        proposal: which.
-        costs: that it was chosen for.
+        costs: that the limit was chosen for.
     """
     good, bad, limit = proposal.good, proposal.bad, np.array([proposal.limit_mm2])
     diverted, passed = (int(count[0]) for count in errors(good, bad, limit))
@@ -148,7 +143,7 @@ def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
 
 
 def _curve(proposal: Proposal) -> list[dict[str, Any]]:
-    """Both errors over the limit, each with its interval."""
+    """Return both errors over the limit, each with its interval."""
     known = np.concatenate([proposal.good, proposal.bad])
     known = known[np.isfinite(known)]
     limits = np.linspace(0.95 * known.min(), 1.05 * known.max(), _CURVE_POINTS)

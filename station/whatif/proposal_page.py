@@ -1,4 +1,4 @@
-"""A proposed limit in sentences and on a page: good and bad fruit, and both errors over the limit."""
+"""Report of a proposed limit: sentences, histogram of good and bad fruit, both errors over the limit."""
 
 import base64
 import io
@@ -37,14 +37,15 @@ show();
 """
 
 
-def lines_of(told: dict[str, Any]) -> list[str]:
-    """The sentences of a proposal, for the terminal and the page.
+def lines_of(figures: dict[str, Any]) -> list[str]:
+    """Describe a proposal in sentences, for the terminal and the page.
 
     Args:
-        told: all its figures, by name.
+        figures: its figures, by name.
     """
-    best = told["proposed"]
-    costs = f"costs {told['false_accept_cost']:g} sound ones diverted and {100 * told['damaged_share']:g} % are damaged"
+    best = figures["proposed"]
+    cost, share = figures["false_accept_cost"], figures["damaged_share"]
+    costs = f"costs {cost:g} sound ones diverted and {100 * share:g} % are damaged"
     lines = [
         f"proposed: {best['limit_mm2']:.1f} mm² at {best['closing_mm']:g} mm, where a damaged fruit passed {costs}",
         f"of the marked fruit: {_of(best['good_diverted'])} good diverted, {_of(best['bad_passed'])} bad passed",
@@ -73,9 +74,9 @@ def lines_of(told: dict[str, Any]) -> list[str]:
         lines.append(f"{best['not_known']} marked fruit tell nothing: a fault ended their steps")
     lines.extend(
         f"at {other['closing_mm']:g} mm: {other['limit_mm2']:.1f} mm², costs {_times(other, best)}"
-        for other in told["other_closings"]
+        for other in figures["other_closings"]
     )
-    for name, rate in told["by_the_proposed_recipe"].items():
+    for name, rate in figures["by_the_proposed_recipe"].items():
         low, high = ("not known" if end is None else f"{100 * end:.1f} %" for end in rate["interval"])
         lines.append(
             f"{name} fruit rejected by the proposed recipe: {rate['rejected']} of {rate['decided']} decided "
@@ -93,25 +94,25 @@ def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
     return f"{other['cost'] / best['cost']:.1f} times as much" if best["cost"] else f"{other['cost']:.3f} in place of 0"
 
 
-def page_of(title: str, best: Proposal, told: dict[str, Any]) -> str:
-    """The page with its two pictures and a slider on the limit, in one file.
+def page_of(title: str, best: Proposal, figures: dict[str, Any]) -> str:
+    """Make the page with its two pictures and a slider on the limit, in one file.
 
     Args:
         title: the recipe's.
-        best: what is proposed.
-        told: all its figures, by name.
+        best: the proposal.
+        figures: its figures, by name.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    curve = told["proposed"]["curve"]
+    curve = figures["proposed"]["curve"]
     chosen = min(range(len(curve)), key=lambda place: abs(curve[place]["limit_mm2"] - best.limit_mm2))
     pictures = {"histogram": _histogram(best), "errors": _errors(best, curve)}
     return environment.from_string(_PAGE).render(
-        title=title, lines=lines_of(told), curve=curve, chosen=chosen, **pictures
+        title=title, lines=lines_of(figures), curve=curve, chosen=chosen, **pictures
     )
 
 
 def _histogram(best: Proposal) -> str:
-    """Good and bad beside each other, with the limit; a data URI."""
+    """Draw good and bad beside each other, with the limit; returns a data URI."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     groups = [values[np.isfinite(values)] for values in (best.good, best.bad)]
@@ -124,7 +125,7 @@ def _histogram(best: Proposal) -> str:
 
 
 def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
-    """Both errors over the limit, with their intervals; a data URI."""
+    """Draw both errors over the limit, with their intervals; returns a data URI."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     limits = [point["limit_mm2"] for point in curve]

@@ -1,4 +1,4 @@
-"""A stored inspection's images measured again, by another segmentation."""
+"""Remeasurement of a stored inspection's images by another segmentation."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,28 +16,28 @@ from station.vision.press import PressTracker
 from station.whatif.stored import StoredPress
 
 _SAME_AREA, _SAME_PX = 0.02, 50
-"""So far may an area measured again be from the stored one, for another version of OpenCV; usually they are equal."""
+"""Greatest difference of a remeasured area from the stored one, for other versions of OpenCV; usually 0."""
 
 
 class CannotRemeasureError(StationError):
-    """The images that were kept do not tell what the other segmentation would have seen."""
+    """The stored images do not give the result of the other segmentation."""
 
 
 def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> Press:
-    """A press with the areas that another segmentation finds in the stored images.
+    """Return a press with the areas that another segmentation finds in the stored images.
 
-    They are measured again as the station measured them: as one press, step after step from the onset. Stored is the
-    mean of a step's frames. How far the frames disagreed is known from the stored confidence alone: it is a factor on
-    the method's own, and is carried over.
+    They are measured as the station measured them: as one press, step after step from the onset. The stored image is
+    the mean of a step's frames. The disagreement of the frames is known only from the stored confidence: it is a factor
+    on the method's own confidence, and is taken over.
 
     Args:
         stored: with its images.
-        own: the segmentation of then.
+        own: the segmentation of the inspection.
         draft: the segmentation to try.
 
     Raises:
         CannotRemeasureError: an image is missing or no image, the images do not give the stored areas, or the draft
-            would have seen the onset elsewhere.
+            would have found the onset at another width.
     """
     press = stored.press
     own, draft = gated(own, stored.gate_factor), gated(draft, stored.gate_factor)
@@ -77,7 +77,7 @@ def _point(
 
 
 def _scale(press: Press) -> float:
-    """mm² a pixel, from the points that have an area."""
+    """Return mm² per pixel, from the points that have an area."""
     known = [point.area_mm2 / point.area_px for point in press.points if point.area_px]
     if not known:
         raise CannotRemeasureError("no stored point has an area, so the scale of its images is not known")

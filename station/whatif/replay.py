@@ -1,7 +1,7 @@
-"""One stored inspection judged by a draft, as the station would have done; where that cannot be known, it says so.
+"""Replay of a stored inspection by a draft; a result that cannot be known is reported as unknown.
 
-A stored curve ends where the recipe of then ended it. A draft that would have pressed on has no verdict but what is
-certain by then: damage that is proven, and a fruit that cannot pass any more, whatever would have come.
+A stored curve ends where the inspection's own recipe ended it. A draft that would have continued has only the verdicts
+that are certain at that point: proven damage, and a fruit that cannot pass any more, whatever would have followed.
 """
 
 import json
@@ -25,32 +25,32 @@ After = Literal["PASS", "FAIL", "NO_RESULT", "UNDECIDABLE"]
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What the draft makes of one inspection."""
+    """Result of the draft on one inspection."""
 
     sequence: int
     lot: str
     before: OutcomeName
     after: After
     why: str
-    """The draft's reasons in sentences, or why nothing can be known; empty for PASS."""
+    """The draft's reasons in sentences, or why the result is unknown; empty for PASS."""
     faithful: bool
-    """Judged again by its own recipe, the inspection has the outcome that is stored."""
+    """Judged again by its own recipe, the inspection has the stored outcome."""
     areas_mm2: tuple[float, ...] = ()
-    """Of the steps, as the draft measures the stored images; empty where it measures as the recipe of then."""
+    """Of the steps, as the draft measures the stored images; empty if it measures as the inspection's own recipe."""
 
     @property
     def changes_side(self) -> Literal["", "passes", "rejected"]:
-        """Whether the fruit goes another way: to the good ones, or away from them."""
+        """Whether the fruit changes sides: to the accepted ones, or away from them."""
         if self.after == "UNDECIDABLE" or (self.before == "PASS") == (self.after == "PASS"):
             return ""
         return "passes" if self.after == "PASS" else "rejected"
 
 
 def recipe_of_snapshot(text: str) -> Recipe | None:
-    """A recipe as it was stored with an inspection; None where this program does not take it any more.
+    """Parse a recipe as it was stored with an inspection; None if this program does not accept it any more.
 
     Args:
-        text: canonical JSON of any released form.
+        text: canonical JSON of any released schema.
     """
     values = json.loads(text)
     try:
@@ -64,8 +64,8 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
     """Judge one stored inspection by a draft.
 
     Args:
-        stored: as read; with images where the draft finds contacts otherwise than `own`.
-        own: the recipe that it was inspected by; None where that is not known any more.
+        stored: with images if the draft finds contacts differently from `own`.
+        own: the recipe of the inspection; None if it is not known any more.
         draft: the recipe to try.
     """
     if own is None:
@@ -89,7 +89,7 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
 
 
 def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
-    """Why no curve taken by one recipe tells of the other; empty where it does.
+    """Return why a curve pressed by one recipe is no evidence for the other; empty if it is.
 
     Args:
         own: the recipe that the fruit was pressed by.
@@ -107,7 +107,7 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
 
 
 def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
-    """Whether the areas have to be measured again: the method, or a parameter of the one in use, is another.
+    """Check whether the areas have to be measured again: the method, or one of its parameters, differs.
 
     Args:
         own: the recipe that the areas were measured by.
@@ -128,11 +128,10 @@ def _judged(
     """Judge press after press, as often as the draft would have pressed the fruit.
 
     Args:
-        stored: the inspection.
         presses: in order, each as it was measured and as the draft measures it.
-        own: the recipe of then.
+        own: the recipe of the inspection.
         draft: the recipe to try.
-        faithful: as `Replayed` has it.
+        faithful: as in `Replayed`.
     """
     for pressed in range(1, len(presses) + 1):
         then, now = (together(each) for each in zip(*presses[:pressed], strict=True))
@@ -145,7 +144,7 @@ def _judged(
 
 
 def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict | str:
-    """The draft's verdict on presses together, or why it is not known."""
+    """Return the draft's verdict on presses together, or why it is not known."""
     if whole.onset_mm is None:
         sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
         if sooner or whole.interruptions:
@@ -169,7 +168,7 @@ def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict |
 
 
 def _until_stop(press: Press, draft: Recipe) -> Press:
-    """The points that the draft would have taken of those there are."""
+    """Return the existing points that the draft would have taken."""
     points = press.points[: draft.steps.number + 1]
     for number in range(1, len(points)):
         if early_stop(replace(press, points=points[:number]), draft) is not None:
@@ -178,7 +177,7 @@ def _until_stop(press: Press, draft: Recipe) -> Press:
 
 
 def _stopping(draft: Recipe) -> Recipe:
-    """The draft as it would be if no step were made that cannot change the outcome."""
+    """Return the draft with the early stop: no step that cannot change the outcome."""
     return draft.model_copy(update={"steps": draft.steps.model_copy(update={"stop_when_decided": True})})
 
 

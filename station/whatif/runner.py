@@ -1,4 +1,4 @@
-"""Many inspections judged again: on all cores, or on a Dask cluster, with what is done already kept."""
+"""Runner of a what-if: many inspections judged again on all cores, or on a Dask cluster."""
 
 import importlib
 import multiprocessing
@@ -25,13 +25,13 @@ CHUNK = 200
 _WITH_IMAGES = 8
 _REACH_S = 10.0
 _AHEAD = 3
-"""Chunks that wait for each worker: so many that none is idle, so few that memory stays small."""
+"""Batches that wait for each worker: enough that none is idle, few enough that memory stays small."""
 _ALONE_S = 2.0
-"""About as long as a process takes to start and to load what it needs."""
+"""About the time that a process takes to start and to load its imports."""
 
 
 class Batch(NamedTuple):
-    """What a worker gets: plain values, so that it needs neither the database nor its disk."""
+    """Input of a worker: plain values, so that it needs neither the database nor its disk."""
 
     stored: list[StoredPress]
     own: dict[str, str]
@@ -41,11 +41,7 @@ class Batch(NamedTuple):
 
 
 def replay_batch(batch: Batch) -> list[Replayed]:
-    """Judge a batch: what a worker does, in whatever process.
-
-    Args:
-        batch: self-contained.
-    """
+    """Judge a batch, in any process."""
     cv2.setNumThreads(1)
     draft = Recipe.model_validate_json(batch.draft)
     own = {sha256: recipe_of_snapshot(text) for sha256, text in batch.own.items()}
@@ -53,7 +49,7 @@ def replay_batch(batch: Batch) -> list[Replayed]:
 
 
 def batches(folder: Path, wanted: Sequence[int], own: dict[str, str], draft: Recipe) -> Iterator[Batch]:
-    """Read what is to be judged, part by part.
+    """Read the inspections to be judged, batch by batch.
 
     Args:
         folder: the records' folder.
@@ -83,7 +79,7 @@ def run(parts: Iterable[Batch], jobs: int, scheduler: str | None) -> Iterator[li
         scheduler: a Dask scheduler's address, in place of this machine's processes.
 
     Raises:
-        BadInputError: the address is none, or the extra `cluster` is not installed.
+        BadInputError: the address is invalid, or the extra `cluster` is not installed.
         StationError: a worker was lost.
     """
     if scheduler is not None:
@@ -96,7 +92,7 @@ def run(parts: Iterable[Batch], jobs: int, scheduler: str | None) -> Iterator[li
 
 
 def _on_cores(parts: Iterator[Batch], jobs: int) -> Iterator[list[Replayed]]:
-    """This process works too, and at first alone: what is done by the time that another one has started needs none."""
+    """Use this machine's cores. This process works too, and at first alone: small runs need no other process."""
     until_s = time.monotonic() + _ALONE_S
     for part in parts:
         yield replay_batch(part)
@@ -111,7 +107,7 @@ def _on_cores(parts: Iterator[Batch], jobs: int) -> Iterator[list[Replayed]]:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
-    """Workers of a Dask cluster; they need this program installed, and nothing of this machine's disk."""
+    """Use workers of a Dask cluster; they need this program installed, and nothing of this machine's disk."""
     try:
         distributed = importlib.import_module("distributed")
     except ImportError as error:
@@ -130,7 +126,7 @@ def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
 
 
 def _reach(address: str) -> None:
-    """Dask's own client leaves threads and tracebacks behind where nobody answers."""
+    """Connect to the scheduler first: Dask's own client leaves threads and tracebacks if nothing answers."""
     try:
         parts = urlsplit(address)
         if parts.scheme not in {"tcp", "tls"} or parts.hostname is None or parts.port is None:
@@ -143,7 +139,7 @@ def _reach(address: str) -> None:
 def _flow(
     parts: Iterable[Batch], submit: Callable[[Batch], Any], most: int, *, helps: bool = False
 ) -> Iterator[list[Replayed]]:
-    """Keep so many batches on their way; this process may help with others meanwhile."""
+    """Keep up to `most` batches in progress; this process may help with others meanwhile."""
     source, under_way = iter(parts), set[Future[list[Replayed]]]()
     try:
         while True:

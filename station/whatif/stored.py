@@ -17,7 +17,7 @@ from station.records.images import image_path
 from station.vocabulary import OutcomeName, Reason
 
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
-"""A count of the gripper, by which the onset is searched; for records that do not have their own."""
+"""Default of the gripper's count, the step of the onset search; for records without their own."""
 _FLAGS = {flag.value for flag in Flag}
 _INTERRUPTIONS = frozenset(
     {
@@ -32,7 +32,7 @@ _INTERRUPTIONS = frozenset(
     }
 )
 _STEPS_ENDED = "The steps ended at"
-"""How the judge's own sentence for `INTERNAL_FAULT` begins, which tells it from a fault of the program."""
+"""Start of the judge's own sentence for `INTERNAL_FAULT`; it distinguishes it from a fault of the program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,31 +42,29 @@ class StoredPress:
     sequence: int
     lot: str
     before: OutcomeName
-    """As the station judged it then."""
+    """As the station judged it."""
     recipe_sha256: str
     press: Press
     """The last one, with its points in the order of the steps."""
     gate_factor: float = 1.0
-    """By which the sensor's calibration had raised the robust method's gate."""
+    """Factor by which the sensor's calibration had raised the robust method's gate."""
     images: tuple[tuple[int | None, bytes], ...] = ()
-    """PNG by step, None for the reference; only where they were asked for and kept."""
+    """PNG by step, None for the reference; only if requested and stored."""
     first: Press | None = None
-    """The press before it, which was inconclusive; None where the fruit was pressed once."""
+    """The press before it, which was inconclusive; None if the fruit was pressed once."""
 
     @property
     def judged(self) -> Press:
-        """All presses together, as the station judged them."""
+        """Return all presses together, as the station judged them."""
         return self.press if self.first is None else together([self.first, self.press])
 
 
 def sequences(connection: Connection, name: str, lots: Sequence[str], last: int | None) -> list[int]:
-    """The judged inspections of a recipe, in order.
+    """List the judged inspections of a recipe, in order.
 
     Args:
-        connection: any.
-        name: the recipe's.
-        lots: their names; all where empty.
-        last: at most so many, the latest; all where None.
+        lots: their names; all if empty.
+        last: at most so many, the latest; None for all.
     """
     marks = ", ".join("?" * len(lots))
     chosen = f"AND i.lot IN ({marks})" if lots else ""
@@ -79,12 +77,7 @@ def sequences(connection: Connection, name: str, lots: Sequence[str], last: int 
 
 
 def snapshots(connection: Connection, name: str) -> dict[str, str]:
-    """The recipe's stored forms, canonical JSON by their hash.
-
-    Args:
-        connection: any.
-        name: the recipe's.
-    """
+    """Return the recipe's stored versions, canonical JSON by their hash."""
     found = connection.exec_driver_sql("SELECT sha256, text FROM recipe_snapshots WHERE name = ?", (name,))
     return dict(tuple(row) for row in found)
 
@@ -93,10 +86,9 @@ def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, 
     """Read some inspections with their curves.
 
     Args:
-        connection: any.
-        wanted: their sequences, ascending, some hundreds at most.
+        wanted: sequences, ascending, some hundreds at most.
         folder: the records' folder, for the images.
-        with_images: read their images too, where they were kept.
+        with_images: read the stored images too.
     """
     marks = ", ".join("?" * len(wanted))
     rows = connection.exec_driver_sql(
@@ -115,12 +107,7 @@ def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, 
 
 
 def read_gate_factor(connection: Connection, sequence: int) -> float:
-    """By which the sensor's calibration had raised the robust method's gate in an inspection; 1 where it did not.
-
-    Args:
-        connection: any.
-        sequence: which.
-    """
+    """Return the factor by which the sensor's calibration had raised the robust method's gate; 1 for none."""
     query = "SELECT json_extract(measures, '$.gate_factor') FROM inspections WHERE sequence = ?"
     return connection.exec_driver_sql(query, (sequence,)).scalar() or 1.0
 
@@ -167,7 +154,7 @@ _NONE: frozenset[Flag] = frozenset()
 
 
 def _interruptions(found: set[Reason], points: Sequence[Measured], told: Sequence[str]) -> Iterator[Reason]:
-    """Which reasons came from outside the measurement: the judge gives some of them itself."""
+    """Return the reasons from outside the measurement; the judge gives the others itself."""
     yield from (reason for reason in Reason if reason in found & _INTERRUPTIONS)
     mismatch = any(Flag.REFERENCE_MISMATCH in point.flags for point in points)
     if Reason.REFERENCE_BAD in found and not mismatch:

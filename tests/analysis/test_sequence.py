@@ -256,7 +256,7 @@ def test_rows_come_in_the_order_given_and_none_is_lost_where_the_run_ends_early(
             for number in (3, 1):
                 output.add(measured(number), 0.0)
             assert not (out / "results.csv").exists()
-            output.leave_out(Refused(source("0.png"), 0, "no image"))
+            output.skip(Refused(source("0.png"), 0, "no image"))
             assert [row["image"] for row in read_table(out / "results.csv")] == ["1.png"]
             raise KeyboardInterrupt
 

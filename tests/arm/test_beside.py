@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.arm.offset import beside
+from station.devices.arm.offset import offset_pose
 from station.settings.arm import Centring
 from station.twin.ur.kinematics import forward
 from station.twin.ur.poses import pose_from_transform, transform_from_pose
@@ -25,7 +25,7 @@ def test_it_is_the_pose_moved_in_its_own_axes(turn, offset_mm):
     step = np.eye(4)
     step[:3, 3] = np.array(offset_mm) / 1000
     expected = pose_from_transform(transform_from_pose(pose) @ step)
-    assert beside(pose, offset_mm) == pytest.approx(expected, abs=1e-9)
+    assert offset_pose(pose, offset_mm) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_way_in_the_image_goes_along_the_axes_that_the_site_states():

@@ -3,7 +3,7 @@
 import pytest
 
 from station.devices.arm.dashboard import DashboardFacts
-from station.devices.arm.diagnosis import from_state, from_words, why_not_done
+from station.devices.arm.diagnosis import diagnose, from_output, from_state
 from station.devices.arm.faults import REMEDIES, ArmCause
 from station.devices.arm.messages import Snapshot
 
@@ -58,7 +58,7 @@ def test_the_gravest_cause_that_the_state_shows_is_named(bits, mode, cause):
     ],
 )
 def test_what_was_not_done_has_one_cause(state, remote, healthy, cause):
-    assert why_not_done(state, facts(remote=remote), "", was_healthy=healthy).cause is cause
+    assert diagnose(state, facts(remote=remote), "", was_healthy=healthy).cause is cause
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_what_was_not_done_has_one_cause(state, remote, healthy, cause):
     ],
 )
 def test_ur_rtdes_own_words_are_understood(words, cause):
-    fault = from_words(words)
+    fault = from_output(words)
     assert (fault and fault.cause) == cause
 
 

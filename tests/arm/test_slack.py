@@ -6,10 +6,10 @@ import sys
 PR_GET_TIMERSLACK = 30
 ASKS = f"""
 import ctypes, threading
-from station.devices.arm.process import TIMER_SLACK_NS, sleep_loosely
+from station.devices.arm.process import TIMER_SLACK_NS, relax_timers
 ask = lambda: found.append(ctypes.CDLL(None).prctl({PR_GET_TIMERSLACK}))
 found = []
-sleep_loosely()
+relax_timers()
 for thread in [threading.Thread(target=ask)]:
     thread.start()
     thread.join()

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from station.cli import cli
 from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit
-from station.records.direct import writing
+from station.records.direct_transaction import direct_transaction
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def trail(folder: Path) -> Callable[..., None]:
     """Append some rows."""
 
     def write(number: int = 5, **of_entry: Any) -> None:
-        with writing(folder) as connection:
+        with direct_transaction(folder) as connection:
             for place in range(number):
                 values = {"who": "Ida", "role": "quality", "action": "test.done", "subject": f"thing {place}"}
                 append_audit(connection, AuditEntry(**{**values, **of_entry}))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.audit_head import Head, read_head, save_head
 from station.records.database import reading
-from station.records.direct import writing
+from station.records.direct_transaction import direct_transaction
 from station.records.errors import BadRecordError
 from station.records.records import Records
 from station.settings.records import RecordsSettings
@@ -178,7 +178,7 @@ def test_what_is_undone_leaves_no_row(folder, trail, station):
     trail(1)
 
     def fail():
-        with writing(folder) as connection:
+        with direct_transaction(folder) as connection:
             append_audit(connection, AuditEntry("Ida", "quality", "test.done", "x"))
             raise ValueError("no")
 

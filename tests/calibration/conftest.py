@@ -15,13 +15,13 @@ from typing import Any
 import cv2
 import pytest
 
-from station.calibration.bench import Place, Progress, Unit
-from station.calibration.calibrating import Calibrating, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
 from station.calibration.report import calibration_files
+from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
-from station.studies.drawn_ball import DrawnBall
+from station.studies.simulated_rig import SimulatedRig
 from station.twin.console import ask
 
 UNIT = Unit("T0001", "drawn DIGIT", simulated=True)
@@ -35,8 +35,8 @@ def one_thread() -> None:
 
 @pytest.fixture(scope="session")
 def drawn_ball() -> Callable[..., Any]:
-    """Makes a drawn ball; see `station/studies/drawn_ball.py`."""
-    return DrawnBall
+    """Makes a drawn ball; see `station/studies/simulated_rig.py`."""
+    return SimulatedRig
 
 
 def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress] | None = None) -> Draft:
@@ -44,7 +44,7 @@ def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress
     recipe = find_recipe("rubber_ball")
     tell = [].append if told is None else told.append
     return asyncio.run(
-        Calibrating(
+        CalibrationProcedure(
             ball, UNIT, recipe, CalibrationSettings(), [Place(*place) for place in places], "anna", "0.1", tell
         ).run()
     )
@@ -59,7 +59,7 @@ def calibrate_drawn_fixture() -> Callable[..., Draft]:
 def draft() -> Draft:
     """A good calibration on two places."""
     cv2.setNumThreads(1)
-    return calibrate_drawn(DrawnBall(1, mm_per_px=0.0285), (-2.5, 0.0), (0.0, 3.0))
+    return calibrate_drawn(SimulatedRig(1, mm_per_px=0.0285), (-2.5, 0.0), (0.0, 3.0))
 
 
 @pytest.fixture

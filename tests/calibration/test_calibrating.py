@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from station.calibration.bench import Unit
-from station.calibration.calibrating import Calibrating
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.errors import RefusedError
 from station.calibration.figures import noise, scale_of
 from station.calibration.gate import gated
 from station.calibration.model import PlacePoint, Refusal
 from station.calibration.report import refusal_files
+from station.calibration.rig import Unit
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
@@ -79,7 +79,7 @@ def test_what_is_no_calibration_is_refused_with_its_reason(drawn_ball, calibrate
 
 
 def test_a_refusal_keeps_every_picture_and_check_and_is_never_used(drawn_ball, store):
-    procedure = Calibrating(
+    procedure = CalibrationProcedure(
         drawn_ball(1, kind=Kind.STRAWBERRY, holder_mm=6.0),
         UNIT,
         find_recipe("rubber_ball"),
@@ -147,7 +147,7 @@ def test_called_off_in_the_middle_the_jaws_open(drawn_ball):
                 pressing.set()
 
         recipe = find_recipe("rubber_ball")
-        procedure = Calibrating(ball, UNIT, recipe, CalibrationSettings(), [], "anna", "0.1", told)
+        procedure = CalibrationProcedure(ball, UNIT, recipe, CalibrationSettings(), [], "anna", "0.1", told)
         running = asyncio.create_task(procedure.run())
         await pressing.wait()
         running.cancel()

@@ -27,10 +27,10 @@ from station.channel.line import (
 )
 from station.channel.panel_live import GetPanelState, PanelState
 from station.records.database import reading, records_folder
-from station.records.reading import read_inspection
-from station.service.calibrated import Calibrated
-from station.service.keeping import Kept
-from station.service.reference import Golden
+from station.records.queries import read_inspection
+from station.service.active_calibration import ActiveCalibration
+from station.service.reference import GoldenReference
+from station.service.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
@@ -58,7 +58,7 @@ def in_use(home, after, serial="T0001", **settings):
     """What the station sees some time after the calibration was made."""
     service = {"uncalibrated": settings.pop("uncalibrated", "refuse")}
     configuration = Configuration.model_validate({"home": home, "calibration": settings, "service": service})
-    return Calibrated(configuration, lambda: serial, after.timestamp)
+    return ActiveCalibration(configuration, lambda: serial, after.timestamp)
 
 
 def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, tmp_path):
@@ -74,8 +74,8 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     stored.add_calibration(calibration, calibration_files(draft))
     assert calibrated.calibration == calibration
     assert calibrated.gate_factor == 1.3
-    golden = Golden(Kept(tmp_path), calibrated.golden)
-    golden.keep_first(np.zeros((640, 480, 3), np.uint8))
+    golden = GoldenReference(StateFiles(tmp_path), calibrated.golden)
+    golden.store_first(np.zeros((640, 480, 3), np.uint8))
     assert not (tmp_path / "golden_reference.png").exists()
     prepared = golden.prepared(Segmentation())
     assert prepared is not None
@@ -89,17 +89,17 @@ def test_a_scale_that_was_not_measured_leaves_the_sites_in_force(store, draft, t
     usual = draft.calibration.model_copy(update={"scale_measured": False, "mm_per_px": 0.0266})
     store.add_calibration(usual, {})
     configuration = Configuration.model_validate({"home": tmp_path, "camera": {"mm_per_px": 0.028}})
-    assert Calibrated(configuration, lambda: "T0001").in_force.mm_per_px == 0.028
+    assert ActiveCalibration(configuration, lambda: "T0001").in_force.mm_per_px == 0.028
 
 
 def test_age_and_a_failed_verification_are_told(stored, draft, tmp_path):
     made_at = draft.calibration.made_at
     young = in_use(tmp_path, made_at + timedelta(days=80))
-    assert (young.trouble(), young.figures.age_s) == ("", 80 * 86_400.0)
+    assert (young.alarm_detail(), young.figures.age_s) == ("", 80 * 86_400.0)
     assert young.figures[1:] == (None, None)
-    assert "91 days old, at most 90" in in_use(tmp_path, made_at + timedelta(days=91)).trouble()
+    assert "91 days old, at most 90" in in_use(tmp_path, made_at + timedelta(days=91)).alarm_detail()
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=1), FAILED), {})
-    assert "failed: wear" in young.trouble()
+    assert "failed: wear" in young.alarm_detail()
     assert young.figures.verification_age_s == pytest.approx(80 * 86_400 - 3600)
     assert young.figures.drift == pytest.approx(-0.03)
 
@@ -121,13 +121,13 @@ def test_nothing_is_ready_without_the_verification_that_is_demanded(stored, draf
 def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_allowed(stored, draft, tmp_path):
     made_at = draft.calibration.made_at
     calibrated, another = in_use(tmp_path, made_at), in_use(tmp_path, made_at, "D11111")
-    assert (calibrated.refusal(), calibrated.trouble()) == ("", "")
+    assert (calibrated.refusal(), calibrated.alarm_detail()) == ("", "")
     assert "not calibrated: calibrate it with the ball on the page Maintenance" in another.refusal()
-    assert another.trouble() == "the sensor is not calibrated: calibrate it first"
+    assert another.alarm_detail() == "the sensor is not calibrated: calibrate it first"
     unknown = in_use(tmp_path, made_at, "")
-    assert (unknown.refusal() != "", unknown.trouble()) == (True, ""), "no sensor was met yet, or it is none"
+    assert (unknown.refusal() != "", unknown.alarm_detail()) == (True, ""), "no sensor was met yet, or it is none"
     allowed = in_use(tmp_path, made_at, "D11111", uncalibrated="allow")
-    assert (allowed.refusal(), allowed.trouble()) == ("", "")
+    assert (allowed.refusal(), allowed.alarm_detail()) == ("", "")
     assert "allowed by service.uncalibrated" in allowed.in_force.words
 
 

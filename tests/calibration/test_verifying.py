@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from station.calibration.gel import Ill, examine
+from station.calibration.gel import GelFault, examine
 from station.calibration.report import verification_files
-from station.calibration.verifying import Verifying
+from station.calibration.verification_procedure import VerificationProcedure
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.twin.digit.sensor import Condition
@@ -19,7 +19,7 @@ from station.vision.methods import median_image
 def verified(ball, draft, tell=lambda _progress: None):
     recipe, settings = find_recipe("rubber_ball"), CalibrationSettings()
     pictures = draft.reference, [step.image for step in draft.steps]
-    procedure = Verifying(ball, recipe, settings, draft.calibration, *pictures, "anna", tell)
+    procedure = VerificationProcedure(ball, recipe, settings, draft.calibration, *pictures, "anna", tell)
     return asyncio.run(procedure.run())
 
 
@@ -30,7 +30,7 @@ def test_the_same_ball_on_the_same_sensor_passes(drawn_ball, draft):
     assert verification.passed, [check for check in verification.checks if not check.passed]
     assert verification.area_ratio == pytest.approx(1.0, abs=0.05)
     assert verification.calibration == draft.calibration.id
-    assert len(verification.checks) == 4 + len(Ill)
+    assert len(verification.checks) == 4 + len(GelFault)
     assert len(verification.curve) < len(draft.calibration.curve)
     assert ball.released == 1
 
@@ -38,18 +38,18 @@ def test_the_same_ball_on_the_same_sensor_passes(drawn_ball, draft):
 @pytest.mark.parametrize(
     ("condition", "ill"),
     [
-        (Condition(torn=True), Ill.TEAR),
-        (Condition(dirt=3), Ill.DIRT),
-        (Condition(dead_led="red"), Ill.LED),
-        (Condition(light=(1.0, 0.6, 1.0)), Ill.LED),
-        (Condition(fog=0.8), Ill.FOG),
-        (Condition(wear=0.8), Ill.WEAR),
+        (Condition(torn=True), GelFault.TEAR),
+        (Condition(dirt=3), GelFault.DIRT),
+        (Condition(dead_led="red"), GelFault.LED),
+        (Condition(light=(1.0, 0.6, 1.0)), GelFault.LED),
+        (Condition(fog=0.8), GelFault.FOG),
+        (Condition(wear=0.8), GelFault.WEAR),
     ],
 )
 def test_each_ill_of_the_gel_is_named_and_shown(drawn_ball, draft, condition, ill):
     result = verified(drawn_ball(1, mm_per_px=0.0285, condition=condition), draft)
     assert not result.verification.passed
-    health = {check.name: check for check in result.verification.checks if check.name in list(Ill)}
+    health = {check.name: check for check in result.verification.checks if check.name in list(GelFault)}
     assert [name for name, check in health.items() if not check.passed] == [ill]
     picture = health[ill].picture
     assert picture is not None

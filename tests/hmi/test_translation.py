@@ -36,11 +36,22 @@ NOT_FOR_OPERATORS = {
 FAULTS_FROM = (
     *(
         f"devices/arm/{name}"
-        for name in ("child", "dashboard", "diagnosis", "faults", "link", "messages", "process", "ur")
+        for name in ("process_handle", "dashboard", "diagnosis", "faults", "link", "messages", "process", "ur")
     ),
     *(f"devices/gripper/{name}" for name in ("calibration", "errors", "modbus_rtu", "robotiq", "urcap")),
     *(f"devices/camera/{name}" for name in ("digit", "feed")),
-    *(f"service/{name}" for name in ("bare_grip", "crew", "grip", "outcome_watch", "reference", "upkeep", "watching")),
+    *(
+        f"service/{name}"
+        for name in (
+            "bare_grip",
+            "device_manager",
+            "grip",
+            "outcome_monitor",
+            "reference",
+            "housekeeping",
+            "device_monitor",
+        )
+    ),
 )
 """Where what is wrong with a device, and so an alarm's detail or why fruit are refused, is put into words."""
 NO_FAULTS = {
@@ -163,8 +174,8 @@ def anonymous(text):
 
 
 def test_what_operators_are_refused_with_is_said_in_every_language():
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
-    for module in ("readiness", "orders", "panel_orders", "alarm_orders"):
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    for module in ("readiness", "plc_commands", "operator_commands", "alarm_commands"):
         told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
         assert told - NOT_FOR_OPERATORS <= known, module
 

@@ -31,7 +31,7 @@ WAIT = "import sys, time, pathlib; pathlib.Path(sys.argv[1], 'begun').touch(); t
 
 async def until(jobs: PanelJobs, job: str, wanted: Callable[[JobView], Any]) -> JobView:
     deadline_s = time.monotonic() + PATIENCE_S
-    while not wanted(told := jobs.told(job)):
+    while not wanted(told := jobs.state(job)):
         assert time.monotonic() < deadline_s, told
         await asyncio.sleep(0.02)
     return told

@@ -11,7 +11,7 @@ import structlog
 
 from station.channel.line import Reason
 from station.logs import configure_logging, inspecting
-from station.service.fruit_line import fruit_line
+from station.service.log_line import fruit_line
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 
 from station.inspection.alarm_table import AlarmId
 from station.outbox import lag
-from station.outbox.lag import Lag
+from station.outbox.lag import OutboxMonitor
+from station.outbox.publisher import run_outbox
 from station.outbox.status import DestinationStatus, outbox_folder, write_status
-from station.outbox.telling import keep_telling
 from station.records.audit import AuditEntry
 from station.service.station import Station
 from station.settings.configuration import load_configuration
@@ -64,7 +64,7 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
         started = asyncio.Event()
         running = asyncio.create_task(station.run(lambda _port: started.set()))
         await asyncio.wait({running, asyncio.create_task(started.wait())}, return_when=asyncio.FIRST_COMPLETED)
-        telling = asyncio.create_task(keep_telling(configuration.outbox, configuration.home))
+        telling = asyncio.create_task(run_outbox(configuration.outbox, configuration.home))
         try:
             status = outbox_folder(configuration.home) / "status.json"
             await until(lambda: status.exists() and '"connected":true' in status.read_text())
@@ -72,7 +72,7 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
             await asyncio.to_thread(server.stop, "fast")
             entries = [AuditEntry("ada", "quality", "tried", f"thing {number}") for number in range(40)]
             assert station.service is not None
-            await station.service.ledger.records.audit(*entries)
+            await station.service.registry.records.audit(*entries)
             await until(lambda: told().state == "unacknowledged")
             assert "postgresql: 4" in told().detail
             assert "entries wait, for " in told().detail
@@ -91,14 +91,14 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
 def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in_time_is_not(site):
     configuration = site(alarm_after_s=60.0)
     home, now_ms = configuration.home, time.time_ns() // 1_000_000
-    of = Lag(configuration.outbox, home)
+    of = OutboxMonitor(configuration.outbox, home)
 
     def trouble(**values):
         usual = {"connected": False, "told": 0, "refused": 0, "waiting": 0, "oldest_utc_ms": None, "error": "away"}
         write_status(outbox_folder(home), {"postgresql": DestinationStatus(**{**usual, **values})})
-        return of.trouble()
+        return of.alarm_detail()
 
-    assert of.trouble() == "", "it has just begun"
+    assert of.alarm_detail() == "", "it has just begun"
     assert trouble(away_since_utc_ms=now_ms - 3_600_000) == "", "away, and nothing to tell"
     assert trouble(waiting=3, oldest_utc_ms=now_ms - 30_000) == ""
     assert "postgresql: 3 entries wait, for 9" in trouble(waiting=3, oldest_utc_ms=now_ms - 90_000)
@@ -112,7 +112,7 @@ def test_a_process_that_says_nothing_any_more_is_an_alarm_too(site, monkeypatch)
     configuration = site()
     status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error="")
     write_status(outbox_folder(configuration.home), {"postgresql": status})
-    of = Lag(configuration.outbox, configuration.home)
-    assert of.trouble() == ""
+    of = OutboxMonitor(configuration.outbox, configuration.home)
+    assert of.alarm_detail() == ""
     monkeypatch.setattr(lag, "LOST_S", -1.0)
-    assert of.trouble().startswith("the outbox's process has not been heard for ")
+    assert of.alarm_detail().startswith("the outbox's process has not been heard for ")

@@ -10,7 +10,7 @@ import pytest
 
 from station.outbox.errors import OutboxError
 from station.outbox.mqtt import Mqtt
-from station.outbox.telling import Teller
+from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxMqttSettings
 
 LIMIT_S = 90.0
@@ -57,7 +57,7 @@ def test_events_are_published_in_order_and_none_is_missing_after_the_broker_was_
     fill(records, 1, 3, steps=1)
 
     async def steps():
-        teller = Teller(records, "line-7", mqtt, longest_pause_s=0.5)
+        teller = Publisher(records, "line-7", mqtt, longest_pause_s=0.5)
         telling = asyncio.create_task(teller.run())
         try:
             await until(lambda: teller.status().waiting == 0)  # what was there before is no news

@@ -18,11 +18,11 @@ from station.outbox.feed import read_batch
 from station.outbox.postgresql import Postgresql
 from station.records.audit import AuditEntry, append_audit
 from station.records.backup import make_backup
-from station.records.changing import changing
 from station.records.database import FILE_NAME
 from station.records.lots import end_lot, start_lot
-from station.records.restoring import restore_backup
-from station.records.writing import tell
+from station.records.restore import restore_backup
+from station.records.short_transaction import short_transaction
+from station.records.write_requests import queue_event
 from station.settings.outbox import OutboxPostgresqlSettings
 
 LIMIT_S = 90.0
@@ -45,7 +45,7 @@ async def tell_all(server, folder, station):
     async with Postgresql(settings(server), station).connected() as session:
         position = await session.position(read_batch(folder, station, 0))
         while (batch := read_batch(folder, station, position)).up_to > position:
-            await session.tell(batch)
+            await session.publish(batch)
             told, position = told + len(batch.events), batch.up_to
     return told
 
@@ -67,7 +67,7 @@ def test_three_stations_lose_and_double_nothing_while_the_server_is_cut_crashed_
 
 def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, tmp_path):
     fill(tmp_path, 1, 3, steps=4)
-    with changing(tmp_path) as connection:
+    with short_transaction(tmp_path) as connection:
         connection.exec_driver_sql(
             "UPDATE inspections SET fruit_length_mm_x10 = 481, size_class = 3 WHERE sequence = 1"
         )
@@ -95,9 +95,9 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
 def test_a_row_that_changed_is_told_again_and_is_there_once(server, fill, tmp_path):
     fill(tmp_path, 1, 2, steps=0)
     asyncio.run(tell_all(server, tmp_path, "changed"))
-    with changing(tmp_path) as connection:
+    with short_transaction(tmp_path) as connection:
         connection.exec_driver_sql("UPDATE inspections SET images_state = 'kept' WHERE sequence = 2")
-        tell(connection, "inspection", 2)
+        queue_event(connection, "inspection", 2)
     asyncio.run(tell_all(server, tmp_path, "changed"))
     found = rows(server, "SELECT sequence, images_state FROM inspections WHERE station = 'changed' ORDER BY sequence")
     assert found == [(1, "not wanted"), (2, "kept")]
@@ -224,12 +224,12 @@ def test_a_station_may_add_to_the_trail_and_not_change_it(server, fill, tmp_path
     with server.connect() as connection:
         connection.execute("CREATE ROLE limited LOGIN IN ROLE fruit_station")
     fill(tmp_path, 1, 2, steps=0)
-    with changing(tmp_path) as connection:
+    with short_transaction(tmp_path) as connection:
         append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing"))
 
     async def steps():
         async with Postgresql(settings(server, user="limited"), "limited").connected() as session:
-            await session.tell(read_batch(tmp_path, "limited", 0))
+            await session.publish(read_batch(tmp_path, "limited", 0))
 
     asyncio.run(steps())
     assert rows(server, "SELECT count(*) FROM audit WHERE station = 'limited'") == [(1,)]

@@ -9,8 +9,8 @@ import pytest
 
 from station.recipe_store.revision import RecipeStoreError
 from station.records.model import RecipeSnapshot
-from station.service.keeping import Kept
-from station.service.recipe_book import RecipeBook
+from station.service.active_recipes import ActiveRecipes
+from station.service.state_files import StateFiles
 from station.settings.recipe import APPROVED_NAME, approved_list, load_recipe, shipped_folder
 from station.settings.recipe_form import canonical_text, content_sha256
 
@@ -18,7 +18,7 @@ LIMIT = "damage.area[0].area_mm2"
 
 
 def book_of(site, home):
-    book = RecipeBook(site, Kept(home))
+    book = ActiveRecipes(site, StateFiles(home))
     book.read()
     return book
 
@@ -160,14 +160,14 @@ def test_a_lot_goes_on_over_a_restart_only_with_what_its_revision_says(begun, do
     book = book_of(site, home)
     first = book.find(1)
     assert first is not None
-    assert book.remember(first, "A-17")
+    assert book.store_active(first, "A-17")
     does("Ida", "edit", "strawberry", "--set", f"{LIMIT}=113")
     does("Ida", "submit", "strawberry")
     does("Bo", "approve", "strawberry")
-    assert book_of(site, home).remembered() == (first, "A-17"), "the lot began with revision 1"
+    assert book_of(site, home).restored() == (first, "A-17"), "the lot began with revision 1"
     kept = home / "active_recipe.json"
     kept.write_text(kept.read_text().replace("112.0", "117.0"))
-    remembered = book_of(site, home).remembered()
+    remembered = book_of(site, home).restored()
     assert remembered is not None
     assert (remembered.lot, remembered.active.snapshot.revision) == (None, "2"), "what was tampered with is not used"
 

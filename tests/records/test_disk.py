@@ -27,10 +27,10 @@ from station.records.errors import (
     RecordsError,
     SequenceError,
 )
+from station.records.high_water_mark import HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
-from station.records.opening import MARK_NAME
+from station.records.open import MARK_NAME
 from station.records.records import Records
-from station.records.sequence_mark import SequenceMark
 
 
 def bulky(trigger: Trigger, size_bytes: int) -> Trigger:
@@ -74,7 +74,7 @@ def test_a_full_disk_refuses_and_takes_again_when_there_is_space(opened, scenari
 
 def test_a_full_database_is_a_full_disk(opened, scenario, trigger, monkeypatch):
     """SQLite's own SQLITE_FULL, without a disk of the test's."""
-    monkeypatch.setattr("station.records.opening.open_engine", _limited)
+    monkeypatch.setattr("station.records.open.open_engine", _limited)
 
     async def steps():
         async with opened() as records:
@@ -197,16 +197,16 @@ def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
 def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario, trigger, monkeypatch):
     """Its answer comes when the writer takes nothing more from outside."""
     gate = threading.Event()
-    save = SequenceMark.save
+    save = HighWaterMark.save
 
-    def slowly(self: SequenceMark) -> None:
+    def slowly(self: HighWaterMark) -> None:
         gate.wait(30)
         save(self)
 
     async def steps():
         async with opened(deadline_s=0.2) as records:
             with monkeypatch.context() as patch:
-                patch.setattr(SequenceMark, "save", slowly)
+                patch.setattr(HighWaterMark, "save", slowly)
                 with pytest.raises(RecordsDeadlineError, match="it within"):
                     await records.begin(trigger)
                 closing = asyncio.create_task(records.close())
@@ -223,7 +223,7 @@ def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario
 
 def test_a_begin_whose_caller_has_gone_is_withdrawn_even_when_it_is_durable(opened, scenario, trigger, monkeypatch):
     inserted, gate = threading.Event(), threading.Event()
-    save = SequenceMark.save
+    save = HighWaterMark.save
 
     def slow(self):
         inserted.set()
@@ -232,7 +232,7 @@ def test_a_begin_whose_caller_has_gone_is_withdrawn_even_when_it_is_durable(open
 
     async def steps():
         async with opened() as records:
-            monkeypatch.setattr(SequenceMark, "save", slow)
+            monkeypatch.setattr(HighWaterMark, "save", slow)
             caller = asyncio.create_task(records.begin(trigger))
             while not inserted.is_set():
                 await asyncio.sleep(0.005)
@@ -366,7 +366,7 @@ def test_a_lost_mark_is_taken_from_the_database_and_an_old_database_from_the_mar
 @pytest.mark.parametrize("cut", range(0, 41, 4))
 def test_a_torn_mark_costs_at_most_the_write_that_tore_it(tmp_path, cut):
     path = tmp_path / "sequence"
-    mark = SequenceMark(path)
+    mark = HighWaterMark(path)
     for value in (5, 6, 8, 11):
         mark.value = value
         mark.save()
@@ -379,5 +379,5 @@ def test_a_torn_mark_costs_at_most_the_write_that_tore_it(tmp_path, cut):
     for place in changed[: len(changed) * cut // 40]:
         torn[place] = after[place]
     path.write_bytes(torn)
-    assert SequenceMark(path).value in {11, 12}
-    assert SequenceMark(path).known
+    assert HighWaterMark(path).value in {11, 12}
+    assert HighWaterMark(path).known

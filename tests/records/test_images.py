@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from station.records.images import ImageStore, accepted_is_kept
+from station.records.images import ImageStore, accepted_is_stored
 from station.records.model import Image
 
 
@@ -70,7 +70,7 @@ def test_a_share_of_the_accepted_is_kept(opened, scenario, inspected, noise, set
 
 @given(st.integers(0, 2**32 - 200), st.floats(0, 1))
 def test_the_share_is_evenly_spread(first, share):
-    kept = sum(accepted_is_kept(sequence, share) for sequence in range(first + 1, first + 101))
+    kept = sum(accepted_is_stored(sequence, share) for sequence in range(first + 1, first + 101))
     assert abs(kept - 100 * share) <= 1 + 1e-6
 
 

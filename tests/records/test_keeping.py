@@ -9,11 +9,11 @@ from dataclasses import replace
 import pytest
 
 from station.records.backup import MANIFEST_NAME, make_backup
-from station.records.checking import check_records
 from station.records.database import FILE_NAME
 from station.records.errors import DamagedError, DiskFullError, LockedError, RecordsError
 from station.records.holds import hold, release
-from station.records.restoring import restore_backup
+from station.records.integrity_check import check_records
+from station.records.restore import restore_backup
 
 
 @pytest.fixture

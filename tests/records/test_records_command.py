@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from station.channel.line import Reason
-from station.records.wording import SENTENCES, sparkline
+from station.records.texts import SENTENCES, sparkline
 from station.settings.recipe import find_recipe
 
 

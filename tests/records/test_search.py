@@ -9,14 +9,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.channel.line import Reason
-from station.records.changing import changing
 from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
-from station.records.finding import HOUR_MS
 from station.records.lots import end_lot, read_lots, start_lot
 from station.records.model import RecipeSnapshot
 from station.records.search import Query, find, find_page
-from station.records.writing import conclude, insert_trigger, publish
+from station.records.search_index import HOUR_MS
+from station.records.short_transaction import short_transaction
+from station.records.write_requests import conclude, insert_trigger, publish
 
 FRUIT = st.sampled_from(["strawberry", "strawberry, revised", "raspberry", None])
 GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}
@@ -172,7 +172,7 @@ def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, as
     assert "lot west is told to be of Meier already" in str(other.exception)
     assert ask("lot", "start", "west", "--grower", "Huber", "--correct", "--by", "ada").exit_code == 0
     assert ask("lot", "end", "west").output.startswith("west: Huber, began")
-    with changing(folder) as connection:
+    with short_transaction(folder) as connection:
         (lot,) = read_lots(connection, 9)
         assert end_lot(connection, "west") == lot, "a lot ends once"
         assert lot.revision == 3

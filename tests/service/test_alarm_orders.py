@@ -59,7 +59,7 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             assert "no_recipe (medium) is shelved until 20" in (await alarms("alarms", "list"))[1]
             assert (await alarms("alarms", "unshelve", "no_recipe", "--by", "Bo"))[0] == 0
             assert await word()
-            told = cell.station.service.ledger.records
+            told = cell.station.service.registry.records
             async with asyncio.timeout(60):
                 while "alarm.unshelved" not in (rows := (await alarms("audit", "show", "--action", "alarm."))[1]):
                     await asyncio.sleep(0.1)

@@ -23,7 +23,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
             cell.at(State.RECORDING_ACCEPT, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))
             outcome = await cell.line.inspect()
             await cell.reach(State.IDLE)
-            record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+            record = await cell.station.service.registry.records.inspection(outcome.sequence)
             return outcome, record.judged, sensor_mm, cell.twin.world.sensor_mm()
 
     outcome, judged, [sensor_mm], at_last = asyncio.run(scenario())

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from station.service.keeping import Kept
+from station.service.active_recipes import ActiveRecipe, ActiveRecipes
 from station.service.last_good import load_or_last_good
-from station.service.recipe_book import Active, RecipeBook
+from station.service.state_files import StateFiles
 from station.settings.problems import SettingsError
 
 
@@ -27,37 +27,37 @@ def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file,
 
 def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_gone(settings_file, tmp_path):
     settings_file()
-    folder, kept = tmp_path / "recipes", Kept(tmp_path / "home")
-    book = RecipeBook(folder, kept)
+    folder, kept = tmp_path / "recipes", StateFiles(tmp_path / "home")
+    book = ActiveRecipes(folder, kept)
     book.read()
     assert book.numbers == (1, 2, 3)
     assert book.problems == ()
     blueberry = book.find(2)
     assert blueberry is not None
-    assert book.remember(blueberry, "LOT 1")
+    assert book.store_active(blueberry, "LOT 1")
     (folder / "blueberry.yaml").write_text("name: [")
     (folder / "raspberry.yaml").unlink()
 
-    later = RecipeBook(folder, kept)
+    later = ActiveRecipes(folder, kept)
     later.read()
     assert later.numbers == (1, 2)
-    assert later.remembered() == (blueberry, "LOT 1")
+    assert later.restored() == (blueberry, "LOT 1")
     assert any("blueberry.yaml" in problem for problem in later.problems)
 
 
 def test_a_checksum_is_that_of_the_recipe_and_of_nothing_else(settings_file, tmp_path):
     settings_file()
-    book = RecipeBook(tmp_path / "recipes", Kept(tmp_path / "home"))
+    book = ActiveRecipes(tmp_path / "recipes", StateFiles(tmp_path / "home"))
     book.read()
     active = book.find(1)
     assert active is not None
     assert json.loads(active.snapshot.text) == active.recipe.model_dump(mode="json")
     other = active.recipe.model_copy(update={"title": "Other"})
-    assert Active.of(other).snapshot.checksum != active.snapshot.checksum
+    assert ActiveRecipe.of(other).snapshot.checksum != active.snapshot.checksum
 
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path):
-    kept = Kept(tmp_path)
+    kept = StateFiles(tmp_path)
     assert kept.read("a/b.json") is None
     assert kept.write("a/b.json", b"first")
     before = (tmp_path / "a" / "b.json").stat().st_ino

@@ -39,7 +39,7 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench,
             await asyncio.sleep(0.02)
         await plc.write({"control": 1})
         assert shown.trigger_id == trigger_id
-        record = await cell.station.service.ledger.records.inspection(shown.sequence)
+        record = await cell.station.service.registry.records.inspection(shown.sequence)
         await plc.acknowledge(shown.sequence)
         return record.trigger.size, FruitSize(shown.fruit_length_mm, shown.size_class)
 

@@ -26,7 +26,7 @@ def test_a_sound_fruit_is_measured_and_a_bruised_one_never_passes(bench, kind, s
                 cell.at(State.JUDGING, lambda bruised=bruised: truths.update({bruised: cell.twin.world.footprint()}))
                 outcomes.append(await cell.line.inspect())
             service = cell.station.service
-            return [(outcome, await service.ledger.records.inspection(outcome.sequence)) for outcome in outcomes]
+            return [(outcome, await service.registry.records.inspection(outcome.sequence)) for outcome in outcomes]
 
     (sound, record), (bruised, _) = asyncio.run(scenario())
     judged = record.judged
@@ -52,7 +52,7 @@ def test_what_cannot_be_measured_is_no_result(bench):
             touching = replace(draw_fruit(Kind.STRAWBERRY, 1), width_mm=56.0)
             cell.twin.world.place(touching)
             in_contact = await cell.line.inspect()
-            record = await cell.station.service.ledger.records.inspection(in_contact.sequence)
+            record = await cell.station.service.registry.records.inspection(in_contact.sequence)
             return empty, in_contact, record.judged.explanation
 
     empty, in_contact, explanation = asyncio.run(scenario())
@@ -72,10 +72,10 @@ def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench, monkeypa
             stop = active.recipe.early_stop.model_copy(update={"area_mm2": 40.0})
             recipe = active.recipe.model_copy(update={"early_stop": stop})
             service.active = type(active).of(recipe)
-            monkeypatch.setattr(cell.station.book, "current", lambda active: active)  # the lot begins with this one
+            monkeypatch.setattr(cell.station.recipes, "current", lambda active: active)  # the lot begins with this one
             await cell.line.ready()
             outcome = await cell.line.inspect()
-            record = await service.ledger.records.inspection(outcome.sequence)
+            record = await service.registry.records.inspection(outcome.sequence)
             return outcome, record.judged.curve
 
     outcome, curve = asyncio.run(scenario())

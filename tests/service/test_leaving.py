@@ -42,7 +42,7 @@ def test_a_trigger_is_accepted_while_the_arm_leaves_and_a_fault_then_gives_it_on
             await line.publish(second)
             assert (first.outcome, second.outcome) == ("PASS", "PASS")
             assert second.sequence == first.sequence + 1
-            record = await cell.station.service.ledger.records.inspection(second.sequence)
+            record = await cell.station.service.registry.records.inspection(second.sequence)
             assert {"retreating_accepted", "approaching"} <= set(record.judged.phases_s)
 
             await inspected_until_leaving(cell)

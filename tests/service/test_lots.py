@@ -36,18 +36,18 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
             await asyncio.to_thread(put_in_force)
             cell.lay("blueberry", 2)
             assert (await cell.line.inspect()).recipe_checksum == first.recipe_checksum, "the lot goes on"
-            await asyncio.to_thread(cell.station.book.refresh)
+            await asyncio.to_thread(cell.station.recipes.refresh)
 
             begun = await begin(cell, 900, "LOT 2")
             assert begun.refusal is None
             second = await cell.line.outcome(begun.sequence)
             await cell.line.publish(second)
             assert second.recipe_checksum != first.recipe_checksum
-            record = await cell.station.service.ledger.records.inspection(second.sequence)
+            record = await cell.station.service.registry.records.inspection(second.sequence)
             assert record.trigger.recipe.revision == "2"
 
             await asyncio.to_thread(store.retire, "blueberry", BO)
-            await asyncio.to_thread(cell.station.book.refresh)
+            await asyncio.to_thread(cell.station.recipes.refresh)
             await cell.line.ready()
             assert (await begin(cell, 901, "LOT 3")).refusal is Refusal.NOT_READY
             why = (await cell.line.state()).why_not_ready

@@ -9,7 +9,7 @@ import pytest
 
 from station.channel.panel_queries import GetStages
 from station.records.database import records_folder
-from station.service import eye as eye_module
+from station.service import vision_worker
 from station.service.panel_pictures import PanelPictures
 from station.service.panel_worker import PanelWorker
 from station.vision.contact import Flag
@@ -37,7 +37,7 @@ def measurements(monkeypatch):
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
-    monkeypatch.setattr(eye_module, "make_method", recording)
+    monkeypatch.setattr(vision_worker, "make_method", recording)
     return made
 
 
@@ -54,7 +54,7 @@ def inspect(bench, settings_file):
             async with bench(file) as cell:
                 await cell.choose("blueberry")
                 outcome = await cell.line.inspect()
-                records = cell.station.service.ledger.records
+                records = cell.station.service.registry.records
                 async with asyncio.timeout(60):
                     while records.status().images_waiting:
                         await asyncio.sleep(0.05)

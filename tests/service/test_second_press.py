@@ -6,7 +6,7 @@ import pytest
 
 from station.inspection.states import State
 from station.records.database import reading, records_folder
-from station.records.report import described
+from station.records.report import format_inspection
 from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, snapshots
@@ -27,7 +27,7 @@ def inspected(bench, roomy):
                 openings = []
                 cell.at(State.OPENING_AGAIN, lambda: (openings.append(cell.phase), meanwhile(cell)))
                 outcome = await cell.line.inspect()
-                record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+                record = await cell.station.service.registry.records.inspection(outcome.sequence)
                 return outcome, record, openings
 
         return asyncio.run(scenario())
@@ -45,7 +45,7 @@ def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(i
     assert "border cuts the contact" in judged.measures["first_press_findings"]
     assert not any("cut_by_border" in point.flags for point in judged.curve)
     assert judged.phases_s["opening_again"] > 0
-    shown = described(record)
+    shown = format_inspection(record)
     assert "Pressed twice, since the first press did not decide: At " in shown
     assert "first_press" not in shown
     with reading(records_folder(tmp_path / "home")) as connection:

@@ -42,7 +42,9 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             state = await cell.line.state()
             assert "calibrate it with the ball on the page Maintenance" in state.why_not_ready
             assert "`station calibrate`" in state.why_not_ready
-            assert sum((await cell.station.service.ledger.records.totals()).values()) == 0, "nothing was begun or lost"
+            assert sum((await cell.station.service.registry.records.totals()).values()) == 0, (
+                "nothing was begun or lost"
+            )
 
             await plc.write({"control": 1})
             shipped = cell.configuration.model_copy(update={"recipes_folder": Configuration().recipes_folder})
@@ -54,7 +56,7 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
 
             await until(ready)
             result = await plc.inspect(8, deadline_s=90)
-            record = await cell.station.service.ledger.records.inspection(result.sequence)
+            record = await cell.station.service.registry.records.inspection(result.sequence)
             assert made.id in record.judged.devices["calibration"]
             assert "uncalibrated" not in record.judged.measures
 
@@ -67,7 +69,7 @@ def test_where_it_is_allowed_each_record_states_it(bench):
         async with bench(uncalibrated="allow") as cell:
             await cell.choose("blueberry")
             outcome = await cell.line.inspect()
-            record = await cell.station.service.ledger.records.inspection(outcome.sequence)
+            record = await cell.station.service.registry.records.inspection(outcome.sequence)
             assert record.judged.measures["uncalibrated"] == "allow"
             assert record.judged.devices["calibration"].endswith("inspecting is allowed by service.uncalibrated")
             assert cell.station.service.alarms.alarms.get(AlarmId.CALIBRATION_OLD).state == "normal"

@@ -69,10 +69,10 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert AlarmId.FRUIT_HELD not in active(cell)
             assert stands_at() == ["above_nest"]
 
-            crew = cell.station.service._crew
+            crew = cell.station.service._devices
             renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
             async with asyncio.timeout(60):
-                while not crew.program_to_play_again:
+                while not crew.needs_program_restart:
                     await asyncio.sleep(0.05)
             assert AlarmId.ARM_LINK_LOST in active(cell)
             assert not (await line.state()).ready
@@ -160,7 +160,7 @@ def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench)
         async with bench() as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
-            gripper = cell.station.service._crew.cell.gripper
+            gripper = cell.station.service._devices.cell.gripper
             status, lost = gripper.link.status, []
 
             async def lose_one():

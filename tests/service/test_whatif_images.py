@@ -25,7 +25,7 @@ def inspected(bench, settings_file):
             outcome = await cell.line.inspect()
             assert outcome.outcome == "PASS", outcome
             async with asyncio.timeout(60):
-                while cell.station.service.ledger.records.status().images_waiting:
+                while cell.station.service.registry.records.status().images_waiting:
                     await asyncio.sleep(0.05)
 
     asyncio.run(scenario())

@@ -1,1 +1,1 @@
-"""The robot arm."""
+"""Robot arm: its Protocol and its driver."""

@@ -1,4 +1,4 @@
-"""How old a state is that carries the time of another machine's clock."""
+"""Age of a state that has the timestamp of another machine's clock."""
 
 from collections import deque
 
@@ -9,16 +9,16 @@ WINDOW_S = 30.0
 class TimestampAge:
     """The age of a stream's latest timestamp.
 
-    The two clocks share neither their zero nor quite their rate. The least difference seen lately between them stands
-    for a state that came at once; what a state's difference exceeds it by is its age. A stream that froze ages with our
-    own clock, and one that comes late shows how late.
+    The two clocks differ in zero and slightly in rate. The least recent difference between them is taken as that of a
+    state without delay; a state's age is the excess of its difference over it. A frozen stream ages with our own clock,
+    and a delayed one shows its delay.
     """
 
     def __init__(self) -> None:
         self._lows: deque[tuple[float, float]] = deque()
 
     def age_s(self, timestamp_s: float, now_s: float) -> float:
-        """The age of a state.
+        """Return the age of a state.
 
         Args:
             timestamp_s: the latest timestamp, on the sender's clock.

@@ -1,4 +1,4 @@
-"""What the station may ask of an arm."""
+"""Arm interface of the station."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,37 +9,36 @@ from station.settings.arm import PoseName
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """What is known of the arm now; what is not surely known is None."""
+    """State of the arm; uncertain values are None."""
 
     age_s: float | None
-    """How old the controller's state is; None where none has come."""
+    """Age of the controller's state; None if there is none yet."""
     joints_rad: tuple[float, ...] | None
-    """Six joint positions; None where the state is stale."""
+    """Six joint positions; None if the state is stale."""
     tool_position_mm: tuple[float, float, float] | None
-    """The tool centre point in the base's frame; None where the state is stale."""
+    """The tool centre point in the base's frame; None if the state is stale."""
     moving: bool | None
-    """Whether the arm moves; None where the state is stale."""
+    """Whether the arm moves; None if the state is stale."""
     at: PoseName | None
-    """The named pose where the arm stands, `nest` also beside it; None where it is elsewhere, moves, or the state is
-    stale."""
+    """The arm's named pose, `nest` also with an offset; None if it is elsewhere, moves, or the state is stale."""
     fault: ArmFault | None
-    """Why nothing can be moved; None where the arm is ready."""
+    """Fault that prevents motion; None if the arm is ready."""
 
     @property
     def ready(self) -> bool:
-        """Whether a motion may be asked for."""
+        """Whether a motion may be requested."""
         return self.fault is None
 
 
 class Arm(Protocol):
-    """An arm between named poses. Everything that cannot be done raises `ArmFault` with its cause and remedy."""
+    """Arm that moves between named poses. A failure raises `ArmFault` with its cause and remedy."""
 
     async def state(self) -> ArmState:
-        """What is known now; it never raises and never waits longer than the state is good for."""
+        """Return the state now; never raises and never waits longer than a state is valid."""
         ...
 
     def renew_health(self, lease_s: float) -> None:
-        """Say that the station is healthy for a while; when the lease runs out, the controller stops the arm.
+        """Renew the health lease; when it runs out, the controller stops the arm.
 
         Args:
             lease_s: seconds from now.
@@ -47,26 +46,26 @@ class Arm(Protocol):
         ...
 
     async def move_to(self, pose: PoseName) -> None:
-        """Go to a pose and return when it is reached; already being there is no motion. A cancelled move is stopped.
+        """Move to a pose and return when it is reached; no motion if it is there already. A cancelled move is stopped.
 
         Raises:
-            ArmFault: the arm is not ready, cannot go there, or was kept from arriving.
+            ArmFault: the arm is not ready, cannot move there, or was stopped on the way.
         """
         ...
 
     async def move_beside_nest(self, offset_mm: tuple[float, float, float]) -> None:
-        """Go straight to the nest moved by an offset, and return when it is reached. A cancelled move is stopped.
+        """Move straight to the nest plus an offset, and return when it is reached. A cancelled move is stopped.
 
         Args:
             offset_mm: from the nest, along the tool's own x, y and z.
 
         Raises:
-            ArmFault: the arm is not ready, may not go there, or was kept from arriving.
+            ArmFault: the arm is not ready, may not move there, or was stopped on the way.
         """
         ...
 
     async def stop(self) -> None:
-        """Brake to rest; an arm at rest stays so. This is no emergency stop.
+        """Brake to rest; an arm at rest does not change. This is no emergency stop.
 
         Raises:
             ArmFault: the controller does not confirm; its watchdog then stops the arm.
@@ -74,7 +73,7 @@ class Arm(Protocol):
         ...
 
     async def confirm_protective_stop(self) -> None:
-        """A person has seen why the arm stopped: leave the protective stop and make the arm ready again.
+        """Leave the protective stop, after a person has checked its cause, and make the arm ready again.
 
         Raises:
             ArmFault: the controller refuses, or the arm does not become ready.
@@ -82,7 +81,7 @@ class Arm(Protocol):
         ...
 
     async def power_on_and_release_brakes(self) -> None:
-        """A person has made sure that the arm may start: power, brakes, program. A running arm is left as it is.
+        """Power on, release the brakes, start the program, after a person's check. A running arm does not change.
 
         Raises:
             ArmFault: the controller refuses, or the arm does not become ready.
@@ -90,7 +89,7 @@ class Arm(Protocol):
         ...
 
     async def upload_again(self) -> None:
-        """A person wants the program to run again after it was stopped; a running one is left as it is.
+        """Restart the program for a person after it was stopped; a running one does not change.
 
         Raises:
             ArmFault: the program does not play.
@@ -98,5 +97,5 @@ class Arm(Protocol):
         ...
 
     async def close(self) -> None:
-        """Let the arm go; closing twice does nothing."""
+        """Close the connection. Idempotent."""
         ...

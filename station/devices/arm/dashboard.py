@@ -1,4 +1,4 @@
-"""A client of the controller's dashboard server: one short connection for each conversation.
+"""Dashboard client of the controller: one short connection for each conversation.
 
 Source of commands and answers: Universal Robots, "Dashboard Server e-Series".
 """
@@ -18,7 +18,7 @@ LONGEST_LINE = 4096
 
 @dataclass(frozen=True, slots=True)
 class DashboardFacts:
-    """What the controller says of itself."""
+    """Facts that the controller reports about itself."""
 
     version: str
     serial_number: str
@@ -29,13 +29,13 @@ class DashboardFacts:
 
 
 class DashboardConversation:
-    """Lines and answers on one connection."""
+    """Requests and replies on one connection."""
 
     def __init__(self, host: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._host, self._reader, self._writer = host, reader, writer
 
-    async def hear(self) -> str:
-        """The next line.
+    async def read_line(self) -> str:
+        """Read the next line.
 
         Raises:
             ArmFault: none came in time, or it is no text.
@@ -49,8 +49,8 @@ class DashboardConversation:
             raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} does not speak its protocol")
         return line.decode("ascii").strip()
 
-    async def say(self, command: str) -> str:
-        """Send a line and give the answer.
+    async def request(self, command: str) -> str:
+        """Send a line and return the reply.
 
         Raises:
             ArmFault: none came in time.
@@ -60,33 +60,30 @@ class DashboardConversation:
             await self._writer.drain()
         except OSError as error:
             raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} hung up") from error
-        return await self.hear()
+        return await self.read_line()
 
     async def facts(self) -> DashboardFacts:
-        """Everything that the driver and the device check want to know.
+        """Read all facts for the driver and the device check.
 
         Raises:
             ArmFault: an answer did not come in time.
         """
         return DashboardFacts(
-            version=(await self.say("PolyscopeVersion")).removeprefix("URSoftware "),
-            serial_number=await self.say("get serial number"),
-            model=await self.say("get robot model"),
-            robot_mode=(await self.say("robotmode")).removeprefix("Robotmode: "),
-            safety_status=(await self.say("safetystatus")).removeprefix("Safetystatus: "),
-            remote="true" in await self.say("is in remote control"),
+            version=(await self.request("PolyscopeVersion")).removeprefix("URSoftware "),
+            serial_number=await self.request("get serial number"),
+            model=await self.request("get robot model"),
+            robot_mode=(await self.request("robotmode")).removeprefix("Robotmode: "),
+            safety_status=(await self.request("safetystatus")).removeprefix("Safetystatus: "),
+            remote="true" in await self.request("is in remote control"),
         )
 
 
 @contextlib.asynccontextmanager
 async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
-    """Connect and hear the greeting.
-
-    Args:
-        host: the controller's address.
+    """Connect and read the greeting.
 
     Raises:
-        ArmFault: nobody answers, or not in the protocol.
+        ArmFault: no answer, or none in the protocol.
     """
     try:
         async with asyncio.timeout(LINE_DEADLINE_S):
@@ -98,7 +95,7 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         raise ArmFault(ArmCause.LINK_LOST, detail) from error
     try:
         conversation = DashboardConversation(host, reader, writer)
-        greeting = await conversation.hear()
+        greeting = await conversation.read_line()
         if "Dashboard Server" not in greeting:
             raise ArmFault(ArmCause.LINK_LOST, f"what answers at {host}:{PORT} is no dashboard server: {greeting!r}")
         yield conversation

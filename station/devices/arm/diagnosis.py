@@ -1,4 +1,4 @@
-"""From what was seen of a controller to the cause why its arm cannot move."""
+"""Diagnosis of an arm that cannot move: from the controller's state to the cause."""
 
 from station.devices.arm.dashboard import DashboardFacts
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -18,11 +18,11 @@ SAFETY_CAUSES: tuple[tuple[int, ArmCause, str], ...] = (
 """Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first."""
 
 STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
-"""The causes that the state alone shows, and shows the end of."""
+"""Causes whose start and end the state alone shows."""
 
 
 def from_state(snapshot: Snapshot) -> ArmFault | None:
-    """What the state alone tells; None where power and safety let the arm move."""
+    """Return the cause that the state alone shows; None if power and safety let the arm move."""
     for bits, cause, words in SAFETY_CAUSES:
         if snapshot.safety_bits & bits:
             return ArmFault(cause, words)
@@ -31,14 +31,14 @@ def from_state(snapshot: Snapshot) -> ArmFault | None:
     return None
 
 
-def why_not_done(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_healthy: bool) -> ArmFault:
-    """The cause why a command was not done or no program plays.
+def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: str, *, was_healthy: bool) -> ArmFault:
+    """Return the cause why a command was not done or no program plays.
 
     Args:
         snapshot: the controller's state.
-        facts: what its dashboard server said.
-        words: what ur-rtde said, if anything.
-        was_healthy: whether the station had said without a gap that it is healthy.
+        facts: of its dashboard server.
+        output: ur-rtde's output, if any.
+        was_healthy: the station's health lease was renewed without a gap.
     """
     fault = from_state(snapshot)
     if fault is not None:
@@ -46,14 +46,14 @@ def why_not_done(snapshot: Snapshot, facts: DashboardFacts, words: str, *, was_h
     if not facts.remote:
         return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
     if snapshot.runtime_state == PLAYING:
-        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {words}".rstrip())
+        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {output}".rstrip())
     if not was_healthy:
         return ArmFault(ArmCause.WATCHDOG, "the controller's watchdog stopped the program: the station was not healthy")
-    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {words}".rstrip())
+    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {output}".rstrip())
 
 
-def from_words(words: str) -> ArmFault | None:
-    """What ur-rtde's own exceptions tell; None where they leave it open."""
+def from_output(words: str) -> ArmFault | None:
+    """Return the cause in ur-rtde's own exceptions; None if they leave it open."""
     lowered = words.lower()
     if "remote control" in lowered:
         return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")

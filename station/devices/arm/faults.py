@@ -1,4 +1,4 @@
-"""Why an arm does not do what it is asked, and what a person can do about it."""
+"""Arm faults: causes and remedies."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ from station.errors import StationError
 
 
 class ArmCause(StrEnum):
-    """The causes that the driver tells apart."""
+    """Causes that the driver distinguishes."""
 
     LINK_LOST = "link_lost"
     STALE = "stale"
@@ -54,7 +54,7 @@ REMEDIES: dict[ArmCause, str] = {
 
 
 class ArmFault(StationError):  # noqa: N818 (a fault in the field's sense)
-    """A cause with what was seen of it; the text ends with the remedy."""
+    """Fault of the arm: its cause and its details; the text ends with the remedy."""
 
     def __init__(self, cause: ArmCause, detail: str) -> None:
         self.cause = cause
@@ -63,5 +63,5 @@ class ArmFault(StationError):  # noqa: N818 (a fault in the field's sense)
 
     @property
     def remedy(self) -> str:
-        """What a person can do."""
+        """Return the remedy."""
         return REMEDIES[self.cause]

@@ -1,7 +1,7 @@
-"""The link to the controller: the process that ur-rtde lives in, brought up, watched, and put back when it is gone.
+"""Arm link: starts, monitors and restarts the ur-rtde process of one controller.
 
-The link comes back by itself after a drop. What a person has to look at stays as a fault until that person's verb:
-a stop of any kind, a program that no longer plays, a budget of restarts that is used up.
+The link reconnects by itself after a drop. A fault that a person has to check remains until that person's command: a
+stop of any kind, a program that no longer plays, an exhausted restart budget.
 """
 
 import asyncio
@@ -11,11 +11,11 @@ import time
 from collections import deque
 from typing import NoReturn
 
-from station.devices.arm.child import ArmProcess
 from station.devices.arm.dashboard import dashboard
-from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, from_state, from_words, why_not_done
+from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_output, from_state
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.process_handle import ArmProcess
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 class ArmLink:
-    """One controller's link, kept up by a task of its own. Everything that touches the process goes one at a time."""
+    """Link to one controller, maintained by a task of its own. All access to the process is serialised."""
 
     def __init__(self, settings: ArmSettings) -> None:
         self._settings = settings
@@ -43,7 +43,7 @@ class ArmLink:
         self._healthy_until_s = 0.0
         self._was_healthy = True
         self._lock = asyncio.Lock()
-        self._keeping: asyncio.Task[None] | None = None
+        self._maintaining: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         self.fault_since_s = 0.0
         """When the fault was seen, on the machine's monotonic clock."""
@@ -52,17 +52,17 @@ class ArmLink:
 
     @property
     def fault(self) -> ArmFault | None:
-        """Why nothing can be moved: a lost link, else what waits for a person; None where the program plays."""
+        """Return why nothing can be moved: a lost link, or a fault that waits for a person; None if ready."""
         return self._lost or self._latched
 
     @property
     def lost(self) -> ArmFault | None:
-        """Why nothing is known of the arm; None where the link is up, whatever else waits for a person."""
+        """Return why the arm's state is unknown; None if the link is up, whatever else waits for a person."""
         return self._lost
 
     @property
     def pid(self) -> int | None:
-        """The id of the process at the moment."""
+        """Return the id of the present process."""
         return self._process.pid if self._process is not None else None
 
     @property
@@ -71,22 +71,22 @@ class ArmLink:
         return time.monotonic() < self._healthy_until_s
 
     def renew_health(self, lease_s: float) -> None:
-        """The station is healthy for so many seconds from now."""
+        """Renew the health lease, in seconds from now."""
         self._healthy_until_s = time.monotonic() + lease_s
 
     async def open(self) -> None:
-        """Begin to keep the link up."""
-        if self._keeping is None:
+        """Start to maintain the link."""
+        if self._maintaining is None:
             self.renew_health(FIRST_LEASE_S)
             self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet"), None
-            self._keeping = asyncio.create_task(self._keep(), name="the arm's link")
+            self._maintaining = asyncio.create_task(self._keep(), name="the arm's link")
 
     async def close(self) -> None:
-        """End the process; closing twice does nothing."""
-        if self._keeping is not None:
-            self._keeping.cancel()
-            await asyncio.gather(self._keeping, return_exceptions=True)
-            self._keeping = None
+        """End the process. Idempotent."""
+        if self._maintaining is not None:
+            self._maintaining.cancel()
+            await asyncio.gather(self._maintaining, return_exceptions=True)
+            self._maintaining = None
         async with self._lock:
             await self._drop()
         self._set(ArmFault(ArmCause.CLOSED, "the arm was closed"))
@@ -95,7 +95,7 @@ class ArmLink:
         """Wait until the arm is ready or waits for a person.
 
         Raises:
-            ArmFault: why it is not ready.
+            ArmFault: it is not ready.
         """
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(deadline_s):
@@ -106,7 +106,7 @@ class ArmLink:
             raise self.fault
 
     async def snapshot(self) -> Snapshot:
-        """The controller's state, asked for now; the time of asking is added to its age.
+        """Read the controller's state now; the request's duration is added to its age.
 
         Raises:
             ArmFault: there is none.
@@ -116,7 +116,7 @@ class ArmLink:
             raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
         limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=limit_s)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=limit_s)
         except ArmFault as fault:
             if fault.cause is ArmCause.DEADLINE:
                 raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
@@ -126,10 +126,10 @@ class ArmLink:
         return snapshot.model_copy(update={"age_s": snapshot.age_s + time.monotonic() - begun_s})
 
     async def order(self, request: Beside | Move | Reachable | Halt) -> Outcome:
-        """Have the process carry out a command; when it does not answer it is ended, and the watchdog stops the arm.
+        """Send a command to the process; if it does not answer it is ended, and the watchdog stops the arm.
 
         Raises:
-            ArmFault: there is no process, it gave no answer, or the controller's state grew too old meanwhile.
+            ArmFault: there is no process, it gave no answer, or the controller's state became too old meanwhile.
         """
         limit_s = self._settings.call_deadline_s
         try:
@@ -151,7 +151,7 @@ class ArmLink:
             self._lock.release()
 
     async def _ask_watched(self, process: ArmProcess, request: Beside | Move | Reachable | Halt) -> Outcome:
-        asking = asyncio.create_task(process.ask(request, Outcome, deadline_s=self._settings.call_deadline_s))
+        asking = asyncio.create_task(process.request(request, Outcome, deadline_s=self._settings.call_deadline_s))
         fading = asyncio.create_task(self._until_faded(process))
         try:
             await asyncio.wait({asking, fading}, return_when=asyncio.FIRST_COMPLETED)
@@ -167,13 +167,13 @@ class ArmLink:
             await self._heard(process)
 
     async def _heard(self, process: ArmProcess) -> Snapshot:
-        snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
         if snapshot.age_s > self._settings.link_lost_after_s:
             raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
         return snapshot
 
     async def upload(self) -> None:
-        """Bring the program to play, over the standing link or a new one; a playing one is left alone.
+        """Start the program, over the present link or a new one; a playing one does not change.
 
         Raises:
             ArmFault: it does not play.
@@ -202,7 +202,7 @@ class ArmLink:
             if self.fault is not None:
                 raise self.fault
         elif snapshot.runtime_state != PLAYING:
-            done = await process.ask(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
+            done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:
                 raise await self._explain(done.words)
             self._up()
@@ -210,10 +210,10 @@ class ArmLink:
             self._set(None)
 
     async def _free_to_move(self, process: ArmProcess) -> Snapshot:
-        # The RTDE state may lag a little behind what the dashboard server has just said.
+        # The RTDE state may lag a little behind the dashboard server's reply.
         deadline_s = time.monotonic() + SETTLE_S
         while True:
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             fault = from_state(snapshot)
             if fault is None:
                 return snapshot
@@ -228,7 +228,7 @@ class ArmLink:
                     await self._step()
                 except ArmFault as fault:
                     await self._lose(fault)
-                except Exception as error:  # the link outlives whatever else goes wrong with it
+                except Exception as error:  # the link outlives any other failure
                     log.exception("the arm's link")
                     await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
             await asyncio.sleep(self._pause_s())
@@ -243,7 +243,7 @@ class ArmLink:
             await self._watch(self._process)
         elif self._latched is None or self._latched.cause is not ArmCause.RESTARTS:
             process = await self._connect()
-            snapshot = await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             fault = from_state(snapshot) or self._latched
             if fault is None:
                 await self._command(process)
@@ -263,13 +263,13 @@ class ArmLink:
         elif latched is not None and latched not in STATE_CAUSES:
             return
         elif snapshot.runtime_state != PLAYING:
-            self._face(await self._explain(""))
+            self._store_or_raise(await self._explain(""))
         elif self._lost is not None:
             self._set(None)
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):
-            pass  # whether anybody is there at all is asked before a start is spent on it
+            pass  # check that a controller answers before a start is spent on it
         now_s = time.monotonic()
         while self._starts_s and now_s - self._starts_s[0] > self._settings.restart_window_s:
             self._starts_s.popleft()
@@ -280,9 +280,9 @@ class ArmLink:
             )
         self._starts_s.append(now_s)
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
-        outcome = await self._process.ask(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
+        outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
-            raise from_words(outcome.words) or ArmFault(
+            raise from_output(outcome.words) or ArmFault(
                 ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}"
             )
         return self._process
@@ -295,42 +295,42 @@ class ArmLink:
             payload_centre_mm=settings.payload_centre_mm,
             watchdog_hz=settings.watchdog_hz,
         )
-        outcome = await process.ask(request, Outcome, deadline_s=settings.constructor_limit_s)
+        outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
         if not outcome.done:
-            self._face(await self._explain(outcome.words))
+            self._store_or_raise(await self._explain(outcome.words))
         else:
             # The lease that the process knew may have run out while the connection was made: renew it before the
-            # watchdog that has just been set up looks for a kick. Whether it answers is the next beat's matter.
+            # watchdog that has just been set up expects a kick. The next beat checks whether it answers.
             with contextlib.suppress(ArmFault):
-                await process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+                await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
 
     async def _explain(self, words: str) -> ArmFault:
-        fault = from_words(words)
+        fault = from_output(words)
         if fault is not None or self._process is None:
             return fault or ArmFault(ArmCause.LINK_LOST, f"the arm is not connected: {words}")
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
-        snapshot = await self._process.ask(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        return why_not_done(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        return diagnose(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
-    async def explain(self, words: str) -> ArmFault:
-        """The cause why a command was not done, which is then the link's fault.
+    async def explain(self, output: str) -> ArmFault:
+        """Return the cause why a command was not done; it becomes the link's fault.
 
         Args:
-            words: what ur-rtde said.
+            output: ur-rtde's output.
         """
         async with self._lock:
             try:
-                fault = await self._explain(words)
-                self._face(fault)
+                fault = await self._explain(output)
+                self._store_or_raise(fault)
             except ArmFault as lost:
                 fault = lost
                 await self._lose(lost)
             return fault
 
-    def _face(self, fault: ArmFault) -> None:
-        """Keep what waits for a person; raise what a new process may mend."""
+    def _store_or_raise(self, fault: ArmFault) -> None:
+        """Store a fault that waits for a person; raise one that a new process may clear."""
         if fault.cause in SELF_HEALING:
             raise fault
         self._set(fault)

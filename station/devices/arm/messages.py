@@ -1,4 +1,4 @@
-"""What the driver and its process say to each other."""
+"""Channel messages between the driver and the ur-rtde process."""
 
 from typing import ClassVar
 
@@ -25,20 +25,20 @@ class Command(Message):
 
 
 class Upload(Message):
-    """Send the control program again over the standing connection and see that it plays."""
+    """Send the control program again over the present connection and check that it plays."""
 
     purpose: ClassVar[str] = "to upload the control program again"
 
 
 class Beat(Message):
-    """Tell the state; the station is healthy for so long from now."""
+    """Read the state; the station is healthy for so long from now."""
 
     purpose: ClassVar[str] = "for the arm's state"
     healthy_for_s: float
 
 
 class Beside(Message):
-    """Ask for the joint positions that bring the tool beside other joint positions' place, not turned."""
+    """Compute the joint positions of a tool pose with an offset and the same orientation."""
 
     purpose: ClassVar[str] = "for the way to a place beside"
     joints_rad: Six
@@ -47,19 +47,19 @@ class Beside(Message):
 
 
 class Move(Message):
-    """Begin a motion to joint positions, straight for the tool or straight for the joints."""
+    """Start a motion to joint positions, straight for the tool or straight for the joints."""
 
     purpose: ClassVar[str] = "to begin a motion"
     joints_rad: Six
     straight: bool
     speed: float
-    """rad/s, or mm/s where straight."""
+    """rad/s, or mm/s if straight."""
     acceleration: float
-    """rad/s², or mm/s² where straight."""
+    """rad/s², or mm/s² if straight."""
 
 
 class Reachable(Message):
-    """Ask whether joint positions are within the safety limits and have a solution."""
+    """Check that joint positions are within the safety limits and have a solution."""
 
     purpose: ClassVar[str] = "whether the pose is reachable"
     joints_rad: Six
@@ -73,12 +73,12 @@ class Halt(Message):
 
 
 class Outcome(Message):
-    """Whether it was done; where not, what ur-rtde said."""
+    """Success, or ur-rtde's output after a failure."""
 
     done: bool
     words: str = ""
     joints_rad: Six | None = None
-    """What was asked for, of `Beside`."""
+    """Result of `Beside`."""
 
 
 class Snapshot(Message):
@@ -93,8 +93,8 @@ class Snapshot(Message):
     safety_bits: int
     runtime_state: int
     commanding: bool
-    """Whether the connection that commands stands."""
+    """Whether the commanding connection is up."""
     underway: bool
     """Whether the control program reports a motion."""
     kicks_late: bool = False
-    """Whether the controller's watchdog was left without a kick for longer than its limit since the program began."""
+    """Whether the controller's watchdog was not kicked within its limit since the program began."""

@@ -1,12 +1,12 @@
-"""A place beside a tool's pose, by the tool's own axes."""
+"""Offset of a tool's pose along the tool's own axes."""
 
 from math import cos, hypot, sin
 
 from station.devices.arm.messages import Position, Six
 
 
-def beside(pose: Six, offset_mm: Position) -> Six:
-    """The pose moved by an offset in its own axes, and not turned.
+def offset_pose(pose: Six, offset_mm: Position) -> Six:
+    """Return the pose with an offset along its own axes, with the same orientation.
 
     Args:
         pose: x, y, z in m and the rotation vector in rad.

@@ -1,22 +1,22 @@
-"""A look at the arm's controller that changes nothing: what `station devices check` shows of it."""
+"""Arm check of `station devices check`: reads the controller and changes nothing."""
 
 import asyncio
 import struct
 
 from station.devices.arm.dashboard import DashboardFacts, dashboard
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
-from station.devices.finding import Finding
+from station.devices.check_result import CheckResult
 from station.settings.arm import ArmSettings
 
 RTDE_PORT = 30004
 SCRIPT_PORT = 30003
 PORT_DEADLINE_S = 2.5
 FRESH_S = 0.3
-"""In that time from its start on a stream must have shown its clock advance: it is neither frozen nor late."""
+"""Time from a stream's start within which its clock has to advance: then it is neither frozen nor late."""
 STREAM_HZ = 125.0
 HEADER = struct.Struct(">HB")
 CLAIM = b"input_int_register_23,input_double_register_23"
-"""A fieldbus holds registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: to claim one of those, however
+"""A fieldbus may own registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: claiming one of those, even
 shortly, would refuse a station that connects at that moment."""
 LONGEST_WORD = 120
 NOBODY_THERE = "Check arm.host in station.yaml, and that the controller is on and its network cable is in."
@@ -26,21 +26,17 @@ FROZEN = (
 )
 
 
-async def probe_arm(settings: ArmSettings) -> list[Finding]:
-    """Ask the controller's dashboard, RTDE and script servers. It moves nothing, starts nothing and never raises.
-
-    Args:
-        settings: where the controller is.
-    """
+async def probe_arm(settings: ArmSettings) -> list[CheckResult]:
+    """Check the controller's dashboard, RTDE and script servers. It moves nothing, starts nothing and never raises."""
     try:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
     except ArmFault as fault:
-        return [Finding("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
+        return [CheckResult("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
     return [_controller(settings.host, facts), await _rtde(settings.host), await _script(settings.host)]
 
 
-def _controller(host: str, facts: DashboardFacts) -> Finding:
+def _controller(host: str, facts: DashboardFacts) -> CheckResult:
     found = (
         f"{_short(facts.model)} at {host}, serial number {_short(facts.serial_number)}, "
         f"PolyScope {_short(facts.version)}: {_short(facts.robot_mode)}, "
@@ -48,8 +44,8 @@ def _controller(host: str, facts: DashboardFacts) -> Finding:
     )
     cause = _cause(facts)
     if cause is None:
-        return Finding("arm controller", found, "ok", "")
-    return Finding("arm controller", found, "fault", REMEDIES[cause])
+        return CheckResult("arm controller", found, "ok", "")
+    return CheckResult("arm controller", found, "fault", REMEDIES[cause])
 
 
 def _cause(facts: DashboardFacts) -> ArmCause | None:
@@ -68,13 +64,13 @@ def _cause(facts: DashboardFacts) -> ArmCause | None:
 
 
 def _short(words: str) -> str:
-    """What a peer said, cut to what fits a line, without what a terminal would obey."""
+    """Cut a peer's text to one line, without control characters."""
     legible = "".join(letter if letter.isprintable() else "?" for letter in words)
     return legible if len(legible) <= LONGEST_WORD else f"{legible[: LONGEST_WORD - 1]}…"
 
 
-async def _rtde(host: str) -> Finding:
-    """Ask for protocol version 2, for what a fieldbus holds and for the clock; the claim ends with the connection."""
+async def _rtde(host: str) -> CheckResult:
+    """Request protocol version 2, the registers of a fieldbus, and the clock; the claim ends with the connection."""
     place, connected = f"{host}:{RTDE_PORT}", False
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
@@ -90,22 +86,24 @@ async def _rtde(host: str) -> Finding:
                 writer.transport.abort()
     except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error) as error:
         if not connected:
-            return Finding("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
+            return CheckResult("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
         how = f"answers later than {PORT_DEADLINE_S:g} s" if isinstance(error, TimeoutError) else "hangs up"
-        return Finding("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
+        return CheckResult("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
     found = f"RTDE at {place}, controller {'.'.join(map(str, version))}"
     if accepted[:1] != b"\x01":
-        return Finding("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
+        return CheckResult("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
     if not fresh:
-        return Finding("arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN)
+        return CheckResult(
+            "arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN
+        )
     if b"IN_USE" in kinds:
         remedy = REMEDIES[ArmCause.REGISTERS_IN_USE]
-        return Finding("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
-    return Finding("arm RTDE", found, "ok", "")
+        return CheckResult("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
+    return CheckResult("arm RTDE", found, "ok", "")
 
 
 async def _advances(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
-    """Start the stream and see two different timestamps of it in time."""
+    """Start the stream and check that it gives two different timestamps in time."""
     try:
         async with asyncio.timeout(FRESH_S):
             await _exchange(reader, writer, b"S", b"")
@@ -124,7 +122,7 @@ async def _exchange(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, 
 
 
 async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
-    """The payload of the next package of a kind."""
+    """Return the payload of the next package of a kind."""
     while True:
         size, answered = HEADER.unpack(await reader.readexactly(HEADER.size))
         answer = await reader.readexactly(max(0, size - HEADER.size))
@@ -132,12 +130,12 @@ async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
             return answer
 
 
-async def _script(host: str) -> Finding:
+async def _script(host: str) -> CheckResult:
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             _, writer = await asyncio.open_connection(host, SCRIPT_PORT)
     except (TimeoutError, OSError):
         found = f"nobody takes programs at {host}:{SCRIPT_PORT}"
-        return Finding("arm programs", found, "fault", NOBODY_THERE)
+        return CheckResult("arm programs", found, "fault", NOBODY_THERE)
     writer.transport.abort()
-    return Finding("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")
+    return CheckResult("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")

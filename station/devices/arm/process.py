@@ -1,8 +1,8 @@
-"""The process that ur-rtde lives in: `python -m station.devices.arm.process ENDPOINT HOST FREQUENCY PARENT`.
+"""ur-rtde process: `python -m station.devices.arm.process ENDPOINT HOST FREQUENCY PARENT`.
 
 ur-rtde's constructors hold the interpreter's lock, hang on a silent peer, and a dropped link ends the process with a
-segmentation fault. So there is one such process for each connection; whoever started it kills it when it does not
-answer, and the kernel kills it when that one dies, which works even while ur-rtde holds the lock.
+segmentation fault. So there is one such process for each connection; its parent kills it when it does not answer, and
+the kernel kills it when the parent dies, which works even while ur-rtde holds the lock.
 """
 
 import asyncio
@@ -21,7 +21,7 @@ from station.channel.server import ChannelServer
 from station.devices.arm.age import TimestampAge
 from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
-from station.devices.arm.offset import beside
+from station.devices.arm.offset import offset_pose
 from station.errors import StationError
 
 VARIABLES = [
@@ -39,11 +39,11 @@ KICKS_PER_LIMIT = 4
 PR_SET_PDEATHSIG, PR_SET_TIMERSLACK = 1, 29
 """Numbers: prctl(2)."""
 TIMER_SLACK_NS = 1_000_000
-"""Half of the controller's fastest cycle: so much later may a state be seen than it came."""
+"""Half of the controller's fastest cycle: the longest delay between a state's arrival and its use."""
 
 
 class UrRtdeProcess:
-    """The handlers of the channel. Whatever commands the arm runs in one thread, one after the other."""
+    """Handlers of the channel. All that commands the arm runs in one thread, one after the other."""
 
     def __init__(self, host: str, frequency_hz: float) -> None:
         self._host, self._frequency_hz = host, frequency_hz
@@ -57,18 +57,18 @@ class UrRtdeProcess:
         self._kicks_late = self._played = False
 
     async def watch(self, _request: Watch) -> Outcome:
-        """Make the receiving connection; this holds the interpreter's lock until it stands."""
+        """Open the receiving connection; this holds the interpreter's lock until it is open."""
         try:
             self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         return Outcome(done=True)
 
     async def command(self, request: Command) -> Outcome:
-        """Make the commanding connection; this holds the interpreter's lock until it stands."""
+        """Open the commanding connection; this holds the interpreter's lock until it is open."""
         try:
             control = RTDEControlInterface(self._host, self._frequency_hz)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         self._control = control
         self._set_up = request
@@ -77,11 +77,11 @@ class UrRtdeProcess:
         return await self._on_arm(self._prepare)
 
     async def upload(self, _request: Upload) -> Outcome:
-        """Send the program again; ur-rtde's own answer says nothing, only a playing program counts."""
+        """Send the program again; ur-rtde's own result is not reliable, only a playing program counts."""
         return await self._on_arm(lambda: self._commanding().reuploadScript() and self._plays() and self._prepare())
 
     async def beat(self, request: Beat) -> Snapshot:
-        """Tell the state."""
+        """Return the state."""
         receive = self._receive
         if receive is None:
             raise StationError("the state is not received yet")
@@ -102,7 +102,7 @@ class UrRtdeProcess:
         )
 
     async def move(self, request: Move) -> Outcome:
-        """Begin a motion."""
+        """Start a motion."""
         joints = list(request.joints_rad)
 
         def begin() -> bool:
@@ -114,14 +114,14 @@ class UrRtdeProcess:
         return await self._on_arm(begin)
 
     async def beside(self, request: Beside) -> Outcome:
-        """Ask the controller how the tool gets beside a place; not done where it cannot."""
+        """Compute the joint positions for an offset by the controller; not done if there are none."""
         joints = list(request.joints_rad)
         found: list[float] = []
 
         def ask() -> bool:
             control = self._commanding()
             x, y, z, rx, ry, rz = control.getForwardKinematics(joints, self._tool())
-            pose = list(beside((x, y, z, rx, ry, rz), request.offset_mm))
+            pose = list(offset_pose((x, y, z, rx, ry, rz), request.offset_mm))
             if not control.getInverseKinematicsHasSolution(pose, joints):
                 return False
             found.extend(control.getInverseKinematics(pose, joints))
@@ -131,7 +131,7 @@ class UrRtdeProcess:
         return outcome.model_copy(update={"joints_rad": tuple(found)}) if outcome.done else outcome
 
     async def reachable(self, request: Reachable) -> Outcome:
-        """Ask the controller about joint positions, and about the tool's pose that they make."""
+        """Check joint positions, and the tool's pose at them, by the controller."""
         joints = list(request.joints_rad)
 
         def ask() -> bool:
@@ -153,7 +153,7 @@ class UrRtdeProcess:
         return await self._on_arm(brake)
 
     async def _kick(self, period_s: float) -> None:
-        """Keep the controller's watchdog quiet as long as the station says that it is healthy."""
+        """Kick the controller's watchdog as long as the health lease runs."""
         while True:
             await asyncio.sleep(period_s)
             control, playing = self._control, self._playing()
@@ -202,7 +202,7 @@ class UrRtdeProcess:
     async def _on_arm(self, call: Callable[[], bool]) -> Outcome:
         try:
             done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
-        except Exception as error:  # noqa: BLE001 (whatever ur-rtde throws is an answer)
+        except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, words=str(error))
         return Outcome(done=bool(done))
 
@@ -214,10 +214,10 @@ def die_with(parent: int) -> None:
         os._exit(1)
 
 
-def sleep_loosely() -> None:
-    """Let the kernel wake this thread, and all that it starts from now on, a little later than they ask for.
+def relax_timers() -> None:
+    """Let the kernel wake this thread, and all that it starts from now on, a little later than requested.
 
-    ur-rtde's threads look at their sockets every 0.1 ms, which costs more than all that they find there.
+    ur-rtde's threads poll their sockets every 0.1 ms, which costs more than all data that they read.
     """
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_TIMERSLACK, TIMER_SLACK_NS)
 
@@ -245,7 +245,7 @@ def main() -> None:
     """Run the process; its arguments are the endpoint, the controller's host, the frequency and the parent's id."""
     endpoint, host, frequency_hz, parent = sys.argv[1:]
     die_with(int(parent))
-    sleep_loosely()
+    relax_timers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asyncio.run(serve(endpoint, host, float(frequency_hz)))
 

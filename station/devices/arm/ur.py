@@ -1,4 +1,4 @@
-"""The driver of a Universal Robots arm. Unverified on hardware."""
+"""Driver of a Universal Robots arm. Unverified on hardware."""
 
 import asyncio
 import contextlib
@@ -24,13 +24,13 @@ AT_REST_RAD_S = 1e-3
 BESIDE_WITHIN_RAD = 2e-4
 """A place beside the nest is reached within this: 0.3 mm of the tool are at least 4e-4. Unverified on hardware."""
 SHORT_AFTER_S = 0.3
-"""How long a motion that has ended elsewhere may look so before it counts."""
+"""Time for which an arm has to be at rest elsewhere before the motion counts as failed."""
 
 
 class UrArm:
     """An `Arm` on ur-rtde, which lives in a process of its own. Belongs to the event loop in which it is opened.
 
-    A move to the nest, and the move that leaves it, is straight for the tool; the others are straight for the joints.
+    Moves to and from the nest are straight for the tool; the others are straight for the joints.
     """
 
     def __init__(self, settings: ArmSettings) -> None:
@@ -40,7 +40,7 @@ class UrArm:
         self._stopped = asyncio.Event()
         self._last_target: PoseName | None = None
         self._beside_rad: Six | None = None
-        """Where the arm was last sent beside the nest."""
+        """Last target beside the nest."""
         self._reachable: set[tuple[int, PoseName]] = set()
 
     async def __aenter__(self) -> Self:
@@ -51,32 +51,32 @@ class UrArm:
         await self.close()
 
     async def open(self) -> None:
-        """Begin to connect; `ready` says whether it went well. Opening twice does nothing."""
+        """Start to connect; `ready` waits for the result. Idempotent."""
         await self._link.open()
 
     async def ready(self, deadline_s: float) -> None:
         """Wait until the arm is ready.
 
         Raises:
-            ArmFault: why it is not, as soon as only a person can help, or at the deadline.
+            ArmFault: it is not ready: as soon as only a person can help, or at the deadline.
         """
         await self._link.settled(deadline_s)
 
     async def close(self) -> None:
-        """End the driver's process; the program that plays is stopped by the controller's watchdog."""
+        """End the driver's process; the controller's watchdog stops the playing program."""
         await self._link.close()
 
     @property
     def process_id(self) -> int | None:
-        """The id of the process that ur-rtde lives in; None where there is none."""
+        """Return the id of the ur-rtde process; None if there is none."""
         return self._link.pid
 
     def renew_health(self, lease_s: float) -> None:
-        """Say that the station is healthy for so many seconds; when they are over, the controller stops the arm."""
+        """Renew the health lease, in seconds from now; when it runs out, the controller stops the arm."""
         self._link.renew_health(lease_s)
 
     async def state(self) -> ArmState:
-        """What is known now; it waits at most for as long as a state is good."""
+        """Return the state now; waits at most for as long as a state is valid."""
         try:
             snapshot = await self._link.snapshot()
         except ArmFault as fault:
@@ -90,10 +90,10 @@ class UrArm:
         return ArmState(snapshot.age_s, snapshot.joints_rad, (x, y, z), moving, at, self._link.fault)
 
     async def move_to(self, pose: PoseName) -> None:
-        """Go to a pose and return when it is reached.
+        """Move to a pose and return when it is reached.
 
         Raises:
-            ArmFault: the arm is not ready, cannot go there, was stopped, or did not arrive.
+            ArmFault: the arm is not ready, cannot move there, was stopped, or did not arrive.
         """
         async with self._one_way(pose) as snapshot:
             known = (self._link.attachment, pose)
@@ -106,13 +106,13 @@ class UrArm:
             await self._go(target, pose, self._settings.reached_tolerance_rad, straight=straight)
 
     async def move_beside_nest(self, offset_mm: Position) -> None:
-        """Go straight to the nest moved by an offset, and return when it is reached.
+        """Move straight to the nest plus an offset, and return when it is reached.
 
         Args:
             offset_mm: from the nest, along the tool's own x, y and z; no longer than the settings allow.
 
         Raises:
-            ArmFault: the arm is not ready, may not go there, was stopped, or did not arrive.
+            ArmFault: the arm is not ready, may not move there, was stopped, or did not arrive.
         """
         most_mm, where = self._settings.centring.most_mm, "beside the nest"
         if math.hypot(*offset_mm) > most_mm:
@@ -155,32 +155,32 @@ class UrArm:
         """Leave the protective stop, which the controller refuses in its first 5 s, and make the arm ready again."""
         async with self._recovering("the protective stop"), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
-            while "PROTECTIVE_STOP" in await conversation.say("safetystatus"):
+            while "PROTECTIVE_STOP" in await conversation.request("safetystatus"):
                 await asyncio.sleep(max(RECOVERY_POLL_S, self._link.fault_since_s + UNLOCK_AFTER_S - time.monotonic()))
-                await conversation.say("close safety popup")
-                await conversation.say("unlock protective stop")
+                await conversation.request("close safety popup")
+                await conversation.request("unlock protective stop")
             await self._link.upload()
 
     async def power_on_and_release_brakes(self) -> None:
         """Power on, release the brakes and start the program; after a safety fault, restart the safety system first."""
         async with self._recovering("powering on"), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
-            status = await conversation.say("safetystatus")
+            status = await conversation.request("safetystatus")
             if "EMERGENCY_STOP" in status:
                 raise ArmFault(ArmCause.EMERGENCY_STOP, "an emergency stop button is still pressed")
             if "FAULT" in status or "VIOLATION" in status:
-                await conversation.say("restart safety")
-            while "RUNNING" not in (mode := await conversation.say("robotmode")):
-                await conversation.say("close safety popup")
+                await conversation.request("restart safety")
+            while "RUNNING" not in (mode := await conversation.request("robotmode")):
+                await conversation.request("close safety popup")
                 if "POWER_OFF" in mode:
-                    await conversation.say("power on")
+                    await conversation.request("power on")
                 elif "IDLE" in mode:
-                    await conversation.say("brake release")
+                    await conversation.request("brake release")
                 await asyncio.sleep(RECOVERY_POLL_S)
             await self._link.upload()
 
     async def upload_again(self) -> None:
-        """Start the program again after it was stopped; a program that plays is left alone."""
+        """Restart the program after it was stopped; a playing program does not change."""
         async with self._recovering("the upload"):
             await self._link.upload()
 
@@ -205,7 +205,7 @@ class UrArm:
 
     @contextlib.asynccontextmanager
     async def _one_way(self, where: str) -> AsyncIterator[Snapshot]:
-        """One motion at a time, of an arm that is ready."""
+        """Allow one motion at a time, of an arm that is ready."""
         if self._moving.locked():
             raise ArmFault(ArmCause.BUSY, f"the arm cannot go to {where}: it is still on its way elsewhere")
         async with self._moving:

@@ -1,1 +1,1 @@
-"""The tactile camera: what the station asks of it, and its drivers."""
+"""Tactile camera: its Protocol and its drivers."""

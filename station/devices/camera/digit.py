@@ -1,4 +1,4 @@
-"""The DIGIT on USB, through OpenCV's V4L2 capture. Unverified on hardware; its pure parts are tested.
+"""Driver of the DIGIT on USB, by OpenCV's V4L2 capture. Unverified on hardware; its pure parts are tested.
 
 Sources: the sensor's published USB descriptor (vendor 2833, product 0209) and its public driver's behaviour: VGA at
 30 frames/s in YUYV, LEDs of 4 bits a colour packed into the UVC zoom control (firmware 2.00 and newer).
@@ -40,7 +40,7 @@ _STOP_DEADLINE_S = 12.0
 
 
 class Capture(Protocol):
-    """What is used of `cv2.VideoCapture`."""
+    """Used part of `cv2.VideoCapture`."""
 
     def isOpened(self) -> bool: ...  # noqa: N802, D102 (OpenCV's name)
     def set(self, propId: int, value: float, /) -> bool: ...  # noqa: D102
@@ -50,21 +50,17 @@ class Capture(Protocol):
 
 
 class DigitDevice(NamedTuple):
-    """A DIGIT that the kernel knows."""
+    """A DIGIT that the kernel lists."""
 
     serial: str
     node: str
     """Such as /dev/video0."""
     revision: str = ""
-    """Of the sensor and its firmware, as the USB descriptor has it: 0200 for 2.00."""
+    """Of the sensor and its firmware, from the USB descriptor: 0200 for 2.00."""
 
 
 def find_digits(sysfs: Path = SYSFS) -> list[DigitDevice]:
-    """The DIGITs that are plugged in, in the order of their nodes.
-
-    Args:
-        sysfs: the kernel's folder of video devices.
-    """
+    """Find the connected DIGITs, in the order of their nodes."""
     found = []
     for entry in sorted(sysfs.glob("video*"), key=lambda path: (len(path.name), path.name)):
         usb = (entry / "device").resolve().parent
@@ -83,7 +79,7 @@ def _text(path: Path) -> str:
 
 
 def packed_leds(leds: Leds) -> int:
-    """The value of the zoom control for a light: red in bits 8 to 11, green in 4 to 7, blue in 0 to 3.
+    """Return the zoom control's value for a light: red in bits 8 to 11, green in 4 to 7, blue in 0 to 3.
 
     Args:
         leds: brightness of each colour.
@@ -98,7 +94,7 @@ def packed_leds(leds: Leds) -> int:
 
 
 def to_portrait(image: Image) -> Image:
-    """The sensor's landscape picture as the station sees it: transposed, then flipped upside down.
+    """Rotate the sensor's landscape picture to the station's: transposed, then flipped upside down.
 
     Args:
         image: shape (480, 640, 3), dtype uint8.
@@ -110,7 +106,7 @@ def to_portrait(image: Image) -> Image:
 
 
 def set_mode(capture: Capture, serial: str) -> None:
-    """Ask for VGA at 30 frames/s in YUYV and read back what was given.
+    """Set VGA at 30 frames/s in YUYV and check the mode that the camera gives.
 
     Args:
         capture: an open capture.
@@ -135,22 +131,17 @@ def set_mode(capture: Capture, serial: str) -> None:
 
 
 def open_v4l2(node: str) -> Capture:
-    """Open a node with OpenCV.
-
-    Args:
-        node: such as /dev/video0.
-    """
+    """Open a node with OpenCV."""
     return cv2.VideoCapture(node, cv2.CAP_V4L2)  # pyright: ignore[reportReturnType] (OpenCV's stub has MatLike)
 
 
 class DigitCamera:
-    """The driver `digit`: a thread reads frame after frame, so that the kernel's buffer never holds an old one.
+    """Driver `digit`: a thread reads frame after frame, so that the kernel's buffer never has an old one.
 
-    A sensor that is lost is looked for by its serial number until the camera is closed.
+    A lost sensor is searched by its serial number until the camera is closed.
 
     Args:
-        settings: the camera's settings.
-        sysfs: where to look for sensors.
+        sysfs: folder that lists the sensors.
         opener: opens a node.
     """
 
@@ -169,7 +160,7 @@ class DigitCamera:
 
     @property
     def description(self) -> CameraDescription:
-        """Which camera it is; portrait."""
+        """Return the camera's description; portrait."""
         scale, name = self._settings.mm_per_px, f"DIGIT {self._serial}"
         return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision, self._notice)
 
@@ -219,7 +210,7 @@ class DigitCamera:
         self._leds_wanted.set()
 
     async def close(self) -> None:
-        """Let the sensor go. Idempotent."""
+        """Release the sensor. Idempotent."""
         thread, self._thread = self._thread, None
         if thread:
             self._stopping.set()
@@ -239,7 +230,7 @@ class DigitCamera:
                 self._capture(loop)
             except CameraError as error:
                 self._feed.trouble = str(error)
-            except Exception as error:  # noqa: BLE001 (whatever OpenCV throws, the sensor is looked for again)
+            except Exception as error:  # noqa: BLE001 (after any error of OpenCV the sensor is searched again)
                 self._feed.trouble = f"reading it failed: {error}"
             self._stopping.wait(_RETRY_S)
 

@@ -1,4 +1,4 @@
-"""Where a driver puts its frames and the station takes the newest: nothing queues up, nothing old is given."""
+"""Frame feed: the driver's newest frame for the station; no queue, no old frame."""
 
 import asyncio
 import time
@@ -8,12 +8,12 @@ from station.devices.camera.interface import Frame, FrameFault, Image, NoFrameEr
 
 
 class FrameFeed:
-    """The newest frame of one camera, judged only when somebody takes it.
+    """Newest frame of one camera, checked only when it is taken.
 
     Args:
         name: the camera's, for messages.
-        health: judges the frames.
-        remedy: what to do where no frame comes.
+        health: checks the frames.
+        remedy: for the message if no frame comes.
     """
 
     def __init__(self, name: str, health: FrameHealth, remedy: str = "Check its cable and its light") -> None:
@@ -26,18 +26,18 @@ class FrameFeed:
         self._sequence = 0
         self._given: Frame | None = None
         self.trouble = "it has sent nothing yet"
-        """What the driver has had to struggle with since the last frame; said where no frame comes."""
+        """The driver's faults since the last frame; part of the message if no frame comes."""
 
     def publish(
         self, image: Image, captured_s: float, width_mm: float | None = None, sequence: int | None = None
     ) -> None:
-        """Put a new frame; only from the event loop's thread.
+        """Set a new frame; only from the event loop's thread.
 
         Args:
             image: shape (height, width, 3), dtype uint8; not changed from now on.
             captured_s: monotonic time of its capture.
             width_mm: the gripper's width recorded with it.
-            sequence: the device's own number of the frame; counted here where the device has none.
+            sequence: the device's own number of the frame; counted here if the device has none.
         """
         self._before, self._image = self._image, image
         self._captured_s, self._width_mm = captured_s, width_mm
@@ -46,7 +46,7 @@ class FrameFeed:
         self._changed.set()
 
     async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """The newest frame, once there is one captured after a time.
+        """Return the newest frame, once there is one captured after a time.
 
         Args:
             newer_than_s: monotonic time.

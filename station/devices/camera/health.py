@@ -1,4 +1,4 @@
-"""Whether a frame is fit to be measured, told from its pixels, its time and the frame before it."""
+"""Frame check: faults of a frame, found from its pixels, its time and the frame before."""
 
 import cv2
 import numpy as np
@@ -20,10 +20,10 @@ _FITS_BETTER = 0.85
 
 
 class FrameHealth:
-    """Judges one camera's frames in their order.
+    """Checks one camera's frames in their order.
 
-    A seam is a line right across the image at which all of it steps at once; nothing pressed into a gel makes one.
-    With the image rolled back to the seam it either fits the light as it was before (shifted) or not (torn).
+    A seam is a line across the whole image with a step along all of it; nothing pressed into a gel makes one. With the
+    image rolled back to the seam it either fits the light of the frame before (shifted) or not (torn).
 
     Args:
         oldest_s: age beyond which a frame is stale.
@@ -35,11 +35,11 @@ class FrameHealth:
         self._baseline: npt.NDArray[np.float32] | None = None
 
     def judge(self, image: Image, before: Image | None, age_s: float) -> frozenset[FrameFault]:
-        """What is wrong with a frame; nothing, for a good one.
+        """Return the faults of a frame; none for a good one.
 
         Args:
             image: shape (height, width, 3), dtype uint8.
-            before: the frame that the camera gave just before it; None for its first.
+            before: the camera's frame just before it; None for its first.
             age_s: time since its capture.
         """
         faults: set[FrameFault] = set()
@@ -62,7 +62,7 @@ class FrameHealth:
         return frozenset(faults)
 
     def _broken(self, image: Image, coarse: npt.NDArray[np.float32]) -> FrameFault | None:
-        """Torn or shifted, where there is a seam; what is shifted has one alone."""
+        """Return torn or shifted, if there is a seam; a shifted frame has exactly one."""
         seams = [(axis, seam) for axis in (0, 1) if (seam := find_seam(image, axis)) is not None]
         if not seams:
             return None
@@ -75,9 +75,9 @@ class FrameHealth:
 
 
 def find_seam(image: Image, axis: int) -> int | None:
-    """The line at which the whole image steps, or None where there is none.
+    """Return the line at which the whole image steps, or None if there is none.
 
-    A step is told from a steep but smooth slope by what the slopes on both sides would make of it.
+    A step is distinguished from a steep but smooth slope by extrapolating the slopes on both sides.
 
     Args:
         image: shape (height, width, 3), dtype uint8.

@@ -1,4 +1,4 @@
-"""What the station asks of a tactile camera, whichever it is."""
+"""Tactile camera interface of the station."""
 
 import hashlib
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Mask = npt.NDArray[np.uint8]
 
 
 class CameraError(StationError):
-    """The camera cannot be used; the message says why and what to do."""
+    """The camera cannot be used; the message gives the reason and the remedy."""
 
 
 class NoCameraError(CameraError):
@@ -23,20 +23,20 @@ class NoCameraError(CameraError):
 
 
 class NoFrameError(CameraError):
-    """No frame as new as was asked for came in time."""
+    """No frame as new as requested came in time."""
 
 
 class CameraProtocolError(CameraError):
-    """What came is not what the camera's protocol allows."""
+    """A message that the camera's protocol does not allow."""
 
 
 class FrameFault(StrEnum):
-    """What is wrong with a frame; such a frame is not measured."""
+    """Faults of a frame; a faulty frame is not measured."""
 
     STALE = "stale"
     """Captured too long ago."""
     REPEATED = "repeated"
-    """The very pixels of the frame before: a live sensor's noise never does that."""
+    """The same pixels as the frame before: a live sensor's noise never repeats."""
     TORN = "torn"
     """Two pieces that do not fit along one line."""
     SHIFTED = "shifted"
@@ -44,25 +44,25 @@ class FrameFault(StrEnum):
     BLACK = "black"
     SATURATED = "saturated"
     WRONG_SIZE = "wrong_size"
-    """Not the mode that was asked for."""
+    """Not the requested mode."""
 
 
 @dataclass(frozen=True, slots=True)
 class CameraDescription:
-    """Which camera it is and what its frames are."""
+    """Identity of the camera, and its frames' properties."""
 
     name: str
     width_px: int
     height_px: int
     mm_per_px: float
     frames_per_s: float | None
-    """None where frames come as fast as they are asked for."""
+    """None if frames come as fast as they are requested."""
     serial: str = ""
     """Of the sensor, by which its calibration is found; empty for a recording."""
     revision: str = ""
-    """Of the sensor and its firmware, in its maker's digits; empty where none is told."""
+    """Of the sensor and its firmware, in its maker's digits; empty if unknown."""
     notice: str = ""
-    """What does not keep it from giving frames, and still wants a person; empty where there is nothing."""
+    """A condition that needs a person though frames come; empty for none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +70,17 @@ class Frame:
     """One image with its number and its time."""
 
     image: Image
-    """Shape (height, width, 3), dtype uint8, BGR, portrait; never changed after it was handed out."""
+    """Shape (height, width, 3), dtype uint8, BGR, portrait; never changed after it was published."""
     sequence: int
     captured_s: float
     """Monotonic time (`time.monotonic`) at which it was captured."""
     faults: frozenset[FrameFault] = frozenset()
     width_mm: float | None = None
-    """The gripper's width that was recorded with it; only a replay knows one."""
+    """The gripper's width that was recorded with it; only in a replay."""
 
     @property
     def content_hash(self) -> str:
-        """BLAKE2b of the pixels, 16 bytes in hexadecimal; about a millisecond, so it is made only when asked for."""
+        """Return the pixels' BLAKE2b, 16 bytes in hexadecimal; it takes about a millisecond, so only on demand."""
         return hashlib.blake2b(np.ascontiguousarray(self.image).data, digest_size=16).hexdigest()
 
 
@@ -94,11 +94,11 @@ class Leds:
 
 
 class Camera(Protocol):
-    """A tactile camera. Drivers hold nothing open before `open` and nothing after `close`."""
+    """A tactile camera. Drivers open nothing before `open` and leave nothing open after `close`."""
 
     @property
     def description(self) -> CameraDescription:
-        """Which camera it is; complete once it is open."""
+        """Return the camera's description; complete once it is open."""
         ...
 
     async def open(self) -> None:
@@ -110,16 +110,16 @@ class Camera(Protocol):
         ...
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """The first frame at hand that was captured after a time.
+        """Return the first available frame captured after a time.
 
-        A frame with faults is given too: the caller decides whether to ask again.
+        A frame with faults is returned too: the caller decides whether to try again.
 
         Args:
             newer_than_s: monotonic time that the capture must come after.
             deadline_s: longest wait, in seconds.
 
         Raises:
-            NoFrameError: no such frame came in time; also while the camera is lost and being looked for again.
+            NoFrameError: no such frame came in time; also while the camera is lost and being searched.
         """
         ...
 
@@ -135,5 +135,5 @@ class Camera(Protocol):
         ...
 
     async def close(self) -> None:
-        """Let the camera go. Idempotent."""
+        """Release the camera. Idempotent."""
         ...

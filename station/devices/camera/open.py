@@ -1,4 +1,4 @@
-"""From the settings to the camera's driver."""
+"""Camera factory: from the settings to the driver."""
 
 from station.devices.camera.digit import DigitCamera
 from station.devices.camera.interface import Camera
@@ -8,11 +8,7 @@ from station.settings.camera import CameraSettings
 
 
 def camera_from(settings: CameraSettings) -> Camera:
-    """Make the camera that the settings name; it is not opened yet.
-
-    Args:
-        settings: the camera's settings.
-    """
+    """Make the camera of the settings; it is not opened yet."""
     match settings.driver:
         case "digit":
             return DigitCamera(settings)

@@ -1,18 +1,18 @@
-"""What `station devices check` says of the camera."""
+"""Camera check of `station devices check`."""
 
 import math
 import time
 
 from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError
 from station.devices.camera.open import camera_from
-from station.devices.finding import Finding
+from station.devices.check_result import CheckResult
 from station.settings.camera import CameraSettings
 
 _FRAMES = 15
 _FRAME_DEADLINE_S = 1.0
 _SLOW_SHARE = 0.8
 _SHORTEST_S = 1e-3
-"""For the rate of a recording that is played as fast as asked."""
+"""Rate of a recording that is played as fast as requested."""
 
 REMEDIES = {
     FrameFault.STALE: "the computer or the link is too slow: close other programs, use a USB port of its own",
@@ -25,24 +25,20 @@ REMEDIES = {
 }
 
 
-async def probe_camera(settings: CameraSettings) -> list[Finding]:
-    """Open the camera, look at half a second of frames, and close it again. Never raises for a bad camera.
-
-    Args:
-        settings: the camera's settings.
-    """
+async def probe_camera(settings: CameraSettings) -> list[CheckResult]:
+    """Open the camera, check half a second of frames, and close it again. Never raises for a bad camera."""
     camera = camera_from(settings)
     try:
         await camera.open()
         return [_judged(camera, await _some_frames(camera, recorded=settings.driver == "replay"))]
     except CameraError as error:
-        return [Finding("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
+        return [CheckResult("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
     finally:
         await camera.close()
 
 
 async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
-    """So many frames, or as many as a recording has."""
+    """Read so many frames, or as many as a recording has."""
     frames: list[Frame] = []
     newest_s = -math.inf if recorded else time.monotonic()
     try:
@@ -55,7 +51,7 @@ async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
     return frames
 
 
-def _judged(camera: Camera, frames: list[Frame]) -> Finding:
+def _judged(camera: Camera, frames: list[Frame]) -> CheckResult:
     description = camera.description
     rate = (len(frames) - 1) / max(_SHORTEST_S, frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
@@ -64,10 +60,10 @@ def _judged(camera: Camera, frames: list[Frame]) -> Finding:
     if faults:
         sick = sum(1 for frame in frames if frame.faults)
         remedy = "; ".join(REMEDIES[fault] for fault in faults)
-        return Finding("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
+        return CheckResult("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
     if description.notice:
-        return Finding("camera", found, "warning", description.notice)
+        return CheckResult("camera", found, "warning", description.notice)
     if description.frames_per_s and len(frames) > 1 and rate < _SLOW_SHARE * description.frames_per_s:
         remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
-        return Finding("camera", found, "warning", remedy)
-    return Finding("camera", found, "ok", "")
+        return CheckResult("camera", found, "warning", remedy)
+    return CheckResult("camera", found, "ok", "")

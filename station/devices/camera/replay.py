@@ -1,4 +1,4 @@
-"""Recorded frames in the place of a sensor: a folder of images or a video, in real time or as fast as asked."""
+"""Replay camera: a recording, a folder of images or a video, in real time or as fast as requested."""
 
 import asyncio
 import csv
@@ -22,11 +22,7 @@ _REMEDY = "Start again to play it from its beginning, or name a longer one in ca
 
 
 class ReplayCamera:
-    """The driver `replay`. A recording is played once; opening again starts it from the beginning.
-
-    Args:
-        settings: the camera's settings.
-    """
+    """Driver `replay`. A recording is played once; opening again starts it from the beginning."""
 
     def __init__(self, settings: CameraSettings) -> None:
         self._settings = settings
@@ -39,7 +35,7 @@ class ReplayCamera:
 
     @property
     def description(self) -> CameraDescription:
-        """Which recording it is; its size is known once it is open."""
+        """Return the recording's description; its size is known once it is open."""
         height, width = self._size
         replay = self._settings.replay
         return CameraDescription(
@@ -51,7 +47,7 @@ class ReplayCamera:
 
         Raises:
             NoCameraError: the recording is missing, empty or no recording.
-            CameraError: the file of widths is not what it has to be.
+            CameraError: the file of widths is invalid.
         """
         if self._feed:
             return
@@ -69,10 +65,10 @@ class ReplayCamera:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """See `Camera.frame`; as fast as asked, each call after the first gives the recording's next frame.
+        """See `Camera.frame`; without a rate each call after the first gives the recording's next frame.
 
         Args:
-            newer_than_s: monotonic time that the capture must come after; without a rate it is not looked at.
+            newer_than_s: monotonic time that the capture must come after; ignored without a rate.
             deadline_s: longest wait, in seconds.
 
         Raises:
@@ -90,11 +86,7 @@ class ReplayCamera:
         return frame
 
     async def set_leds(self, leds: Leds) -> None:
-        """Does nothing: what is recorded keeps its light.
-
-        Args:
-            leds: not looked at.
-        """
+        """Do nothing: recorded frames keep their light."""
 
     async def close(self) -> None:
         """Stop playing. Idempotent."""
@@ -127,7 +119,7 @@ class ReplayCamera:
 
 
 def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
-    """The frames of a recording with their names, read one by one.
+    """Yield the frames of a recording with their names, read one by one.
 
     Args:
         source: a folder of images, taken in natural order, or a video, whose frames are named by their numbers.
@@ -158,7 +150,7 @@ def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
 
 
 def read_widths(path: Path) -> dict[str, float]:
-    """The gripper's width recorded with each image.
+    """Read the gripper's width recorded with each image.
 
     Args:
         path: CSV with the columns `image` and `width_mm`.

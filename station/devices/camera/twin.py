@@ -1,7 +1,7 @@
-"""The simulated DIGIT over TCP; its messages are described in docs/twin.md.
+"""Twin camera: the simulated DIGIT over TCP; its messages are described in docs/twin.md.
 
-Everything that arrives is checked before it is believed; a connection that breaks the protocol, goes silent or is
-cut is given up and made again for as long as the camera is open.
+Everything received is validated; a connection that breaks the protocol, goes silent or is cut is closed and reopened
+for as long as the camera is open.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 _LONGEST_SIDE = 4096
 _BUFFER_BYTES = 2**20
-"""A frame: with asyncio's 64 KiB the reading is paused and resumed a dozen times in each."""
+"""Size of a frame: with asyncio's 64 KiB, reading pauses and resumes a dozen times per frame."""
 _SILENCE_S = 2.0
 _OLDEST_S = 1e6
 _RETRY_S = 0.1
@@ -43,11 +43,7 @@ _FRAMES_PER_S = 30.0
 
 
 class TwinCamera:
-    """The driver `twin`.
-
-    Args:
-        settings: the camera's settings.
-    """
+    """Driver `twin`."""
 
     def __init__(self, settings: CameraSettings) -> None:
         self._settings = settings
@@ -57,7 +53,7 @@ class TwinCamera:
 
     @property
     def description(self) -> CameraDescription:
-        """Which camera it is."""
+        """Return the camera's description."""
         height, width = _SIZE
         name, serial = f"twin DIGIT at {self._where}", f"TWIN-{self._settings.twin.port}"
         return CameraDescription(name, width, height, self._settings.mm_per_px, _FRAMES_PER_S, serial)
@@ -110,15 +106,17 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the light could not be set; {_words(error)}") from error
+            raise CameraError(
+                f"camera twin at {self._where}: the light could not be set; {_describe(error)}"
+            ) from error
         if answer.get("kind") != "leds":
             raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
 
     async def true_mask(self, frame: Frame) -> Mask:
-        """What truly touched the gel in a frame, which only a twin can tell; never used for a measurement.
+        """Return the true contact mask of a frame, which only a twin has; never used for a measurement.
 
         Args:
-            frame: one of the last frames that this camera gave.
+            frame: one of the last frames of this camera.
 
         Returns:
             Shape (height, width), dtype uint8, 0 or 255.
@@ -140,7 +138,9 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(f"camera twin at {self._where}: the truth could not be read; {_words(error)}") from error
+            raise CameraError(
+                f"camera twin at {self._where}: the truth could not be read; {_describe(error)}"
+            ) from error
         return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
 
     async def close(self) -> None:
@@ -157,7 +157,7 @@ class TwinCamera:
             except CameraProtocolError as error:
                 self._feed.trouble = str(error)
             except (OSError, EOFError, TimeoutError) as error:
-                self._feed.trouble = _words(error)
+                self._feed.trouble = _describe(error)
             await asyncio.sleep(_RETRY_S)
 
     async def _listen(self) -> None:
@@ -184,8 +184,8 @@ class TwinCamera:
         return reader, writer
 
 
-def _words(error: OSError | EOFError) -> str:
-    """What became of the connection."""
+def _describe(error: OSError | EOFError) -> str:
+    """Describe the connection's failure."""
     if isinstance(error, EOFError):
         return "the connection was closed"
     if isinstance(error, TimeoutError):

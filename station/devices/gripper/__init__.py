@@ -1,1 +1,1 @@
-"""The gripper: a small Protocol, and Robotiq's 2F-85 behind it over two wires."""
+"""Gripper: its Protocol, and the driver of Robotiq's 2F-85 over two wires."""

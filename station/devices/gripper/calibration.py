@@ -1,4 +1,4 @@
-"""Millimetres and newtons to the gripper's counts and settings, and back.
+"""Gripper calibration: conversion of millimetres and newtons to the gripper's counts and settings, and back.
 
 Scales: Robotiq 2F-85 & 2F-140 instruction manual, speed and force registers; linear between the ends, and a force of
 20 to 235 N: both unverified on hardware.
@@ -13,11 +13,11 @@ SLOWEST_MM_S, FASTEST_MM_S = 20.0, 150.0
 WEAKEST_N, STRONGEST_N = 20.0, 235.0
 _FULL_SCALE = 255
 _ROUNDING = 1e-9
-"""Keeps what floating point makes of a tie, or of a whole setting, from deciding."""
+"""Tolerance for floating point errors at a tie, or at a whole setting."""
 
 
 def width_of_count(count: int, calibration: GripperCalibration) -> float:
-    """The gap for fruit at a position, mm; negative where the fingers press on each other.
+    """Return the gap for fruit at a position, mm; negative if the fingers press on each other.
 
     Args:
         count: position as read, 0 to 255.
@@ -28,12 +28,12 @@ def width_of_count(count: int, calibration: GripperCalibration) -> float:
 
 
 def max_width_mm(calibration: GripperCalibration) -> float:
-    """The gap for fruit when fully open, mm."""
+    """Return the gap for fruit when fully open, mm."""
     return width_of_count(calibration.open_count, calibration)
 
 
 def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
-    """The position whose width is nearest, at most half a count away; a tie goes to the wider gap.
+    """Return the position whose width is nearest, at most half a count away; a tie gives the wider gap.
 
     Args:
         width_mm: 0 to the widest gap of the finger set.
@@ -53,7 +53,7 @@ def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
 
 
 def speed_setting(speed_mm_s: float) -> int:
-    """The nearest speed setting, 0 to 255.
+    """Return the nearest speed setting, 0 to 255.
 
     Raises:
         GripperRequestError: the gripper cannot move at this speed.
@@ -67,7 +67,7 @@ def speed_setting(speed_mm_s: float) -> int:
 
 
 def force_setting(force_N: float) -> int:
-    """The force setting, 0 to 255, rounded down: never more force than asked for.
+    """Return the force setting, 0 to 255, rounded down: never more force than requested.
 
     Raises:
         GripperRequestError: the gripper cannot hold this force.

@@ -1,4 +1,4 @@
-"""What can be wrong with the gripper: each with a code, a cause and a remedy."""
+"""Gripper errors, each with a code, a cause and a remedy."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from station.errors import StationError
 
 
 class GripperError(StationError):
-    """The gripper cannot do what it was asked."""
+    """The gripper cannot carry out a request."""
 
     code = "gripper"
 
@@ -29,7 +29,7 @@ class GripperUnreachableError(GripperError):
 
 
 class GripperLinkLostError(GripperError):
-    """The connection broke. The gripper itself goes on with its last command."""
+    """The connection broke. The gripper continues its last command."""
 
     code = "link_lost"
 
@@ -41,13 +41,13 @@ class GripperSilentError(GripperError):
 
 
 class GripperProtocolError(GripperError):
-    """What came back is no answer to what was asked."""
+    """An invalid answer to a request."""
 
     code = "protocol"
 
 
 class GripperNotActiveError(GripperError):
-    """A motion was asked of a gripper that is not activated."""
+    """A motion was requested of a gripper that is not activated."""
 
     code = "not_active"
 
@@ -77,7 +77,7 @@ class GripperEmergencyStopError(GripperError):
 
 
 class FaultText(NamedTuple):
-    """A fault of the gripper in words."""
+    """Cause and remedy of a gripper fault, as text."""
 
     name: str
     cause: str
@@ -103,7 +103,7 @@ FAULTS: dict[int, FaultText] = {
 """gFLT. Source: Robotiq 2F-85 & 2F-140 instruction manual, fault status register."""
 
 NEEDS_ACTIVATION = range(0xA, 0x10)
-"""Codes that only a reset and an activation clear; the others pass by themselves."""
+"""Codes that only a reset and an activation clear; the others clear by themselves."""
 
 
 class GripperFaultError(GripperError):

@@ -1,4 +1,4 @@
-"""What the station asks of a gripper, and what it gets to know."""
+"""Gripper interface of the station."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -6,41 +6,41 @@ from typing import Protocol
 
 
 class ObjectState(StrEnum):
-    """What the gripper feels between its fingers."""
+    """Object detection between the fingers."""
 
     IDLE = "idle"
-    """No motion is asked for, and without one the gripper does not look."""
+    """No motion is requested, and without one the gripper detects nothing."""
     MOVING = "moving"
     CONTACT_OPENING = "contact_opening"
     """Stopped by something outside the fingers."""
     CONTACT_CLOSING = "contact_closing"
-    """Stopped by something between the fingers at the force asked for. A soft fruit is often too soft for that."""
+    """Stopped by something between the fingers at the requested force. A soft fruit is often too soft for that."""
     AT_POSITION = "at_position"
     LOST = "lost"
-    """What was held is no longer felt."""
+    """The held object is no longer detected."""
 
 
 @dataclass(frozen=True, slots=True)
 class GripperReading:
-    """One look at the gripper."""
+    """Reading of the gripper."""
 
     width_mm: float
-    """Measured gap that is left for the fruit; negative where the fingers press on each other."""
+    """Measured gap for the fruit; negative if the fingers press on each other."""
     position_count: int
     echoed_count: int
-    """The position request that the gripper has."""
+    """The gripper's present position request."""
     object_state: ObjectState
     active: bool
     """Activated and ready to move."""
     fault_code: int
     """0, or the gripper's own code."""
     current_a: float | None
-    """Motor current; None where the wire does not carry it."""
+    """Motor current; None if the wire does not carry it."""
     at_s: float
-    """Monotonic time just before the gripper was asked."""
+    """Monotonic time just before the request."""
 
     def age_s(self, now_s: float) -> float:
-        """How old the reading is, in seconds.
+        """Return the age of the reading, in seconds.
 
         Args:
             now_s: monotonic time, as of `time.monotonic()`.
@@ -50,7 +50,7 @@ class GripperReading:
 
 @dataclass(frozen=True, slots=True)
 class MoveResult:
-    """How a move ended."""
+    """Result of a move."""
 
     requested_width_mm: float
     requested_count: int
@@ -59,16 +59,16 @@ class MoveResult:
 
     @property
     def width_mm(self) -> float:
-        """The measured width: what counts, since a millimetre is no whole number of counts."""
+        """Return the measured width; it is the valid one, because a millimetre is no whole number of counts."""
         return self.reading.width_mm
 
 
 class Gripper(Protocol):
-    """A two-finger gripper. Every verb ends, with a result or with a `GripperError`, within its settings' times."""
+    """A two-finger gripper. Every method ends, with a result or with a `GripperError`, within its settings' times."""
 
     @property
     def max_width_mm(self) -> float:
-        """The widest gap for fruit that the fingers leave."""
+        """Return the widest gap for fruit."""
         ...
 
     async def activate(self) -> GripperReading:
@@ -87,7 +87,7 @@ class Gripper(Protocol):
         ...
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:
-        """Move until the width is reached or something is felt. Idempotent.
+        """Move until the width is reached or an object is detected. Idempotent.
 
         Args:
             width_mm: gap between the finger surfaces, 0 to `max_width_mm`.
@@ -101,9 +101,9 @@ class Gripper(Protocol):
         ...
 
     async def read(self) -> GripperReading:
-        """Ask the gripper, without moving it."""
+        """Read the gripper, without moving it."""
         ...
 
     async def close(self) -> None:
-        """Give the wire back, not the fingers. Idempotent; a later verb opens the wire again."""
+        """Close the wire, not the fingers. Idempotent; a later call opens the wire again."""
         ...

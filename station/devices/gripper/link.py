@@ -1,4 +1,4 @@
-"""What the driver needs from a wire: the gripper's status, and four commands."""
+"""Gripper link: the wire's interface for the driver, with the gripper's status and four commands."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -15,12 +15,12 @@ class State(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The gripper's registers as they were read."""
+    """The gripper's registers as read."""
 
     state: int
     """gSTA."""
     go_to: bool
-    """gGTO: a motion is asked for; where not, gOBJ means nothing."""
+    """gGTO: a motion is requested; if not, gOBJ means nothing."""
     object_: int
     """gOBJ."""
     fault: int
@@ -30,7 +30,7 @@ class Status:
     position: int
     """gPO."""
     current_a: float | None
-    """gCU, None where the wire does not carry it."""
+    """gCU, None if the wire does not carry it."""
 
 
 class Link(Protocol):
@@ -43,7 +43,7 @@ class Link(Protocol):
 
     @property
     def place(self) -> str:
-        """What is at the other end and where, in words."""
+        """Describe the device at the other end and its address."""
         ...
 
     async def status(self) -> Status:
@@ -55,11 +55,11 @@ class Link(Protocol):
         ...
 
     async def begin_activation(self) -> None:
-        """Raise the activation bit: the fingers travel. An automatic release shall open them, not close."""
+        """Raise the activation bit: the fingers travel. An automatic release has to open them, not close."""
         ...
 
     async def go_to(self, position: int, speed: int, force: int) -> None:
-        """Move; to be sent to an active gripper only.
+        """Move; only for an active gripper.
 
         Args:
             position: 0 to 255.

@@ -1,4 +1,4 @@
-"""The wire on the gripper's own RS-485 line: Modbus RTU at a serial port, or RTU frames over TCP.
+"""Modbus RTU link of the gripper: its RS-485 line at a serial port, or RTU frames over TCP.
 
 Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on hardware.
 """
@@ -29,7 +29,7 @@ _AMPERE_PER_COUNT = 0.01
 
 _Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
-# Every failure is told by an error of the gripper. Unhandled, pymodbus' own lines would go to stderr; a program that
+# Every failure becomes a gripper error. Unhandled, pymodbus' own lines would go to stderr; a program that
 # sets up logging still gets them.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
@@ -48,7 +48,7 @@ class ModbusRtuLink:
 
     @property
     def place(self) -> str:
-        """What is at the other end and where, in words."""
+        """Describe the device at the other end and its address."""
         settings = self._settings
         where = settings.serial_port if settings.line == "serial" else f"{settings.host}:{settings.port}"
         return f"Modbus RTU unit {settings.unit} at {where}"
@@ -71,7 +71,7 @@ class ModbusRtuLink:
         await self._write([_ACTIVATE | _GO_TO | _RELEASE_OPENS, position, speed << 8 | force])
 
     async def halt(self) -> None:
-        """Stop moving; the activation bit is written as it stands, since raising it would start an activation."""
+        """Stop moving; the activation bit is written unchanged, because raising it would start an activation."""
         async with self._exchange:
             registers = await self._registers()
             await self._send([registers[0] & _ACTIVATE | _RELEASE_OPENS])
@@ -130,7 +130,7 @@ class ModbusRtuLink:
         return self._checked(asking, function)
 
     def _checked(self, asked: asyncio.Future[ModbusPDU], function: int) -> ModbusPDU:
-        """The answer, or the error that stands for what came instead."""
+        """Return the answer, or raise the error for an invalid one."""
         if asked.cancelled() or isinstance(asked.exception(), ConnectionException):
             raise GripperLinkLostError(
                 f"the connection to {self.place} broke",
@@ -219,5 +219,5 @@ class ModbusRtuLink:
 
 
 async def _called(request: Callable[[_Client], Awaitable[ModbusPDU]], client: _Client) -> ModbusPDU:
-    """Makes what pymodbus raises before it awaits anything an outcome like the others."""
+    """Convert an exception that pymodbus raises before its first await to an outcome like the others."""
     return await request(client)

@@ -1,40 +1,36 @@
-"""A look at the gripper for `station devices check`: nothing is moved."""
+"""Gripper check of `station devices check`: nothing is moved."""
 
-from station.devices.finding import Finding
+from station.devices.check_result import CheckResult
 from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.devices.gripper.interface import GripperReading
 from station.devices.gripper.robotiq import make_gripper
 from station.settings.gripper import GripperCalibration, GripperSettings
 
 _CALIBRATION_COUNTS = 3
-"""How far outside its calibrated ends a gripper may read."""
+"""Allowed reading beyond the calibrated ends."""
 
 
-async def probe_gripper(settings: GripperSettings) -> list[Finding]:
-    """Say what answers at the gripper's address and whether it can be used.
-
-    Args:
-        settings: as of `station.yaml`.
-    """
+async def probe_gripper(settings: GripperSettings) -> list[CheckResult]:
+    """Report what answers at the gripper's address and whether it can be used."""
     gripper = make_gripper(settings)
     place = gripper.link.place
     try:
         reading = await gripper.read()
     except GripperError as error:
         found = error.cause if place in error.cause else f"{place}: {error.cause}"
-        return [Finding("gripper", found, "fault", error.remedy)]
+        return [CheckResult("gripper", found, "fault", error.remedy)]
     finally:
         await gripper.close()
     return [_judged(reading, place, settings.calibration)]
 
 
-def _judged(reading: GripperReading, place: str, calibration: GripperCalibration) -> Finding:
+def _judged(reading: GripperReading, place: str, calibration: GripperCalibration) -> CheckResult:
     found = f"{place}: position {reading.position_count}, width {reading.width_mm:.1f} mm, {reading.object_state}"
     if reading.fault_code:
         fault = GripperFaultError(reading.fault_code)
-        return Finding("gripper", f"{found}; {fault.cause}", "fault", fault.remedy)
+        return CheckResult("gripper", f"{found}; {fault.cause}", "fault", fault.remedy)
     if not reading.active:
-        return Finding(
+        return CheckResult(
             "gripper",
             f"{found}; not activated",
             "warning",
@@ -42,10 +38,10 @@ def _judged(reading: GripperReading, place: str, calibration: GripperCalibration
         )
     low, high = calibration.open_count - _CALIBRATION_COUNTS, calibration.closed_count + _CALIBRATION_COUNTS
     if not low <= reading.position_count <= high:
-        return Finding(
+        return CheckResult(
             "gripper",
             f"{found}; outside the calibrated counts {calibration.open_count} to {calibration.closed_count}",
             "warning",
             "read the counts with the gripper open and closed and correct gripper.calibration",
         )
-    return Finding("gripper", found, "ok", "")
+    return CheckResult("gripper", found, "ok", "")

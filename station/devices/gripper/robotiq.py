@@ -1,4 +1,4 @@
-"""The Robotiq 2F-85: the verbs, the same over both wires. Unverified on hardware."""
+"""Driver of the Robotiq 2F-85, the same over both wires. Unverified on hardware."""
 
 import asyncio
 import time
@@ -29,11 +29,11 @@ from station.settings.gripper import GripperSettings
 _POLL_S = 0.005
 """The gripper refreshes its registers at 200 Hz (manual, Modbus RTU communication)."""
 _RESET_HOLD_S = 0.5
-"""Between reset and activation, as in the drivers that are known to work; also how long an old fault may linger."""
+"""Between reset and activation, as in the drivers that are known to work; also the longest life of an old fault."""
 _MUTE_GRACE_S = 0.5
-"""Fault 9 says that the line was silent for a second, which being asked again cures; only one that stays is real."""
+"""Fault 9 means that the line was silent for a second; the next request clears it, and only a lasting one is real."""
 _AT_POSITION_COUNTS = 2
-"""How far from the request the gripper may stand and still be at position."""
+"""Largest distance from the request that counts as at position."""
 _HALT_ANSWERS = 4
 """Time for a quiet line, a connection and the two exchanges of a halt, in answer time-outs."""
 _NO_COMMUNICATION = 0x9
@@ -54,10 +54,10 @@ _STATE_WORDS = {
 
 
 class Robotiq2F85:
-    """A 2F-85 behind a wire. Verbs that move take turns; `read` and `stop` may be called at any time.
+    """A 2F-85 behind a wire. Methods that move run one at a time; `read` and `stop` may be called at any time.
 
-    After a lost link the error comes after one short try to stop, and the next verb connects again. Nothing is ever
-    repeated on its own: where the fingers are then is for `read` to say.
+    After a lost link the error comes after one short attempt to stop, and the next call connects again. Nothing is ever
+    repeated automatically: use `read` for the fingers' position.
     """
 
     def __init__(self, link: Link, settings: GripperSettings) -> None:
@@ -71,7 +71,7 @@ class Robotiq2F85:
 
     @property
     def max_width_mm(self) -> float:
-        """The widest gap for fruit that the fingers leave."""
+        """Return the widest gap for fruit."""
         return max_width_mm(self._calibration)
 
     async def activate(self) -> GripperReading:
@@ -86,20 +86,20 @@ class Robotiq2F85:
             GripperError: the wire.
         """
         async with self._turn:
-            status, at_s = await self._look()
+            status, at_s = await self._poll()
             if self._is_active(status):
                 return self._reading(status, at_s)
             self._held_request = None
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
             await self.link.reset()
-            while (await self._look())[0].state != State.RESET:
+            while (await self._poll())[0].state != State.RESET:
                 await self._wait_until(deadline_s, "its reset", None)
                 await self.link.reset()
             await asyncio.sleep(_RESET_HOLD_S)
             await self.link.begin_activation()
             began_s = time.monotonic()
             while True:
-                status, at_s = await self._look()
+                status, at_s = await self._poll()
                 if self._is_active(status):
                     return self._reading(status, at_s)
                 if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
@@ -116,9 +116,9 @@ class Robotiq2F85:
         return await self.move_to_width(to_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:
-        """Move until the width is reached or something is felt. Idempotent.
+        """Move until the width is reached or an object is detected. Idempotent.
 
-        A move that fails or is cancelled stops the fingers where the wire still allows it.
+        A move that fails or is cancelled stops the fingers if the wire still allows it.
 
         Args:
             width_mm: gap between the finger surfaces, 0 to `max_width_mm`; the nearest count is requested.
@@ -165,25 +165,25 @@ class Robotiq2F85:
         return await self.read()
 
     async def read(self) -> GripperReading:
-        """Ask the gripper, without moving it; a fault is told in the reading, not raised.
+        """Read the gripper, without moving it; a fault is part of the reading, not raised.
 
         Raises:
             GripperError: the wire.
         """
-        return self._reading(*await self._look())
+        return self._reading(*await self._poll())
 
     async def close(self) -> None:
-        """Give the wire back, not the fingers. Idempotent; a later verb opens the wire again."""
+        """Close the wire, not the fingers. Idempotent; a later call opens the wire again."""
         await self.link.close()
 
-    async def _look(self) -> tuple[Status, float]:
+    async def _poll(self) -> tuple[Status, float]:
         at_s = time.monotonic()
         return await self.link.status(), at_s
 
     async def _ready(self) -> tuple[Status, float]:
-        """The status of a gripper that may be told to move."""
-        status, at_s = await self._look()
-        fault = self._standing_fault(status, at_s)
+        """Return the status of a gripper that may move."""
+        status, at_s = await self._poll()
+        fault = self._active_fault(status, at_s)
         if fault:
             raise GripperFaultError(fault)
         if status.state != State.ACTIVE:
@@ -194,7 +194,7 @@ class Robotiq2F85:
         return status, at_s
 
     async def _arrival(self, count: int, deadline_s: float, stops: int) -> tuple[Status, float]:
-        """The status once two looks in a row found the fingers at rest, and in the same place."""
+        """Return the status once two consecutive readings found the fingers at rest, and at the same place."""
         position = None
         while True:
             status, at_s = await self._ready()
@@ -209,7 +209,7 @@ class Robotiq2F85:
             raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
 
     async def _halt_if_possible(self) -> None:
-        """One try, which does not hold up the error for longer than a few answers."""
+        """Try once to stop, which delays the error by a few answers at most."""
         with suppress(GripperError, TimeoutError):
             async with asyncio.timeout(_HALT_ANSWERS * self._settings.answer_timeout_s):
                 await self.link.halt()
@@ -228,14 +228,14 @@ class Robotiq2F85:
     @staticmethod
     async def _wait_until(deadline_s: float, what: str, status: Status | None) -> None:
         if time.monotonic() > deadline_s:
-            seen = f": {_in_words(status)}" if status else ""
+            seen = f": {_describe(status)}" if status else ""
             raise GripperTimeoutError(
                 f"{what} did not end in time{seen}",
                 "look for what holds the fingers, and for a second master that commands the gripper",
             )
         await asyncio.sleep(_POLL_S)
 
-    def _standing_fault(self, status: Status, now_s: float) -> int:
+    def _active_fault(self, status: Status, now_s: float) -> int:
         if status.fault != _NO_COMMUNICATION:
             self._mute_since_s = None
             return status.fault
@@ -259,17 +259,13 @@ class Robotiq2F85:
         )
 
 
-def _in_words(status: Status) -> str:
+def _describe(status: Status) -> str:
     state = _OBJECT_STATES[status.object_] if status.go_to else ObjectState.IDLE
     return f"it stands at count {status.position}, {_STATE_WORDS[state]}"
 
 
 def make_gripper(settings: GripperSettings) -> Robotiq2F85:
-    """The gripper that the settings name; nothing is sent yet.
-
-    Args:
-        settings: driver, wire, finger set and times.
-    """
+    """Make the gripper of the settings; nothing is sent yet."""
     if settings.driver == "urcap":
         return Robotiq2F85(UrcapLink(settings.urcap, settings.answer_timeout_s), settings)
     return Robotiq2F85(ModbusRtuLink(settings.modbus_rtu, settings.answer_timeout_s), settings)

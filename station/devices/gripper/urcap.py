@@ -1,4 +1,4 @@
-"""The wire through Robotiq's URCap: a text socket on the UR controller, TCP 63352.
+"""URCap link of the gripper: Robotiq's text socket on the UR controller, TCP 63352.
 
 The socket carries no motor current. Unverified on hardware.
 """
@@ -22,11 +22,11 @@ _ACKNOWLEDGED = b"ack"
 """Comes without a newline."""
 _LONGEST_ANSWER = 64
 _CONNECT_TIMEOUT_S = 2.0
-"""Leaves room for one lost packet, which TCP repeats after a second."""
+"""Includes time for one lost packet, which TCP repeats after a second."""
 
 
 class UrcapLink:
-    """One connection to the URCap, kept open."""
+    """One persistent connection to the URCap."""
 
     def __init__(self, settings: UrcapSettings, answer_timeout_s: float) -> None:
         self._settings = settings
@@ -36,7 +36,7 @@ class UrcapLink:
 
     @property
     def place(self) -> str:
-        """What is at the other end and where, in words."""
+        """Describe the device at the other end and its address."""
         return f"URCap at {self._settings.host}:{self._settings.port}"
 
     async def status(self) -> Status:
@@ -135,14 +135,14 @@ class UrcapLink:
                     self._streams = await asyncio.open_connection(self._settings.host, self._settings.port)
             except OSError as error:
                 raise GripperUnreachableError(
-                    f"no connection to the {self.place} ({_words(error)})",
+                    f"no connection to the {self.place} ({_describe(error)})",
                     "check the robot's address and network, and that the Robotiq URCap is installed and running",
                 ) from error
         return self._streams
 
 
-def _words(error: OSError) -> str:
-    """Why no connection was made, without what asyncio puts around it."""
+def _describe(error: OSError) -> str:
+    """Describe the failure of the connection, without asyncio's own text around it."""
     number = error.errno or 0
     return os.strerror(number) if number > 0 else error.strerror or "no answer"
 

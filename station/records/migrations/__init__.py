@@ -1,1 +1,1 @@
-"""How a database of an earlier program becomes one of this program; run by Alembic when the records are opened."""
+"""Schema migrations of the database, run by Alembic when the records are opened."""

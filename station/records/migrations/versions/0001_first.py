@@ -1,4 +1,4 @@
-"""The first form of the records."""
+"""First schema of the records."""
 
 import sqlalchemy as sa
 from alembic import op

@@ -1,4 +1,4 @@
-"""The audit trail, to which rows can only be appended, and the recipes' revisions."""
+"""Schema: the audit trail, to which rows can only be appended, and the recipes' revisions."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -29,7 +29,7 @@ def upgrade() -> None:
     op.create_index("ix_audit_action", "audit", ["action", "seq"], unique=False)
     op.execute(f"CREATE TRIGGER audit_no_update BEFORE UPDATE ON audit BEGIN {_REFUSED}; END")
     op.execute(f"CREATE TRIGGER audit_no_delete BEFORE DELETE ON audit BEGIN {_REFUSED}; END")
-    # An INSERT OR REPLACE removes the old row without asking the trigger above.
+    # An INSERT OR REPLACE removes the old row without running the trigger above.
     behind = "WHEN NEW.seq <= (SELECT max(seq) FROM audit)"
     op.execute(f"CREATE TRIGGER audit_only_after BEFORE INSERT ON audit {behind} BEGIN {_REFUSED}; END")
     op.create_table(

@@ -1,4 +1,4 @@
-"""Found by lot, grower, time, outcome and reason; held images; and what other systems are told."""
+"""Schema: search by lot, grower, time, outcome and reason; held images; the outbox."""
 
 import uuid
 

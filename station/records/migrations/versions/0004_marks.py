@@ -1,4 +1,4 @@
-"""What people found of fruit, and who shelved an alarm."""
+"""Schema: people's marks of fruit, and who shelved an alarm."""
 
 import sqlalchemy as sa
 from alembic import op

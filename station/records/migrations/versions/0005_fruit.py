@@ -1,4 +1,4 @@
-"""Found by fruit: which recipe an inspection was made by."""
+"""Schema: search by fruit, the recipe of an inspection."""
 
 from alembic import op
 

@@ -1,4 +1,4 @@
-"""The second witness of each step: how much of its image has changed."""
+"""Schema: the changed area of each step's image, beside its contact area."""
 
 import sqlalchemy as sa
 from alembic import op

@@ -1,4 +1,4 @@
-"""The fruit's size as the line's PLC gave it with the trigger."""
+"""Schema: the fruit's size as the line's PLC gave it with the trigger."""
 
 import sqlalchemy as sa
 from alembic import op

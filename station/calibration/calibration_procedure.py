@@ -1,0 +1,247 @@
+"""Calibration procedure of one unit: the paper's ball, 46 to 33 mm, then at further places.
+
+Limits of the method (decision 0022): the area over closing depends on how gel, ball and sponge share the closing, so
+it gives no scale. A scale needs a known length on the gel: the distance from one place of the ball to another.
+"""
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import combinations
+from math import hypot
+from typing import NamedTuple
+
+from station.calibration import figures, gel
+from station.calibration.checks import ROUNDEST, calibration_checks
+from station.calibration.errors import RefusedError
+from station.calibration.figures import MeasuredScale
+from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
+from station.calibration.press import BallPress, Step
+from station.calibration.rig import OnProgress, Place, Progress, Rig, Unit
+from station.errors import StationError
+from station.settings.calibration import CalibrationSettings
+from station.settings.recipe import Recipe
+from station.vision.contact import Image
+from station.vision.scale import Scale
+
+log = logging.getLogger(__name__)
+
+NOISE_FRAMES = 30
+_PLACES_CLOSING_MM = 2.0
+"""Deep enough for a good centre, shallow enough to stay inside the field also away from the middle."""
+_LEAST_WAY_MM = 2.0
+
+TEXTS = {
+    "untouched": "the untouched gel",
+    "press": "the ball, step by step",
+    "onset": "where the contact begins",
+    "place": "the ball at another place",
+    "judge": "the result",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """A good calibration that is not stored yet, with its pictures."""
+
+    calibration: Calibration
+    reference: Image
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Measurements of a calibration, complete or not."""
+
+    reference: Image | None
+    steps: tuple[Step, ...]
+    """Every press, also those at further places."""
+    checks: tuple[Check, ...]
+
+
+class _Measured(NamedTuple):
+    """Values that the result is judged by."""
+
+    reference: Image
+    frames: Sequence[Image]
+    """With nothing touching the gel."""
+    steps: Sequence[Step]
+    onset_mm: float
+    noise: Noise
+    places: Sequence[PlacePoint]
+
+
+class CalibrationProcedure:
+    """One run. It stores nothing; when it is cancelled the jaws open.
+
+    Args:
+        recipe: the ball's width steps.
+        settings: ball and limits.
+        places: further places of the ball.
+        program: this program's version.
+        on_progress: called with the progress.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        unit: Unit,
+        recipe: Recipe,
+        settings: CalibrationSettings,
+        places: Sequence[Place],
+        operator: str,
+        program: str,
+        on_progress: OnProgress,
+    ) -> None:
+        self._rig, self._unit, self._recipe, self._settings = rig, unit, recipe, settings
+        self._places = [Place(0.0, 0.0), *places]
+        self._operator, self._program, self._on_progress = operator, program, on_progress
+        self._press = BallPress(rig, recipe)
+        self._pressed: list[Step] = []
+        self._checks: tuple[Check, ...] = ()
+        if any(hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < _LEAST_WAY_MM for a, b in combinations(self._places, 2)):
+            raise ValueError(f"expected places at least {_LEAST_WAY_MM:g} mm apart, the first is 0,0")
+
+    @property
+    def evidence(self) -> Evidence:
+        """Return the measurements until now."""
+        return Evidence(self._press.reference, tuple(self._pressed), self._checks)
+
+    async def run(self) -> Draft:
+        """Calibrate once. The gripper presses the ball repeatedly, and releases it before the result is judged.
+
+        Raises:
+            RefusedError: the result is no valid calibration, with every reason.
+            StationError: a device's fault; by then the jaws were commanded to open.
+        """
+        try:
+            measured = await self._measure()
+        except BaseException:
+            await self._let_go()
+            raise
+        await self._rig.release()
+        self._say("judge", 1, 1, "")
+        return await asyncio.to_thread(self._judge, measured)
+
+    async def _let_go(self) -> None:
+        try:
+            await self._rig.release()
+        except StationError as error:
+            log.warning("the jaws could not be opened: %s", error)
+
+    async def _measure(self) -> _Measured:
+        self._say("untouched", 1, 1, f"{NOISE_FRAMES} frames, nothing may touch the gel")
+        frames = await self._press.take_reference(NOISE_FRAMES)
+        reference = self._press.reference
+        assert reference is not None  # noqa: S101 (taken just now)
+        findings = await asyncio.to_thread(gel.examine, reference, None, self._settings.least_light)
+        if findings:
+            raise RefusedError(*(f"{finding.sentence}: {gel.REMEDIES[finding.ill]}" for finding in findings))
+        if max(await asyncio.to_thread(lambda: figures.pixel_noise(frames).mean(axis=(0, 1)))) == 0:
+            raise RefusedError("the frames do not differ at all: a live sensor's do; see `station devices check`")
+        untouched = [await self._press.measure([frame]) for frame in frames[:: max(1, len(frames) // 6)]]
+        steps = await self._press_through()
+        first = next(step for step in steps if step.contact.is_firm)
+        before = [step for step in steps if step.width_mm > first.width_mm]
+        self._say("onset", 1, 1, f"between {before[-1].width_mm:.1f} and {first.width_mm:.1f} mm")
+        onset_mm = await self._press.fine_onset(before[-1].width_mm, first.width_mm)
+        noise = await asyncio.to_thread(figures.noise, frames, [*untouched, *(step.contact for step in before)])
+        return _Measured(reference, frames, steps, onset_mm, noise, await self._at_places(onset_mm))
+
+    async def _press_through(self) -> list[Step]:
+        plan = self._recipe.steps
+        start_mm = plan.start_width_mm or self._settings.ball_mm + self._settings.holder_mm + 4.0
+        steps: list[Step] = []
+        for number in range(plan.number + 1):
+            step = await self._press.step(start_mm - number * plan.step_mm)
+            steps.append(step)
+            self._pressed.append(step)
+            area = f"{step.contact.area_px} px" if step.contact.found else "no contact"
+            self._say("press", number + 1, plan.number + 1, f"{step.width_mm:.2f} mm: {area}")
+            if number == 0 and step.contact.is_firm:
+                met_mm = self._settings.ball_mm + self._settings.holder_mm
+                raise RefusedError(
+                    f"something touches the gel at the start, {step.width_mm:.1f} mm, and a "
+                    f"{self._settings.ball_mm:g} mm ball is met at {met_mm:.1f} mm: take it out, look for the "
+                    "right ball and what holds it"
+                )
+        if not any(step.contact.is_firm for step in steps):
+            raise RefusedError(
+                f"nothing touched the gel down to {steps[-1].width_mm:.1f} mm: is the ball between the fingers? "
+                "A smaller one is never met"
+            )
+        return steps
+
+    async def _at_places(self, onset_mm: float) -> list[PlacePoint]:
+        if len(self._places) < 2:
+            return []
+        found: list[PlacePoint] = []
+        for number, place in enumerate(self._places):
+            if number:
+                await self._rig.release()
+                await self._rig.lay(place)
+                await self._press.take_reference(self._recipe.imaging.reference_frames)
+            step = await self._press.step(onset_mm - _PLACES_CLOSING_MM)
+            self._pressed.append(step)
+            contact = step.contact
+            where = f"place {number + 1}, {place.x_mm:g},{place.y_mm:g} mm"
+            if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
+                raise RefusedError(
+                    f"{where}: at {step.width_mm:.1f} mm no whole contact is seen: lay the ball nearer to the "
+                    "gel's middle, as high as before"
+                )
+            x_px, y_px = contact.centroid_px
+            found.append(
+                PlacePoint(
+                    x_mm=place.x_mm,
+                    y_mm=place.y_mm,
+                    width_mm=round(step.width_mm, 3),
+                    centroid_x_px=round(x_px, 2),
+                    centroid_y_px=round(y_px, 2),
+                    area_px=contact.area_px,
+                )
+            )
+            self._say("place", number + 1, len(self._places), f"{where}: at {x_px:.0f}, {y_px:.0f} px")
+        return found
+
+    def _judge(self, measured: _Measured) -> Draft:
+        reference, frames, steps, onset_mm, noise, places = measured
+        scale: MeasuredScale | None = None
+        if len(places) > 1:
+            scale = figures.scale_of(places, self._settings.place_tolerance_mm)
+        height, width = reference.shape[:2]
+        usual = Scale.typical(height, width)
+        made = datetime.now(UTC)
+        checks = self._checks = tuple(calibration_checks(self._settings, self._recipe, steps, onset_mm, noise, scale))
+        calibration = Calibration(
+            id=stamp(made),
+            serial=self._unit.serial,
+            unit=self._unit.name,
+            operator=self._operator,
+            simulated=self._unit.simulated,
+            program=self._program,
+            ball_mm=self._settings.ball_mm,
+            holder_mm=self._settings.holder_mm,
+            width_px=width,
+            height_px=height,
+            mm_per_px=round(usual.mm_per_px if scale is None else scale.mm_per_px, 6),
+            scale_uncertainty=round(usual.uncertainty if scale is None else scale.uncertainty, 4),
+            scale_measured=scale is not None,
+            places=tuple(places),
+            curve=tuple(step.point for step in steps),
+            onset_mm=round(onset_mm, 3),
+            zero_mm=round(onset_mm - self._settings.ball_mm - self._settings.holder_mm, 3),
+            noise=noise,
+            light_levels=gel.light(reference),
+            sharpness_levels=round(gel.sharpness(reference), 3),
+            field=figures.field_map(reference, frames),
+            checks=checks,
+        )
+        if bad := [check for check in checks if not check.passed]:
+            raise RefusedError(*(f"{one.name}: {one.found}, expected {one.expected}: {one.remedy}" for one in bad))
+        return Draft(calibration, reference, tuple(steps))
+
+    def _say(self, what: str, number: int, of: int, detail: str) -> None:
+        self._on_progress(Progress(number, of, TEXTS[what], detail))

@@ -1,0 +1,160 @@
+"""Verification procedure at the shift's start: the same ball against the stored calibration, and the gel's health."""
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from station.calibration import figures, gel
+from station.calibration.checks import verification_checks
+from station.calibration.gel import REMEDIES, Finding, GelFault
+from station.calibration.model import Calibration, Check, Verification, stamp
+from station.calibration.press import BallPress, Step
+from station.calibration.rig import OnProgress, Progress, Rig
+from station.calibration.store import press_name
+from station.errors import StationError
+from station.settings.calibration import CalibrationSettings
+from station.settings.recipe import Recipe
+from station.vision.contact import Image
+
+log = logging.getLogger(__name__)
+
+_NOISE_FRAMES = 9
+_EVERY = 2
+"""One of so many widths of the calibration is pressed."""
+_SOUND = {
+    GelFault.TEAR: "no tear is seen",
+    GelFault.DIRT: "no dirt is seen",
+    GelFault.LED: "every LED is as bright as it was",
+    GelFault.FOG: "gel and lens are clear",
+    GelFault.WEAR: "the gel answers as strongly as it did",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VerificationResult:
+    """A verification with its pictures."""
+
+    verification: Verification
+    reference: Image
+    pictures: dict[str, Image]
+    """By file name."""
+
+
+class VerificationProcedure:
+    """One run; the jaws are open afterwards.
+
+    Args:
+        golden: the calibration's picture of the untouched gel.
+        presses: the calibration's pictures of the ball, in the order of its curve.
+        on_progress: called with the progress.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        recipe: Recipe,
+        settings: CalibrationSettings,
+        calibration: Calibration,
+        golden: Image,
+        presses: Sequence[Image],
+        operator: str,
+        on_progress: OnProgress,
+    ) -> None:
+        self._rig, self._recipe, self._settings = rig, recipe, settings
+        self._calibration, self._golden, self._presses = calibration, golden, presses
+        self._operator, self._on_progress = operator, on_progress
+        self._press = BallPress(rig, recipe, calibration.noise.gate_factor)
+
+    async def run(self) -> VerificationResult:
+        """Verify once. The gripper closes on the ball.
+
+        Raises:
+            StationError: a device's fault; by then the jaws were commanded to open. A bad gel or ball raises nothing.
+        """
+        try:
+            verified = await self._run()
+        except BaseException:
+            try:
+                await self._rig.release()
+            except StationError as error:
+                log.warning("the jaws could not be opened: %s", error)
+            raise
+        await self._rig.release()
+        return verified
+
+    async def _run(self) -> VerificationResult:
+        self._on_progress(Progress(1, 1, "the untouched gel", f"{_NOISE_FRAMES} frames, nothing may touch the gel"))
+        frames = await self._press.take_reference(_NOISE_FRAMES)
+        reference = self._press.reference
+        assert reference is not None  # noqa: S101 (taken just now)
+        findings = await asyncio.to_thread(gel.examine, reference, self._golden, self._settings.least_light)
+        pixel_levels = (await asyncio.to_thread(figures.pixel_noise, frames)).mean(axis=(0, 1))
+        steps, onset_mm = await self._press_ball()
+        curve = tuple(step.point for step in steps)
+        blue, green, red = (float(level) for level in pixel_levels)
+        checks = verification_checks(self._settings, self._calibration, curve, onset_mm, (blue, green, red))
+        if not any(finding.ill in {GelFault.LED, GelFault.FOG} for finding in findings):
+            findings += self._worn(steps)
+        pictures = {f"{finding.ill}.png": finding.picture for finding in findings}
+        checks += [self._health(ill, findings) for ill in GelFault]
+        pictures |= {press_name(number): outlined(step) for number, step in enumerate(steps)}
+        verification = Verification(
+            id=stamp(datetime.now(UTC)),
+            serial=self._calibration.serial,
+            calibration=self._calibration.id,
+            operator=self._operator,
+            passed=all(check.passed for check in checks),
+            area_ratio=figures.area_ratio(curve, self._calibration.curve),
+            onset_mm=None if onset_mm is None else round(onset_mm, 3),
+            checks=tuple(checks),
+            curve=curve,
+        )
+        return VerificationResult(verification, reference, pictures)
+
+    async def _press_ball(self) -> tuple[list[Step], float | None]:
+        """Measure without contact, at every second width that showed a whole contact, and the onset."""
+        reach_mm = self._recipe.steps.result_closings_mm[-1]
+        whole = figures.judged(self._calibration.curve, self._calibration.onset_mm, reach_mm)
+        widths = [self._calibration.curve[0].width_mm, *(point.width_mm for point in whole[::_EVERY])]
+        steps: list[Step] = []
+        for number, width_mm in enumerate(widths, start=1):
+            steps.append(await self._press.step(width_mm))
+            area = f"{steps[-1].contact.area_px} px" if steps[-1].contact.found else "no contact"
+            detail = f"{steps[-1].width_mm:.2f} mm: {area}"
+            self._on_progress(Progress(number, len(widths), "the ball, step by step", detail))
+        touched = next((step for step in steps if step.contact.is_firm), None)
+        if touched is None or touched is steps[0]:
+            return steps, None if touched is None else touched.width_mm
+        before = max(step.width_mm for step in steps if step.width_mm > touched.width_mm)
+        from_mm = min(before, self._calibration.onset_mm + 2 * self._settings.onset_tolerance_mm)
+        self._on_progress(Progress(1, 1, "where the contact begins", f"from {from_mm:.1f} mm"))
+        return steps, await self._press.fine_onset(max(from_mm, touched.width_mm), touched.width_mm)
+
+    def _worn(self, steps: list[Step]) -> list[Finding]:
+        touched = [step for step in steps if step.contact.found]
+        ratio = figures.contrast_ratio([step.point for step in touched], self._calibration.curve)
+        if ratio is None or ratio >= self._settings.least_contrast:
+            return []
+        text = f"the ball changes the picture {ratio:.0%} as much as at the calibration: the coating is worn"
+        now = touched[len(touched) // 2]
+        widths = [abs(point.width_mm - now.width_mm) for point in self._calibration.curve]
+        return [Finding(GelFault.WEAR, text, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
+
+    @staticmethod
+    def _health(ill: GelFault, findings: list[Finding]) -> Check:
+        found = next((finding for finding in findings if finding.ill is ill), None)
+        return Check(
+            name=ill,
+            passed=found is None,
+            found=_SOUND[ill] if found is None else found.sentence,
+            expected="as at the calibration",
+            remedy=REMEDIES[ill],
+            picture=None if found is None else f"{ill}.png",
+        )
+
+
+def outlined(step: Step) -> Image:
+    """Draw a contact's outline into its step's picture."""
+    return gel.outlined(step.image, step.contact.mask)

@@ -1,0 +1,115 @@
+"""Devices, ball and operator for `station calibrate` and `station verify`."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import AsyncIterator
+
+import click
+import cv2
+
+from station.calibration.errors import CalibrationError
+from station.calibration.rig import Place, Progress, Unit
+from station.devices.arm.ur import UrArm
+from station.devices.camera.open import camera_from
+from station.devices.gripper.robotiq import make_gripper
+from station.errors import BadInputError
+from station.records.database import records_folder
+from station.records.errors import LockedError
+from station.records.open import lock_folder
+from station.service.bare_grip import renewed_lease
+from station.service.calibration_rig import StationRig
+from station.service.grip import Cell
+from station.settings.configuration import Configuration
+from station.settings.recipe import Recipe, find_recipe
+
+_ARM_DEADLINE_S = 15.0
+
+
+@contextlib.asynccontextmanager
+async def open_rig(site: Configuration, *, bench: bool, yes: bool) -> AsyncIterator[tuple[StationRig, Unit, Recipe]]:
+    """Open the devices that the site names, for this program alone.
+
+    Args:
+        bench: leave the arm out, as the site's own setting does.
+        yes: do not wait for the operator.
+
+    Raises:
+        CalibrationError: the station runs and has the devices open.
+        BadInputError: the camera has no serial number.
+        StationError: a device's fault.
+    """
+    recipe = find_recipe(site.calibration.recipe, site.recipes_folder)
+    cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
+
+    async def lay(place: Place) -> None:
+        if not yes:
+            where = (
+                f"{place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its first place"
+            )
+            await _wait_for_enter(f"lay the ball {where}, then press Enter")
+
+    async with contextlib.AsyncExitStack() as stack:
+        stack.callback(os.close, _lock(site))
+        camera = camera_from(site.camera)
+        stack.push_async_callback(camera.close)
+        await camera.open()
+        description = camera.description
+        if not description.serial:
+            raise BadInputError(f"camera.driver: {description.name} is no sensor that could be calibrated")
+        gripper = make_gripper(site.gripper)
+        stack.push_async_callback(gripper.close)
+        arm = None
+        if not (bench or site.service.bench):
+            arm = await stack.enter_async_context(UrArm(site.arm))
+            await arm.ready(_ARM_DEADLINE_S * site.service.patience)
+            await stack.enter_async_context(renewed_lease(arm))
+        if not yes:
+            ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
+            await _wait_for_enter(
+                f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
+            )
+        unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
+        yield StationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
+
+
+async def _wait_for_enter(request: str) -> None:
+    """Wait for a person's Enter; Ctrl-C ends the wait, and the end of the input cancels the run."""
+    click.echo(request)
+    loop, line = asyncio.get_running_loop(), asyncio.Event()
+    try:
+        loop.add_reader(sys.stdin, line.set)
+    except PermissionError:  # a file, which is never waited for
+        line.set()
+    try:
+        await line.wait()
+    finally:
+        loop.remove_reader(sys.stdin)
+    if not sys.stdin.readline():
+        raise asyncio.CancelledError
+
+
+def _lock(site: Configuration) -> int:
+    """Take the lock that a station has while it runs."""
+    try:
+        return lock_folder(records_folder(site.home))
+    except LockedError as error:
+        raise CalibrationError(
+            f"the devices are in use ({error.cause}): stop the station, do this, and start it again"
+        ) from error
+
+
+def cancelled_by_signals() -> None:
+    """Let Ctrl-C, and the signal that ends a service, cancel the calling task."""
+    task = asyncio.current_task()
+    assert task is not None  # noqa: S101 (called from a coroutine)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+
+
+def show(progress: Progress) -> None:
+    """Print a procedure's progress."""
+    count = f"{progress.number:2}/{progress.of}" if progress.of > 1 else ""
+    click.echo(f"{progress.title:28}{count:8}{progress.detail}".rstrip())

@@ -1,0 +1,172 @@
+"""`station records`: lots, holds, backups and checks."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from station.commands.records_options import by_option, config_option, folder_of
+from station.errors import StationError
+from station.records.audit import AuditEntry, append_audit
+from station.records.backup import make_backup
+from station.records.database import reading
+from station.records.holds import hold as place_hold
+from station.records.holds import read_holds
+from station.records.holds import release as release_hold
+from station.records.integrity_check import check_records
+from station.records.lots import Lot, end_lot, read_lots, start_lot
+from station.records.restore import restore_backup
+from station.records.short_transaction import short_transaction
+from station.records.texts import printable
+
+_ROLE = "command line"
+_thing = click.argument("thing", metavar="SEQUENCE|LOT")
+_as_lot = click.option("--lot", "is_lot", is_flag=True, help="THING is a lot's name, though it is made of digits.")
+
+
+@click.group()
+def lot() -> None:
+    """Register lots: grower, start and end. The PLC gives only their names."""
+
+
+@lot.command("start")
+@click.argument("name")
+@click.option("--grower", metavar="NAME", required=True, help="Whose fruit it is.")
+@click.option("--correct", is_flag=True, help="Put this grower in the place of the one told before.")
+@by_option
+@config_option
+def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:
+    """Register that the lot NAME starts. Repeating it changes nothing."""
+    with short_transaction(folder_of(config)) as connection:
+        known = {row.name: row for row in read_lots(connection, 1, name=name)}.get(name)
+        started = start_lot(connection, name, grower, correct=correct)
+        if started != known:
+            old = None if known is None else {"grower": known.grower}
+            entry = AuditEntry(by, _ROLE, "lot.started", f"lot {name}", old=old, new={"grower": grower})
+            append_audit(connection, entry)
+    click.echo(_lot_line(started))
+
+
+@lot.command("end")
+@click.argument("name")
+@by_option
+@config_option
+def lot_end(name: str, by: str, config: Path | None) -> None:
+    """Register that the lot NAME has ended. Repeating it changes nothing."""
+    with short_transaction(folder_of(config)) as connection:
+        running = any(row.ended_utc_ms is None for row in read_lots(connection, 1, name=name))
+        ended = end_lot(connection, name)
+        if running:
+            append_audit(connection, AuditEntry(by, _ROLE, "lot.ended", f"lot {name}"))
+    click.echo(_lot_line(ended))
+
+
+@lot.command("list")
+@click.option("--grower", metavar="NAME", help="Of this grower.")
+@click.option("--last", metavar="N", default=20, show_default=True, type=click.IntRange(1, 100_000), help="How many.")
+@config_option
+def lot_list(grower: str | None, last: int, config: Path | None) -> None:
+    """List the registered lots, newest first."""
+    with reading(folder_of(config)) as connection:
+        for row in read_lots(connection, last, grower):
+            click.echo(_lot_line(row))
+
+
+@click.command()
+@_thing
+@_as_lot
+@click.option("--reason", required=True, help="Why, for whoever asks later.")
+@by_option
+@config_option
+def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
+    """Hold the images of an inspection, or all images of a lot: the quota does not remove them."""
+    with short_transaction(folder_of(config)) as connection:
+        before = read_holds(connection)
+        held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
+        if held not in before:
+            append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
+    click.echo(
+        printable(f"{held.description} is on hold since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}")
+    )
+
+
+@click.command()
+@_thing
+@_as_lot
+@click.option("--reason", required=True, help="Why, for whoever asks later.")
+@by_option
+@config_option
+def release(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
+    """Release held images: the quota may remove them."""
+    with short_transaction(folder_of(config)) as connection:
+        released = release_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
+        entry = AuditEntry(by, _ROLE, "images.released", released.description, reason, {"held for": released.reason})
+        append_audit(connection, entry)
+    click.echo(printable(f"{released.description} is released"))
+
+
+@click.command()
+@config_option
+def holds(config: Path | None) -> None:
+    """List what is on hold, oldest first."""
+    with reading(folder_of(config)) as connection:
+        for held in read_holds(connection):
+            click.echo(printable(f"{_time(held.placed_utc_ms)}  {held.description}  by {held.by}: {held.reason}"))
+
+
+@click.command()
+@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@config_option
+def backup(directory: Path, config: Path | None) -> None:
+    """Copy the database and all images to the new folder DIR, also while the station runs, and verify the copy.
+
+    DIR appears when it is complete and on the disk; it must not exist before.
+    """
+    made = make_backup(folder_of(config), directory)
+    click.echo(f"{directory}: {made.inspections} inspections, {made.images} images, {made.size_bytes} bytes, verified")
+    if made.audit_head:
+        click.echo(f"the audit trail's last row in it: {made.audit_head}")
+    for note in made.notes:
+        click.echo(f"note: {note}", err=True)
+
+
+@click.command()
+@click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
+@by_option
+@config_option
+def restore(directory: Path, by: str, config: Path | None) -> None:
+    """Replace the records by the backup in DIR, while no station runs. The present records are moved aside."""
+    restored = restore_backup(folder_of(config), directory, by)
+    click.echo(f"restored {restored.inspections} inspections and {restored.images} images from {directory}")
+    if restored.aside is not None:
+        click.echo(f"what was there is in {restored.aside}")
+
+
+@click.command()
+@config_option
+def check(config: Path | None) -> None:
+    """Check the whole database, and every image against its name, also while the station runs; exit code 1 for faults.
+
+    It changes nothing. The station's next start repairs files without a row and rows without a file.
+    """
+    found = check_records(folder_of(config))
+    for fault in found.faults:
+        click.echo(f"fault: {fault}")
+    for note in found.notes:
+        click.echo(f"note: {note}")
+    click.echo(f"{found.inspections} inspections and {found.images} images checked")
+    if found.faults:
+        raise StationError("the records are not sound: see the faults above; a backup is put back by `records restore`")
+
+
+def _number_or_lot(thing: str, *, is_lot: bool) -> int | str:
+    return int(thing) if thing.isascii() and thing.isdigit() and not is_lot else thing
+
+
+def _lot_line(row: Lot) -> str:
+    ended = "runs" if row.ended_utc_ms is None else f"ended {_time(row.ended_utc_ms)}"
+    return printable(f"{row.name}: {row.grower}, began {_time(row.began_utc_ms)}, {ended}")
+
+
+def _time(utc_ms: int) -> str:
+    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

@@ -1,0 +1,147 @@
+"""Process handle of the ur-rtde process, for the driver."""
+
+import asyncio
+import contextlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections import deque
+from pathlib import Path
+from typing import Self, TypeVar
+
+from station.channel.client import ChannelClient
+from station.channel.messages import ChannelError, Message
+from station.devices.arm.faults import ArmCause, ArmFault
+
+ReplyT = TypeVar("ReplyT", bound=Message)
+LAST_WORDS = 5
+LONGEST_LINE = 65536
+FOLDER = "fruit-station-arm-"
+_OWNED = re.compile(rf"{FOLDER}(\d{{1,9}})-.+")
+
+
+def remove_stale_folders() -> None:
+    """Remove the folders of dead stations: a killed one could not remove its own, nor could its process."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{FOLDER}*"):
+        owned = _OWNED.fullmatch(folder.name)
+        if owned is not None and not _alive(int(owned[1])):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        pass
+    return True
+
+
+class ArmProcess:
+    """One start of the process; any failure of it ends it, and a new one is made."""
+
+    def __init__(
+        self, process: asyncio.subprocess.Process, channel: ChannelClient, folder: tempfile.TemporaryDirectory[str]
+    ) -> None:
+        self._process, self._channel, self._folder = process, channel, folder
+        self._words: deque[str] = deque(maxlen=LAST_WORDS)
+        self._listening = asyncio.create_task(self._listen(), name="words of the arm's process")
+
+    @classmethod
+    async def spawn(cls, host: str, frequency_hz: float) -> Self:
+        """Start the process; it is not connected to anything yet.
+
+        Args:
+            host: the controller's address.
+            frequency_hz: rate of the controller's state.
+
+        Raises:
+            ArmFault: no process can be started.
+        """
+        remove_stale_folders()
+        folder = tempfile.TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-", ignore_cleanup_errors=True)
+        endpoint = f"ipc://{folder.name}/0"  # short: a socket's path has 107 bytes at most
+        try:
+            process = await cls._start(endpoint, host, frequency_hz)
+        except BaseException as error:
+            folder.cleanup()
+            if isinstance(error, OSError):
+                raise ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}") from error
+            raise
+        return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
+
+    @staticmethod
+    async def _start(endpoint: str, host: str, frequency_hz: float) -> asyncio.subprocess.Process:
+        return await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-P",  # a folder named `station` in the working directory is not this package
+            "-m",
+            "station.devices.arm.process",
+            endpoint,
+            host,
+            str(frequency_hz),
+            str(os.getpid()),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+            limit=LONGEST_LINE,
+        )
+
+    @property
+    def pid(self) -> int:
+        """Return the process's id."""
+        return self._process.pid
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process is gone."""
+        return self._process.returncode is not None
+
+    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+        """Send a request to the process; the wait ends also when the process dies.
+
+        Raises:
+            ArmFault: no answer in time, the process has ended, or it refused.
+        """
+        asking = asyncio.create_task(self._channel.request(request, reply, deadline_s=deadline_s))
+        dying = asyncio.create_task(self._process.wait())
+        try:
+            await asyncio.wait({asking, dying}, return_when=asyncio.FIRST_COMPLETED)
+            if asking.done():
+                return asking.result()
+        except ChannelError as error:
+            raise ArmFault(ArmCause.DEADLINE, str(error)) from error
+        finally:
+            for task in (asking, dying):
+                task.cancel()
+            await asyncio.gather(asking, dying, return_exceptions=True)
+        raise ArmFault(ArmCause.LINK_LOST, f"the arm's process ended with {self._process.returncode}{self.last_output}")
+
+    @property
+    def last_output(self) -> str:
+        """Return ur-rtde's last output, for the end of a message."""
+        return f" ({' / '.join(self._words)})" if self._words else ""
+
+    async def end(self) -> None:
+        """Kill the process and remove its folder. Idempotent."""
+        with contextlib.suppress(ProcessLookupError):
+            if not self.ended:
+                self._process.kill()
+        await self._process.wait()
+        await asyncio.gather(self._listening, return_exceptions=True)
+        await self._channel.close()
+        self._folder.cleanup()
+
+    async def _listen(self) -> None:
+        stderr = self._process.stderr
+        while stderr is not None:
+            try:
+                line = await stderr.readline()
+            except ValueError:
+                continue
+            if not line:
+                return
+            self._words.append(line.decode("utf-8", "replace").strip())

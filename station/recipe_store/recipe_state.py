@@ -1,0 +1,115 @@
+"""Recipe state: the revision in force and the state of the file, computed from files and history."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from station.recipe_store.difference import format_differences
+from station.recipe_store.revision import Revision, Status
+from station.settings.problems import Problem, SettingsError
+from station.settings.recipe_model import Recipe
+
+
+class FileState(StrEnum):
+    """State of a recipe's file, compared with the approved revision."""
+
+    APPROVED = "approved"
+    """The same values as the approved revision."""
+    DRAFT = "draft"
+    """Other values: an unapproved draft."""
+    BROKEN = "broken"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Recipe in force, for inspections."""
+
+    recipe: Recipe
+    revision: int
+
+
+@dataclass(frozen=True, slots=True)
+class ValidFile:
+    """Valid file of the folder."""
+
+    path: Path
+    text: str
+    recipe: Recipe
+
+
+@dataclass(frozen=True, slots=True)
+class RecipeState:
+    """State of one recipe."""
+
+    name: str
+    control: Control | None
+    """None if no revision is approved."""
+    file_state: FileState
+    file: ValidFile | None
+    """None if it is invalid or missing."""
+    submitted: Revision | None
+    """The draft that waits for approval, whatever the file's state."""
+    note: str
+    """Information or instruction for a person, one sentence; empty if the file is the approved revision."""
+
+
+def recipe_states(
+    found: Sequence[ValidFile], broken: Mapping[str, Sequence[Problem]], history: Sequence[Revision]
+) -> tuple[RecipeState, ...]:
+    """Combine the files and the history, in the order of names.
+
+    Args:
+        found: the valid files, of different names.
+        broken: what is wrong with the others, by the files' stems. Any recipe without a good file may be the one of a
+            file whose stem is no recipe's name.
+        history: all revisions, oldest first.
+    """
+    files = {file.recipe.name: file for file in found}
+    names = dict.fromkeys(sorted({*files, *(each.name for each in history)}))
+    nobodys = [problem for stem, problems in broken.items() if stem not in names for problem in problems]
+    return tuple(
+        _recipe_state(
+            name, files.get(name), [*broken.get(name, ()), *nobodys], [each for each in history if each.name == name]
+        )
+        for name in names
+    )
+
+
+def _recipe_state(
+    name: str, file: ValidFile | None, broken: Sequence[Problem], history: Sequence[Revision]
+) -> RecipeState:
+    submitted = next((each for each in reversed(history) if each.status is Status.DRAFT), None)
+    approved = next((each for each in reversed(history) if each.status is Status.APPROVED), None)
+    control, note = None, ""
+    if approved is not None:
+        try:
+            control = Control(approved.recipe, approved.revision)
+        except SettingsError as error:
+            note = f"recipe {name}: its approved revision {approved.revision} is not taken any more: {error}"
+    if file is None:
+        state = FileState.BROKEN if broken else FileState.MISSING
+        told = "; ".join(map(str, broken)) or f"recipe {name}: its file is gone"
+        note = note or f"{told}; {_goes_on(control)}: mend it, or `station recipes revert {name}`"
+        if state is FileState.MISSING and control is None:
+            note = ""
+    elif control is not None and file.recipe == control.recipe:
+        state = FileState.APPROVED
+    else:
+        state = FileState.DRAFT
+        note = note or _draft_note(name, file, control, submitted)
+    return RecipeState(name, control, state, file, submitted, note)
+
+
+def _draft_note(name: str, file: ValidFile, control: Control | None, submitted: Revision | None) -> str:
+    changed = "" if control is None else f" ({format_differences(control.recipe, file.recipe)})"
+    if submitted is not None and submitted.recipe == file.recipe:
+        todo = f"revision {submitted.revision} of {submitted.author} waits for another person: station recipes approve"
+    else:
+        todo = f"station recipes submit {name}, or revert it"
+    return f"recipe {name}: {file.path.name} is an unapproved draft{changed}; {_goes_on(control)}; {todo}"
+
+
+def _goes_on(control: Control | None) -> str:
+    return "none is in force" if control is None else f"revision {control.revision} stays in force"

@@ -1,0 +1,64 @@
+"""Direct writes from another process than the station's: short transactions of a person's commands.
+
+SQLite separates two writers; each waits for the other's transaction, the station some milliseconds at most.
+"""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import Connection
+from sqlalchemy.exc import DBAPIError
+
+from station.records.audit import continue_audit, newer_head
+from station.records.audit_head import read_head, try_save_head
+from station.records.database import FILE_NAME, check, migrate, open_engine
+from station.records.error_mapping import map_error
+from station.records.errors import LockedError
+from station.records.open import lock_folder
+
+
+@contextmanager
+def direct_transaction(folder: Path) -> Iterator[Connection]:
+    """Run a transaction: durable when the block has ended, rolled back if it raised.
+
+    If no station has the folder open, a missing database is made, and one of an older schema is migrated.
+
+    Raises:
+        RecordsError: they cannot be written; nothing was changed.
+    """
+    path = folder / FILE_NAME
+    try:
+        _make_ready(folder)
+        head = read_head(folder)
+        engine = open_engine(path, "rw")
+        with engine.connect() as connection:
+            with connection.begin():
+                continue_audit(connection, head)
+                yield connection
+                ahead = newer_head(connection, head)
+            if ahead is not None:
+                try_save_head(folder, ahead)
+    except (DBAPIError, sqlite3.Error, OSError) as error:
+        raise map_error(error, str(path)) from error
+
+
+def _make_ready(folder: Path) -> None:
+    """Migrate the database, unless a station has it open and has done so."""
+    try:
+        lock = lock_folder(folder)
+    except LockedError:
+        return
+    try:
+        path = folder / FILE_NAME
+        if path.exists() and path.stat().st_size:
+            check(path)
+        engine = open_engine(path, "rwc")
+        try:
+            migrate(engine, folder)
+        finally:
+            engine.dispose()
+    finally:
+        os.close(lock)

@@ -1,0 +1,229 @@
+"""Opening of a records folder, whatever its state after a crash or damage."""
+
+import fcntl
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import Connection, func, select
+
+from station.records.audit import continue_audit, newer_head
+from station.records.audit_head import Head, read_head, try_save_head
+from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
+from station.records.error_mapping import DAMAGED_REMEDY, map_error
+from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
+from station.records.high_water_mark import HighWaterMark, sync_folder
+from station.records.images import FOLDER_NAME, ImageStore
+from station.records.schema import inspections
+from station.records.write_requests import add_event, end_open_inspections
+from station.records.writer import Writer
+from station.settings.records import RecordsSettings
+
+MARK_NAME = "sequence"
+LOCK_NAME = "lock"
+
+BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
+"""Files that are moved aside together. The database goes last: while it exists the next start continues the move, and a
+new one never meets an old one's write-ahead log or takes its images for orphans."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A finding at the opening of the records that needs a person: the caller raises an alarm."""
+
+    code: str
+    """The code of the corresponding `RecordsError`, as `damaged`."""
+    cause: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """Open records."""
+
+    writer: Writer
+    images: ImageStore
+    mark: HighWaterMark
+    notices: tuple[Notice, ...]
+    lost: tuple[int, ...]
+    """The inspections that an earlier start left open."""
+
+
+def lock_folder(folder: Path) -> int:
+    """Make the folder if it is missing, and lock it against other stations.
+
+    Returns:
+        A descriptor; closing it releases the lock.
+
+    Raises:
+        LockedError: another station has it.
+        RecordsError: it cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise map_error(error, str(folder)) from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, str(os.getpid()).encode())
+    except BlockingIOError as error:
+        holder = os.read(descriptor, 20).decode("ascii", "replace") or "unknown"
+        os.close(descriptor)
+        raise LockedError(
+            f"{folder}: another station has it, process {holder}", "stop that one, or set another home"
+        ) from error
+    except OSError as error:
+        os.close(descriptor)
+        raise map_error(error, str(folder)) from error
+    return descriptor
+
+
+def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
+    """Open the records; the folder is locked by the caller. Blocks.
+
+    Args:
+        settings: for the images.
+        boot: name of this start of the station.
+
+    Raises:
+        RecordsError: they cannot be opened.
+    """
+    path = folder / FILE_NAME
+    try:
+        mark = HighWaterMark(folder / MARK_NAME)
+        notices = _move_damaged_aside(folder, mark)
+        _migrate(folder)
+        sync_folder(folder)
+        writer = Writer(*_connector(path, mark), str(path))
+        try:
+            head = read_head(folder)
+            lost = writer.submit(lambda connection: _first_transaction(connection, mark, head, boot, notices)).result()
+            images = ImageStore(folder, settings, writer.submit)
+        except BaseException:
+            writer.close()
+            raise
+    except OSError as error:
+        raise map_error(error, str(folder)) from error
+    return Opened(writer, images, mark, notices, lost)
+
+
+def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]:
+    """Move a damaged database aside, and what a missing one left, if the numbers can continue without it."""
+    path = folder / FILE_NAME
+    if not path.exists() or not path.stat().st_size:
+        if mark.value:
+            aside = move_aside(folder, *BELONGING)
+            cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
+            return (Notice("damaged", cause, f"look for the old one; its images are in {aside}"),)
+        if not mark.known and (folder / "aside").exists():
+            raise _lost_mark(mark)
+        return ()
+    try:
+        check(path)
+    except DamagedError as error:
+        if not mark.known:
+            raise _lost_mark(mark) from error
+        aside = move_aside(folder, *BELONGING)
+        log.exception("%s; moved to %s", error.cause, aside)
+        remedy = f"the old one and its images are in {aside}: `sqlite3 FILE .recover` reads what is left of it"
+        return (Notice(error.code, f"{error.cause}; a new one was begun after number {mark.value}", remedy),)
+    return ()
+
+
+def _lost_mark(mark: HighWaterMark) -> SequenceError:
+    return SequenceError(
+        f"{mark.path}: which numbers were given is not known, and the database does not tell",
+        "see the last number that the PLC or the reports know, then: station records continue-after NUMBER",
+    )
+
+
+def _migrate(folder: Path) -> None:
+    """Migrate the schema."""
+    engine = open_engine(folder / FILE_NAME, "rwc")
+    try:
+        migrate(engine, folder)
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise map_error(error, str(folder / FILE_NAME)) from error
+    finally:
+        engine.dispose()
+
+
+def _connector(
+    path: Path, mark: HighWaterMark
+) -> tuple[Callable[[], Connection], Callable[[Connection], None], Callable[[], None]]:
+    """Return how the writer connects, and what it does before and after each commit."""
+    engine = open_engine(path, "rw")
+    found = path.stat()
+    saved = mark.value if mark.known else 0
+    head = read_head(path.parent)
+    ahead: Head | None = None
+
+    def confirm() -> None:
+        """Check that the file still exists: one that was removed could be written for ever, and would be lost."""
+        now = path.stat() if path.exists() else None
+        if now is None or (now.st_dev, now.st_ino) != (found.st_dev, found.st_ino):
+            raise DamagedError(f"{path}: was removed or replaced while the station ran", DAMAGED_REMEDY)
+
+    def connect() -> Connection:
+        confirm()
+        return engine.connect()
+
+    def before_commit(connection: Connection) -> None:
+        nonlocal saved, ahead
+        if mark.value != saved:
+            mark.save()
+            saved = mark.value
+        ahead = newer_head(connection, head)
+        confirm()
+
+    def after_commit() -> None:
+        nonlocal head
+        if ahead is not None:
+            try_save_head(path.parent, ahead)
+            head = ahead
+
+    return connect, before_commit, after_commit
+
+
+def _first_transaction(
+    connection: Connection, mark: HighWaterMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
+) -> tuple[int, ...]:
+    """Run the first transaction of a start."""
+    mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
+    lost = end_open_inspections(connection)
+    add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
+    continue_audit(connection, head)
+    for notice in notices:
+        add_event(connection, f"notice_{notice.code}", None, {"cause": notice.cause, "remedy": notice.remedy})
+    return tuple(lost)
+
+
+def set_mark(folder: Path, number: int) -> None:
+    """Set the high-water mark of sequence numbers, while no station has the folder.
+
+    Args:
+        number: the highest that was ever given.
+
+    Raises:
+        SequenceError: a higher one was given.
+        RecordsError: the folder is in use or cannot be written.
+    """
+    lock = lock_folder(folder)
+    try:
+        mark = HighWaterMark(folder / MARK_NAME)
+        if number < mark.value:
+            raise SequenceError(f"{mark.value} was given already", f"give {mark.value} or a higher number")
+        mark.value = number
+        mark.save()
+    except OSError as error:
+        raise map_error(error, str(folder)) from error
+    finally:
+        os.close(lock)

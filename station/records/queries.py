@@ -1,0 +1,214 @@
+"""Read queries of the records; each a function of a connection that need not be the writer's."""
+
+import json
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sqlalchemy import Connection, func, select, true
+
+from station.channel.line import Outcome
+from station.records.database import plain
+from station.records.errors import UnknownInspectionError
+from station.records.images import image_path
+from station.records.model import (
+    AlarmEntry,
+    AlarmRow,
+    CurvePoint,
+    FullRecord,
+    InspectionRecord,
+    OpenInspections,
+    RecipeSnapshot,
+    StoredImage,
+    Trigger,
+)
+from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
+
+
+class Summary(NamedTuple):
+    """One inspection in a list."""
+
+    sequence: int
+    trigger_id: int
+    began_utc_ms: int
+    lot: str
+    grower: str
+    """Empty if it was not registered."""
+    fruit: str
+    outcome: str | None
+    """None while it runs."""
+    reasons: tuple[str, ...]
+    areas_mm2: tuple[float | None, ...]
+    duration_ms: int | None
+
+
+def read_open(connection: Connection) -> OpenInspections:
+    """Read the inspections that began and were not acknowledged."""
+    table = inspections.c
+    rows = connection.execute(
+        select(table.sequence, table.trigger_id, table.standing)
+        .where(table.acknowledged_utc_ms.is_(None))
+        .order_by(table.sequence)
+    ).all()
+    return OpenInspections(
+        tuple((row.sequence, row.trigger_id) for row in rows if row.standing is None),
+        tuple(Outcome.model_validate_json(row.standing) for row in rows if row.standing is not None),
+    )
+
+
+def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
+    """Read the alarms that were saved last, by their ids."""
+    rows = connection.execute(select(alarms).order_by(alarms.c.id))
+    return tuple(AlarmRow(**row) for row in rows.mappings())
+
+
+def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
+    """Read the log of alarms, newest first.
+
+    Args:
+        limit: at most so many.
+    """
+    columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
+    rows = connection.execute(select(*columns).order_by(alarms_log.c.row.desc()).limit(limit))
+    return tuple(AlarmEntry(*row) for row in rows)
+
+
+def read_inspection(connection: Connection, sequence: int, folder: Path) -> FullRecord:
+    """Read all stored data of one inspection.
+
+    Args:
+        folder: the records' folder, for the images' paths.
+
+    Raises:
+        UnknownInspectionError: there is no record of it.
+    """
+    row = connection.execute(select(inspections).where(inspections.c.sequence == sequence)).one_or_none()
+    if row is None:
+        first, last = connection.execute(
+            select(func.min(inspections.c.sequence), func.max(inspections.c.sequence))
+        ).one()
+        there = f"the records hold {first} to {last}" if last else "the records are empty"
+        raise UnknownInspectionError(
+            f"there is no inspection {sequence}", f"{there}; `station records list` shows them"
+        )
+    kept = connection.execute(select(images).where(images.c.sequence == sequence).order_by(images.c.id))
+    standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
+    return FullRecord(
+        sequence=sequence,
+        trigger=Trigger(
+            row.trigger_id,
+            row.encoder,
+            row.lot,
+            row.began_utc_ms,
+            _recipe(connection, row),
+            row.simulated,
+            row.fruit_length_mm_x10,
+            row.size_class,
+        ),
+        boot=row.boot,
+        judged=_judged(connection, row),
+        standing=standing,
+        published_utc_ms=row.published_utc_ms,
+        acknowledged_utc_ms=row.acknowledged_utc_ms,
+        images=tuple(
+            StoredImage(
+                image.kind, image.step, image.sha256, image.size_bytes, str(image_path(folder, image.sha256).absolute())
+            )
+            for image in kept
+        ),
+        images_state=row.images_state,
+    )
+
+
+_SUMMARIES = """
+SELECT i.sequence, i.trigger_id, i.began_utc_ms, i.lot, coalesce(l.grower, ''), coalesce(r.name, 'none'), i.outcome,
+    json_extract(i.standing, '$.reasons'), i.duration_ms
+FROM inspections AS i
+LEFT JOIN recipe_snapshots AS r ON r.sha256 = i.recipe_sha256
+LEFT JOIN lots AS l ON l.name = i.lot
+WHERE i.sequence IN (SELECT value FROM json_each(?)) ORDER BY i.sequence DESC
+"""
+_AREAS = """
+SELECT sequence, area_mm2 FROM curve_points WHERE sequence IN (SELECT value FROM json_each(?)) ORDER BY sequence, step
+"""
+
+
+def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Summary]:
+    """Read some inspections for a list, highest number first.
+
+    Args:
+        sequences: missing ones are left out.
+    """
+    database = plain(connection)  # through SQLAlchemy a page takes several times as long
+    wanted = (json.dumps(list(sequences)),)
+    areas: defaultdict[int, list[float | None]] = defaultdict(list)
+    for sequence, area_mm2 in database.execute(_AREAS, wanted):
+        areas[sequence].append(area_mm2)
+    rows = database.execute(_SUMMARIES, wanted)
+    return [Summary._make((*row[:7], tuple(json.loads(row[7] or "[]")), tuple(areas[row[0]]), row[8])) for row in rows]
+
+
+def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[str, str, str], int]:
+    """Count the outcomes that the PLC was given, by fruit, outcome and first reason, as the metrics count them.
+
+    Args:
+        boot: count the inspections that this start of the station began; all by default.
+    """
+    table = inspections.c
+    reason = func.coalesce(func.json_extract(table.standing, "$.reasons[0]"), "none")
+    fruit = func.coalesce(recipe_snapshots.c.name, "none")
+    query = (
+        select(fruit, table.outcome, reason, func.count())
+        .outerjoin(recipe_snapshots, recipe_snapshots.c.sha256 == table.recipe_sha256)
+        .where(table.published_utc_ms.is_not(None), true() if boot is None else table.boot == boot)
+        .group_by(fruit, table.outcome, reason)
+    )
+    return {(name, outcome, why): number for name, outcome, why, number in connection.execute(query)}
+
+
+def _recipe(connection: Connection, row: Any) -> RecipeSnapshot | None:
+    if row.recipe_sha256 is None:
+        return None
+    found = connection.execute(select(recipe_snapshots).where(recipe_snapshots.c.sha256 == row.recipe_sha256)).one()
+    return RecipeSnapshot(found.name, found.number, found.revision, found.text)
+
+
+def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
+    if row.judged is None:
+        return None
+    points = connection.execute(
+        select(curve_points).where(curve_points.c.sequence == row.sequence).order_by(curve_points.c.step)
+    )
+    return InspectionRecord(
+        outcome=row.judged,
+        reasons=tuple(row.reasons),
+        explanation=tuple(row.explanation),
+        late=row.late,
+        partial=row.partial,
+        area_mm2=row.area_mm2,
+        area_px=row.area_px,
+        closing_mm=row.closing_mm,
+        confidence=row.confidence,
+        ended_utc_ms=row.ended_utc_ms,
+        duration_ms=row.duration_ms,
+        curve=tuple(
+            CurvePoint(
+                point.step,
+                point.width_mm,
+                point.closing_mm,
+                point.area_mm2,
+                point.area_px,
+                point.confidence,
+                tuple(point.flags),
+                point.captured_s,
+                point.changed_area_mm2,
+                point.changed_area_px,
+            )
+            for point in points
+        ),
+        phases_s=row.phases_s,
+        measures=row.measures,
+        devices=row.devices,
+        versions=row.versions,
+    )

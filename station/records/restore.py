@@ -1,0 +1,121 @@
+"""Restore of a backup; the present records are moved aside, never removed."""
+
+import os
+import shutil
+import sqlite3
+import uuid
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+from sqlalchemy import func, insert, select
+
+from station.records.audit import append_restored
+from station.records.audit_head import Head, read_head, try_save_head
+from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
+from station.records.database import FILE_NAME, migrate, move_aside, open_engine
+from station.records.error_mapping import map_error
+from station.records.errors import DamagedError, RecordsError
+from station.records.high_water_mark import HighWaterMark, sync_folder
+from station.records.images import FOLDER_NAME, image_path
+from station.records.open import BELONGING, lock_folder
+from station.records.retention import referred
+from station.records.schema import origins, outbox
+
+_NEW = "restoring"
+_OTHER = "take another backup: this one is not whole"
+
+
+class RestoreResult(NamedTuple):
+    """Result of a restore."""
+
+    inspections: int
+    images: int
+    aside: Path | None
+    """Folder of the previous records."""
+
+
+def restore_backup(folder: Path, directory: Path, by: str) -> RestoreResult:
+    """Restore a backup, all of it or nothing. Numbers given since it was made are not given again.
+
+    All is copied and verified first, beside the records; then the present records are moved aside and the copy replaces
+    them, the database last. After an interruption call it again.
+
+    Args:
+        folder: the records' folder; no station has it open.
+        directory: as `make_backup` made it.
+        by: name of the person, for the audit trail.
+
+    Raises:
+        RecordsError: a station runs, the backup is not complete, or the disk failed; the records are unchanged.
+    """
+    manifest = read_manifest(directory)
+    lock = lock_folder(folder)
+    new = folder / _NEW
+    try:
+        shutil.rmtree(new, ignore_errors=True)
+        (new / FOLDER_NAME).mkdir(parents=True)
+        _copied(directory, new, manifest)
+        mark = HighWaterMark(folder / MARK_NAME)
+        mark.value = max(mark.value, manifest.sequence)
+        mark.save()
+        _continue(folder, new, manifest, by)
+        present = [name for name in BELONGING if (folder / name).exists()]
+        aside = move_aside(folder, *present) if present else None
+        for name in (FOLDER_NAME, FILE_NAME):
+            (new / name).rename(folder / name)
+        sync_folder(folder)
+        shutil.rmtree(new)
+    except (OSError, sqlite3.Error) as error:
+        raise map_error(error, str(folder)) from error
+    finally:
+        os.close(lock)
+    return RestoreResult(manifest.inspections, manifest.images, aside)
+
+
+def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
+    """Copy database and images, each verified against the manifest."""
+    source, path = directory / FILE_NAME, new / FILE_NAME
+    if not source.exists() or hash_of(source) != manifest.database_sha256:
+        raise DamagedError(f"{source} is missing, or not the one that was verified", _OTHER)
+    shutil.copyfile(source, path)
+    with closing(sqlite3.connect(path)) as connection:
+        faults = list(integrity(connection))
+    if faults:
+        raise DamagedError(f"{source}: {faults[0]}", _OTHER)
+    engine = open_engine(path, "rw")
+    try:
+        with engine.connect() as connection:
+            wanted = referred(connection)
+    finally:
+        engine.dispose()
+    for sha256 in wanted:
+        try:
+            copy_image(image_path(directory, sha256), image_path(new, sha256), sha256)
+        except FileNotFoundError:
+            raise DamagedError(f"{directory}: the image {sha256} is missing", _OTHER) from None
+    for subfolder in (new / FOLDER_NAME, *(new / FOLDER_NAME).iterdir()):
+        sync_folder(subfolder)
+
+
+def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
+    """Continue what is numbered: the outbox under a new origin, the audit trail with a row of the restore."""
+    engine = open_engine(new / FILE_NAME, "rw")
+    try:
+        migrate(engine, new)
+        with engine.begin() as connection:
+            after = (connection.scalar(select(func.max(outbox.c.entry))) or 0) + 1
+            connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
+            told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
+            row = append_restored(connection, by, read_head(folder), told)
+        try_save_head(folder, Head(row.seq, row.hash))
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise map_error(error, str(new / FILE_NAME)) from error
+    finally:
+        engine.dispose()
+    with closing(sqlite3.connect(new / FILE_NAME)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")
+    with (new / FILE_NAME).open("rb") as file:
+        os.fsync(file.fileno())

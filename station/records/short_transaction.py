@@ -1,0 +1,38 @@
+"""Transactions of another process than the station's, between two of the station's writes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sqlalchemy import Connection
+
+from station.records.audit import newer_head
+from station.records.audit_head import read_head, try_save_head
+from station.records.database import FILE_NAME, open_engine
+from station.records.error_mapping import map_error
+from station.records.errors import RecordsError
+
+
+@contextmanager
+def short_transaction(folder: Path) -> Iterator[Connection]:
+    """Run one transaction: durable when the block ends, rolled back if it raises. The station waits: be short.
+
+    Raises:
+        RecordsError: there are no records, or they cannot be changed.
+    """
+    path = folder / FILE_NAME
+    if not path.exists():
+        raise RecordsError(f"there is no {path}", "give the station's home folder, or let the station begin one")
+    engine = open_engine(path, "rw")
+    try:
+        with engine.begin() as connection:
+            yield connection
+            head = newer_head(connection, read_head(folder))
+        if head is not None:
+            try_save_head(folder, head)
+    except RecordsError:
+        raise
+    except Exception as error:
+        raise map_error(error, str(path)) from error
+    finally:
+        engine.dispose()

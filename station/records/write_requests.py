@@ -1,0 +1,317 @@
+"""Write requests of the records, each a function of the writer's connection."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, Literal
+
+from pydantic import ValidationError
+from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy.dialects.sqlite import insert as upsert
+
+from station.channel.line import Outcome, Reason
+from station.records.errors import BadRecordError, UnknownInspectionError
+from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
+from station.records.schema import (
+    alarms,
+    alarms_log,
+    counters,
+    curve_points,
+    events,
+    images,
+    inspections,
+    outbox,
+    recipe_snapshots,
+)
+from station.records.search_index import index_hour, index_reasons
+
+OutboxKind = Literal["inspection", "lot", "audit"]
+PENDING = "pending"
+LOST = "lost: the station ended before they were written"
+
+
+def utc_ms() -> int:
+    """Return the machine's clock, ms since 1970."""
+    return time.time_ns() // 1_000_000
+
+
+def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot: str) -> None:
+    """Begin an inspection.
+
+    Raises:
+        BadRecordError: no outcome could ever be published for such a trigger.
+    """
+    recipe = trigger.recipe
+    if recipe is not None:
+        snapshot = {
+            "sha256": recipe.sha256,
+            "name": recipe.name,
+            "number": recipe.number,
+            "revision": recipe.revision,
+            "checksum": recipe.checksum,
+            "text": recipe.text,
+        }
+        connection.execute(upsert(recipe_snapshots).values(snapshot).on_conflict_do_nothing())
+    begun = {
+        "sequence": sequence,
+        "trigger_id": trigger.trigger_id,
+        "encoder": trigger.encoder,
+        "lot": trigger.lot,
+        "recipe_number": recipe.number if recipe else 0,
+        "recipe_checksum": recipe.checksum if recipe else 0,
+        "simulated": trigger.simulated,
+        "began_utc_ms": trigger.began_utc_ms,
+        "fruit_length_mm_x10": trigger.fruit_length_mm_x10,
+        "size_class": trigger.size_class,
+    }
+    _lost(begun)
+    sha256 = recipe.sha256 if recipe else None
+    connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
+    index_hour(connection, sequence, trigger.began_utc_ms)
+
+
+def withdraw(connection: Connection, sequence: int) -> None:
+    """Withdraw an inspection whose caller was gone when it was durable; its number is not given again."""
+    connection.execute(delete(inspections).where(inspections.c.sequence == sequence, inspections.c.outcome.is_(None)))
+    add_event(connection, "begin_withdrawn", sequence, {})
+
+
+def conclude(
+    connection: Connection, sequence: int, record: InspectionRecord, images_states: Mapping[str, str]
+) -> tuple[Outcome, str | None]:
+    """Store how an inspection ended, unless it is stored already.
+
+    Args:
+        record: its result.
+        images_states: state of its images, by the outcome that decides: `PASS` or `other`.
+
+    Returns:
+        The outcome in force, and the images' state; None if this record was not taken.
+    """
+    row = _row(connection, sequence)
+    standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
+    if row.judged is not None and standing is not None:
+        return standing, None
+    judged = _judged(row._asdict(), record)
+    standing = standing or judged
+    passed = record.outcome == standing.outcome == "PASS"
+    images_state = images_states["PASS" if passed else "other"]
+    connection.execute(
+        update(inspections)
+        .where(inspections.c.sequence == sequence)
+        .values(
+            judged=record.outcome,
+            reasons=[str(reason) for reason in record.reasons],
+            explanation=list(record.explanation),
+            late=record.late,
+            partial=record.partial,
+            area_mm2=judged.area_mm2,
+            area_px=judged.area_px,
+            closing_mm=judged.closing_mm,
+            confidence=judged.confidence,
+            ended_utc_ms=record.ended_utc_ms,
+            duration_ms=record.duration_ms,
+            phases_s=dict(record.phases_s),
+            measures=dict(record.measures),
+            devices=dict(record.devices),
+            versions=dict(record.versions),
+            images_state=images_state,
+            outcome=standing.outcome,
+            standing=standing.model_dump_json(),
+        )
+    )
+    if row.standing is None:
+        index_reasons(connection, None, standing)
+    if record.curve:
+        points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
+        connection.execute(insert(curve_points), points)
+    if row.published_utc_ms is not None:
+        queue_event(connection, "inspection", sequence)
+    return standing, images_state
+
+
+def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:
+    """Store that the PLC was given an outcome, unless it is stored already; True the first time."""
+    table = inspections.c
+    found = connection.execute(
+        select(table.published_utc_ms, table.standing).where(table.sequence == outcome.sequence)
+    ).one_or_none()
+    if found is not None and found.published_utc_ms is not None:
+        return False
+    if found is None:
+        if outcome.sequence > given_up_to:
+            raise UnknownInspectionError(f"inspection {outcome.sequence} was never begun", "ask what is open")
+        _insert_published(connection, outcome, boot)
+    connection.execute(
+        update(inspections)
+        .where(inspections.c.sequence == outcome.sequence)
+        .values(outcome=outcome.outcome, standing=outcome.model_dump_json(), published_utc_ms=utc_ms())
+    )
+    stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
+    index_reasons(connection, stood, outcome)
+    queue_event(connection, "inspection", outcome.sequence)
+    return True
+
+
+def queue_event(connection: Connection, kind: OutboxKind, row: int) -> None:
+    """Queue a row for other systems: an inspection when it is published, and again when it changes after that.
+
+    Args:
+        connection: the writer's, in the transaction of the change.
+        kind: of the row.
+        row: its sequence, id or number.
+    """
+    connection.execute(insert(outbox).values(kind=kind, row=row))
+
+
+def acknowledge(connection: Connection, sequence: int) -> int:
+    """Store that the PLC has taken the published outcomes up to this sequence; returns their number."""
+    table = inspections.c
+    return connection.execute(
+        update(inspections)
+        .where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_not(None), table.sequence <= sequence)
+        .values(acknowledged_utc_ms=utc_ms())
+    ).rowcount
+
+
+def end_open_inspections(connection: Connection) -> list[int]:
+    """End, after a start, what was not surely delivered: NO_RESULT with `station_lost`.
+
+    Returns:
+        The sequences.
+    """
+    table = inspections.c
+    rows = connection.execute(
+        select(inspections).where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_(None))
+    ).all()
+    for row in rows:
+        lost = _lost(row._asdict())
+        connection.execute(
+            update(inspections)
+            .where(table.sequence == row.sequence)
+            .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
+        )
+        index_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
+    lost_images = update(inspections).where(table.images_state == PENDING).values(images_state=LOST)
+    for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
+        if row.published_utc_ms is not None:
+            queue_event(connection, "inspection", row.sequence)
+    return [row.sequence for row in rows]
+
+
+def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequence[AlarmEntry]) -> None:
+    """Store these alarms and no others, and append to the log."""
+    connection.execute(delete(alarms))
+    if active:
+        connection.execute(insert(alarms), [asdict(row) for row in active])
+    if log:
+        connection.execute(insert(alarms_log), [asdict(entry) for entry in log])
+
+
+def add_counts(connection: Connection, by: Mapping[str, int]) -> dict[str, int]:
+    """Add to counters and return all."""
+    for name, number in by.items():
+        row = upsert(counters).values(name=name, value=number)
+        connection.execute(row.on_conflict_do_update(["name"], set_={"value": counters.c.value + number}))
+    return {row.name: row.value for row in connection.execute(select(counters))}
+
+
+def add_event(connection: Connection, name: str, sequence: int | None, details: Mapping[str, Any]) -> None:
+    """Append an event."""
+    values = {"utc_ms": utc_ms(), "name": name, "sequence": sequence, "details": dict(details)}
+    connection.execute(insert(events).values(values))
+
+
+def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: str) -> None:
+    """Add rows for images whose files are durable, and the number of stored images."""
+    if rows:
+        connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
+    table = inspections.c
+    changed = update(inspections).where(table.sequence == sequence).values(images_state=state)
+    if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
+        queue_event(connection, "inspection", sequence)
+
+
+def _row(connection: Connection, sequence: int) -> Any:
+    row = connection.execute(select(inspections).where(inspections.c.sequence == sequence)).one_or_none()
+    if row is None:
+        raise UnknownInspectionError(f"inspection {sequence} is not in this database", "begin it first")
+    return row
+
+
+def _lost(begun: Mapping[str, Any]) -> Outcome:
+    """Return the outcome for the PLC of an inspection that was not surely delivered."""
+    return _outcome(
+        begun,
+        outcome="NO_RESULT",
+        reasons=(Reason.STATION_LOST,),
+        late=bool(begun.get("late")),
+        partial=begun.get("judged") is None or bool(begun.get("partial")),
+        area_mm2=None,
+        area_px=None,
+        closing_mm=None,
+        confidence=None,
+        ended_utc_ms=begun.get("ended_utc_ms") or utc_ms(),
+        duration_ms=begun.get("duration_ms") or 0,
+    )
+
+
+def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
+    """Return the outcome for the PLC of a record."""
+    if bool(record.reasons) == (record.outcome == "PASS"):
+        raise BadRecordError(f"inspection {begun['sequence']}: {record.outcome} with {record.reasons}", "see the log")
+    return _outcome(
+        begun,
+        outcome=record.outcome,
+        reasons=tuple(Reason(reason) for reason in record.reasons),
+        late=record.late,
+        partial=record.partial,
+        area_mm2=None if record.area_mm2 is None else float(record.area_mm2),
+        area_px=None if record.area_px is None else int(record.area_px),
+        closing_mm=None if record.closing_mm is None else float(record.closing_mm),
+        confidence=None if record.confidence is None else float(record.confidence),
+        ended_utc_ms=record.ended_utc_ms,
+        duration_ms=record.duration_ms,
+    )
+
+
+def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
+    columns = (
+        "sequence",
+        "trigger_id",
+        "encoder",
+        "lot",
+        "recipe_number",
+        "recipe_checksum",
+        "simulated",
+        "began_utc_ms",
+        "fruit_length_mm_x10",
+        "size_class",
+    )
+    try:
+        return Outcome(**{name: begun[name] for name in columns}, **ended)
+    except ValidationError as error:
+        raise BadRecordError(f"inspection {begun['sequence']} is malformed: {error}", "see the log") from error
+
+
+def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> None:
+    """Insert an inspection of which only the outcome is known: it began in a database that was moved aside."""
+    connection.execute(
+        insert(inspections).values(
+            sequence=outcome.sequence,
+            boot=boot,
+            trigger_id=outcome.trigger_id,
+            encoder=outcome.encoder,
+            lot=outcome.lot,
+            recipe_number=outcome.recipe_number,
+            recipe_checksum=outcome.recipe_checksum,
+            simulated=outcome.simulated,
+            began_utc_ms=outcome.began_utc_ms,
+            ended_utc_ms=outcome.ended_utc_ms,
+            duration_ms=outcome.duration_ms,
+            fruit_length_mm_x10=outcome.fruit_length_mm_x10,
+            size_class=outcome.size_class,
+            images_state="none: known by its outcome alone",
+        )
+    )
+    index_hour(connection, outcome.sequence, outcome.began_utc_ms)

@@ -1,0 +1,141 @@
+"""Active calibration of the sensor: scale, contact gate, golden reference, age, and due verification."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from station.calibration.model import Calibration, Verification
+from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
+from station.settings.configuration import Configuration
+from station.vision.scale import TYPICAL_STANDARD_UNCERTAINTY
+
+_DAY_S, _HOUR_S = 86_400.0, 3_600.0
+
+
+class CalibrationInUse(NamedTuple):
+    """Scale that a fruit is measured by."""
+
+    mm_per_px: float
+    words: str
+    """For the fruit's record."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of `mm_per_px`."""
+
+
+class CalibrationFigures(NamedTuple):
+    """Calibration figures for the metrics; None for a missing value."""
+
+    age_s: float | None
+    verification_age_s: float | None
+    drift: float | None
+
+
+class ActiveCalibration:
+    """Newest calibration of the sensor in use; read again when another one is stored.
+
+    Args:
+        serial: returns the sensor's serial number.
+        clock: seconds since 1970, as calibrations are dated.
+    """
+
+    def __init__(
+        self, configuration: Configuration, serial: Callable[[], str], clock: Callable[[], float] = time.time
+    ) -> None:
+        self._store, self._home = CalibrationStore(configuration.home), configuration.home
+        self._settings, self._usual_mm_per_px = configuration.calibration, configuration.camera.mm_per_px
+        self._required = configuration.service.uncalibrated == "refuse"
+        self._serial, self._clock = serial, clock
+        self._seen: object = None
+        self._calibration: Calibration | None = None
+        self._verification: Verification | None = None
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """Return the calibration in force; None if the sensor has none."""
+        self._refresh()
+        return self._calibration
+
+    @property
+    def in_force(self) -> CalibrationInUse:
+        """Return the scale that areas are reported in, and its source."""
+        calibration = self.calibration
+        if calibration is None:
+            allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
+            words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration{allowed}"
+            return CalibrationInUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
+        measured = calibration.scale_measured
+        scale = calibration.mm_per_px if measured else self._usual_mm_per_px
+        words = f"{calibration.summary()}, in use {scale:g} mm/px"
+        return CalibrationInUse(
+            scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY
+        )
+
+    @property
+    def gate_factor(self) -> float:
+        """Return the factor that raises the recipe's contact gate on this unit."""
+        return 1.0 if self.calibration is None else self.calibration.noise.gate_factor
+
+    def golden(self) -> Path | None:
+        """Return the file of the untouched gel as it was calibrated."""
+        return None if self.calibration is None else self._store.folder(self.calibration) / REFERENCE
+
+    @property
+    def figures(self) -> CalibrationFigures:
+        """Return ages and drift now."""
+        calibration, verified = self.calibration, self._verification
+        return CalibrationFigures(
+            None if calibration is None else self._clock() - calibration.made_at.timestamp(),
+            None if verified is None else self._clock() - verified.made_at.timestamp(),
+            None if verified is None else verified.drift,
+        )
+
+    def refusal(self) -> str:
+        """Return why inspections are refused, with the remedy; empty if all that is required was done."""
+        limit_h, calibration = self._settings.verify_every_h, self.calibration
+        if calibration is None and (self._required or limit_h is not None):
+            return (
+                "The sensor is not calibrated: calibrate it with the ball on the page Maintenance in manual mode, "
+                "or by `station calibrate` with the station stopped."
+            )
+        if limit_h is None:
+            return ""
+        verified, age_s = self._verification, self.figures.verification_age_s
+        how = "on the page Maintenance in manual mode, or by `station verify` with the station stopped."
+        if verified is None or age_s is None:
+            return f"The calibration was never verified, and it is demanded: verify it with the ball; {how}"
+        if not verified.passed:
+            return f"The last verification failed: mend what its page names, then verify again; {how}"
+        if age_s > limit_h * _HOUR_S:
+            old = f"{age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed"
+            return f"The last verification is {old}: verify with the ball; {how}"
+        return ""
+
+    def alarm_detail(self) -> str:
+        """Return the detail of the alarm calibration_old; empty for no alarm."""
+        calibration, verified = self.calibration, self._verification
+        if calibration is None:
+            return "the sensor is not calibrated: calibrate it first" if self._required and self._serial() else ""
+        age_days = (self.figures.age_s or 0.0) / _DAY_S
+        if age_days > self._settings.oldest_days:
+            return f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"
+        if verified is not None and not verified.passed:
+            failed = ", ".join(check.name for check in verified.checks if not check.passed)
+            return f"the last verification, {verified.id}, failed: {failed}"
+        return ""
+
+    def _refresh(self) -> None:
+        serial = self._serial()
+        seen = (serial, *(_changed(self._home / kind / serial) for kind in (CALIBRATIONS, VERIFICATIONS)))
+        if not serial or seen == self._seen:
+            return
+        self._calibration = self._store.current(serial)
+        self._verification = None if self._calibration is None else self._store.last_verification(self._calibration)
+        self._seen = seen
+
+
+def _changed(folder: Path) -> int:
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return 0

@@ -1,0 +1,138 @@
+"""Audit logger: queues audit entries, writes them in the background, and tries again until they are stored."""
+
+import asyncio
+import logging
+from typing import Any
+
+from station.channel.line import Command, CommandDone
+from station.records.audit import AuditEntry
+from station.records.errors import BadRecordError, RecordsError
+from station.records.records import Records
+
+PLC = "plc"
+PANEL = "panel"
+"""Actor of a command from a panel without a logged-in person."""
+RETRY_S = 2.0
+FLUSH_S = 3.0
+MOST_WAITING = 10_000
+
+log = logging.getLogger(__name__)
+
+
+class AuditLogger:
+    """Queue of audit entries. `note` never waits; no entry is dropped silently.
+
+    Args:
+        records: opened, or to be reopened.
+    """
+
+    def __init__(self, records: Records) -> None:
+        self._records = records
+        self._waiting: list[AuditEntry] = []
+        self._queued = asyncio.Event()
+        self._writing = asyncio.Lock()
+
+    def log(self, *entries: AuditEntry) -> None:
+        """Queue entries to be written.
+
+        Args:
+            entries: in their order.
+        """
+        self._waiting += entries
+        if len(self._waiting) > MOST_WAITING:
+            log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
+        self._queued.set()
+
+    def log_command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
+        """Queue the entry of a command that was carried out or refused.
+
+        Args:
+            who: `plc`, `panel` or a person's name.
+            command: name of the command.
+            subject: object of the command.
+            why_not: reason of the refusal; empty if it was carried out.
+            role: of `who`; by default the same as `who`.
+            **old: values before the command, where they matter.
+        """
+        new = {"done": not why_not} | ({"why": why_not} if why_not else {})
+        self.log(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
+
+    async def run(self) -> None:
+        """Write the queue until cancelled."""
+        while True:
+            await self._queued.wait()
+            self._queued.clear()
+            if not await self._write():
+                await asyncio.sleep(RETRY_S)
+                self._queued.set()
+
+    async def flush(self) -> None:
+        """Write the queue once; what cannot be written is logged."""
+        if not await self._write():
+            log.error("the audit trail could not take: %s", "; ".join(map(str, self._waiting)))
+
+    async def _write(self) -> bool:
+        async with self._writing:
+            while self._waiting:
+                entry = self._waiting[0]
+                try:
+                    await self._records.audit(entry)
+                except BadRecordError:
+                    log.exception("the audit trail cannot hold %s", entry)
+                except RecordsError as error:
+                    log.warning("the audit trail waits: %s", error)
+                    return False
+                del self._waiting[0]
+            return True
+
+
+def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
+    """Make the entry of a command that the PLC or a person gave.
+
+    Args:
+        done: its result.
+        old: the value before; None if unknown.
+        by: name and role of who gave it.
+    """
+    new = {"argument": command.argument, **done.model_dump()}
+    return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
+
+
+def calibration_entry(who: str, reason: str, subject: str, old: Any, new: Any) -> AuditEntry:
+    """Make the entry of a calibration; for `Records.audit`, or `append_audit` if no station runs.
+
+    Args:
+        who: the person who made it.
+        reason: as `yearly`, `gel changed`.
+        subject: the calibrated thing, as `scale of DIGIT D20966`.
+        old: value in force before, None for none.
+        new: value in force from now on.
+    """
+    return AuditEntry(who, "service", "calibration.stored", subject, reason, old, new)
+
+
+def verification_entry(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
+    """Make the entry of a verification.
+
+    Args:
+        who: the person who made it.
+        subject: the verified thing, as `sensor D20966`.
+        calibration: id of the calibration compared with.
+        verification: its own id.
+        passed: all values were within their tolerances.
+    """
+    new = {"calibration": calibration, "verification": verification, "passed": passed}
+    return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
+
+
+def alarm_entry(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
+    """Make the entry of an alarm that a person or the PLC changed.
+
+    Args:
+        who: `plc`, `panel` or a person's name.
+        role: of `who`.
+        change: `acknowledged`, `shelved`, `unshelved` or `reset`.
+        alarm: its id.
+        reason: as for shelving.
+    """
+    return AuditEntry(who, role, f"alarm.{change}", f"alarm {alarm}", reason)

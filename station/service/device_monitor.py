@@ -1,0 +1,114 @@
+"""Device monitor: checks one device periodically, and stores the time of its last answer and its fault."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Awaitable, Callable
+
+from station.errors import StationError
+
+PERIOD_S = 0.25
+FIRST_PAUSE_S = 0.25
+MEETING_S = 15.0
+
+log = logging.getLogger(__name__)
+
+Check = Callable[[], Awaitable[None]]
+"""Checks the device; raises its fault. It returns in time, whatever the device does."""
+
+
+class NoAnswerYetError(StationError):
+    """The device has not answered since the start."""
+
+
+class DeviceMonitor:
+    """Monitor task of one device. It runs for ever, with growing pauses while the device is away.
+
+    Args:
+        name: of the device, as in messages.
+        check: checks the device.
+        longest_pause_s: between two checks.
+        on_change: gets the fault from now on, None for no fault.
+        on_progress: called after each check, whatever its result.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        check: Check,
+        longest_pause_s: float,
+        on_change: Callable[[StationError | None], None],
+        on_progress: Callable[[], None],
+    ) -> None:
+        self.name = name
+        self.fault: StationError | None = NoAnswerYetError(f"{name}: it has not answered yet; wait a moment")
+        self.heard_s: float | None = None
+        """Monotonic time of the last check that found the device healthy."""
+        self.in_use = False
+        """True while a caller works with it: it is not checked then, and the caller reports faults."""
+        self._check, self._longest_pause_s = check, longest_pause_s
+        self._on_change, self._on_progress = on_change, on_progress
+        self._again = asyncio.Event()
+        self._began_s = time.monotonic()
+
+    @property
+    def reported_fault(self) -> StationError | None:
+        """Return the fault that an operator has to see: a device has some time to answer after the start."""
+        return None if self.heard_s is None and time.monotonic() < self._began_s + MEETING_S else self.fault
+
+    @property
+    def age_s(self) -> float | None:
+        """Return the time since it was last found healthy; None if it never was."""
+        return None if self.heard_s is None else time.monotonic() - self.heard_s
+
+    def report_success(self) -> None:
+        """Note that a caller has just worked with the device successfully."""
+        self.heard_s = time.monotonic()
+        self._on_progress()
+
+    def report_fault(self, fault: StationError) -> None:
+        """Note a fault that a caller met; the next check follows at once."""
+        self._set(fault)
+        self._again.set()
+
+    def check_now(self) -> None:
+        """Check again at once, after a repair, without waiting for the next check's time."""
+        self._again.set()
+
+    async def run(self) -> None:
+        """Check until cancelled."""
+        pause_s = PERIOD_S
+        while True:
+            if self.in_use:
+                self._on_progress()
+            else:
+                try:
+                    await self._check()
+                except StationError as fault:
+                    pause_s = FIRST_PAUSE_S if self.fault is None else min(2 * pause_s, self._longest_pause_s)
+                    self._set(fault)
+                    self._on_progress()
+                else:
+                    pause_s = PERIOD_S
+                    self.report_success()
+                    self._set(None)
+            await self._pause(pause_s)
+
+    async def _pause(self, pause_s: float) -> None:
+        until_s = time.monotonic() + pause_s
+        self._again.clear()
+        while (left_s := until_s - time.monotonic()) > 0:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(min(left_s, PERIOD_S)):
+                    await self._again.wait()
+            if self._again.is_set():
+                return
+            self._on_progress()
+
+    def _set(self, fault: StationError | None) -> None:
+        before, self.fault = self.fault, fault
+        if str(before or "") != str(fault or ""):
+            log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault or "well")
+        if (before is None) != (fault is None) or type(before) is not type(fault):
+            self._on_change(fault)

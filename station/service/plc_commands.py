@@ -1,0 +1,285 @@
+"""PLC commands between fruits, and the line's state as the PLC interface reports it."""
+
+import asyncio
+import logging
+import time
+from typing import Any
+
+from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
+from station.channel.panel import Recover
+from station.devices.arm.faults import ArmFault
+from station.errors import BadInputError
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import UNJUDGED, WAITING, Event
+from station.inspection.states import STATES, State
+from station.service.active_recipes import ActiveRecipes
+from station.service.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
+from station.service.device_manager import DeviceManager
+from station.service.lot_manager import LotManager
+from station.service.metrics import Metrics
+from station.service.service import Service
+from station.service.state_files import StateFiles
+from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
+
+DEADLINE_S = 25.0
+"""Less than the PLC interface's own deadline for a command."""
+LINE_SILENT_S = 2.0
+MODES = (1, 2, 3)
+_STOPPED = "stopped_by_a_person"
+_ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
+
+
+class PlcCommands:
+    """Executes the PLC's commands, one after the other.
+
+    Args:
+        lots: gets a chosen recipe.
+        audit: gets every command.
+        metrics: gets the line's signs of life.
+        state_files: stores a person's stop for a restart.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        devices: DeviceManager,
+        recipes: ActiveRecipes,
+        lots: LotManager,
+        audit: AuditLogger,
+        metrics: Metrics,
+        state_files: StateFiles,
+    ) -> None:
+        self._service, self._devices, self._recipes, self._metrics = service, devices, recipes, metrics
+        self._lots, self._audit, self._state_files = lots, audit, state_files
+        self.mode = MODES[0]
+        """PackML's: 1 production, 2 maintenance, 3 manual."""
+        self.recipe_changing = False
+        self.kept_manual = ""
+        """Activity at the panel that needs the mode unchanged; empty for none."""
+        self.registers_wanted = False
+        """Requests the PLC interface's registers with the next beat."""
+        self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
+        self._line: Line | None = None
+        self._line_at_s: float | None = None
+        self._turn = asyncio.Lock()
+
+    @property
+    def line_age_s(self) -> float | None:
+        """Return the time since the PLC interface's last message; None if there was none."""
+        return None if self._line_at_s is None else time.monotonic() - self._line_at_s
+
+    @property
+    def last_report(self) -> Line | None:
+        """Return the PLC interface's last message; None if there was none."""
+        return self._line
+
+    def restore_stop(self) -> None:
+        """Restore a person's stop after a restart; it lasts until a reset."""
+        self._service.stop_wanted = self._state_files.read(_STOPPED) == b"yes"
+
+    def set_line(self, line: Line) -> None:
+        """Store the PLC interface's beat."""
+        self._line, self._line_at_s = line, time.monotonic()
+        if line.registers:
+            self._registers, self.registers_wanted = (line.registers, time.monotonic()), False
+        self._metrics.heard("plc_interface")
+        self._metrics.waiting(line.waiting)
+        if line.plc_alive:
+            self._metrics.heard("plc")
+
+    @property
+    def registers(self) -> tuple[tuple[RegisterView, ...], float]:
+        """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
+        return self._registers
+
+    def line_fault(self) -> str:
+        """Return the line's fault, as far as known; empty for none."""
+        age_s = self.line_age_s
+        if self._line is None or age_s is None:
+            return ""
+        if age_s > LINE_SILENT_S:
+            return f"the PLC interface has not been heard for {age_s:.0f} s"
+        return "" if self._line.plc_alive or not self._line.enabled else "the PLC's heartbeat stands still"
+
+    def update_line_alarms(self) -> None:
+        """Raise and clear the alarms of the line's state."""
+        age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
+        if line is None or age_s is None:
+            return
+        silent = age_s > LINE_SILENT_S
+        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else "")
+        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_fault())
+        can = [fault for fault in line.faults if fault.startswith("CAN:")]
+        shots = [fault for fault in can if fault.startswith(("CAN: shot ", "CAN: the gate reports"))]
+        alarms.update(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
+        alarms.update(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
+
+    async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
+        """Execute one command.
+
+        Args:
+            by: name and role of who gave it.
+        """
+        log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
+        before, alarms = self._value_before(command.command), self._service.alarms.alarms
+        async with self._turn:
+            try:
+                async with asyncio.timeout(DEADLINE_S):
+                    why = await self._execute(command)
+            except TimeoutError:
+                why = f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._sentence()}"
+        if why:
+            log.warning("%s was not done: %s", command.command, why)
+        done = CommandDone(done=not why, why=why)
+        self._audit.log(command_entry(command, done, before, by))
+        if command.command in _ON_ALARMS:
+            now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
+            changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
+            self._audit.log(*(alarm_entry(*by, change, alarm) for alarm in changed))
+        return done
+
+    def _value_before(self, command: CommandName) -> dict[str, Any]:
+        """Return the value that a command is about to change, for the audit log."""
+        active = self._service.active
+        match command:
+            case CommandName.CHANGE_RECIPE:
+                snapshot = None if active is None else active.snapshot
+                return {"recipe": None if snapshot is None else [snapshot.number, snapshot.name, snapshot.revision]}
+            case CommandName.SET_MODE:
+                return {"mode": self.mode}
+            case _:
+                return {"state": str(self._service.state)}
+
+    async def _execute(self, command: Command) -> str:
+        match command.command:
+            case CommandName.CHANGE_RECIPE:
+                return await self._change_recipe(command.argument)
+            case CommandName.RESET:
+                return await self._reset()
+            case CommandName.CALL_OFF:
+                return await self._call_off()
+            case CommandName.SET_MODE:
+                return self._set_mode(command.argument)
+            case CommandName.CLEAR_ALARMS:
+                self._service.alarms.acknowledge_returned()
+                return ""
+
+    def _set_mode(self, mode: int) -> str:
+        if mode not in MODES:
+            return f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)"
+        if self.kept_manual and mode != self.mode:
+            return f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there"
+        self.mode = mode
+        return ""
+
+    async def _change_recipe(self, number: int) -> str:
+        await asyncio.to_thread(self._recipes.read)
+        found = self._recipes.find(number)
+        if found is None:
+            known = ", ".join(map(str, self._recipes.numbers)) or "none"
+            return f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._recipes.problems)
+        widest_mm = self._devices.cell.gripper.max_width_mm
+        if found.recipe.expected_width.smallest_mm >= widest_mm:
+            return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
+        try:
+            self._service.pacing.expected(found.recipe)
+        except BadInputError as error:
+            return str(error)
+        self.recipe_changing = True
+        try:
+            await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
+            kept = self._lots.choose(found)
+            log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
+        finally:
+            self.recipe_changing = False
+        if not kept:
+            return f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
+        return ""
+
+    async def stop(self) -> str:
+        """Accept no trigger until the next reset, also over a restart; the fruit under way is inspected to its end.
+
+        Returns:
+            Why the stop is not complete; empty if it is.
+        """
+        service = self._service
+        service.stop_wanted = True
+        kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
+        if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
+            service.conductor.post(Event.STOP, "a person stops the station at the panel")
+        reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
+        if reached not in WAITING:
+            return "the station was started again meanwhile"
+        return "" if kept else "the station stands, but its next start forgets that: the home folder cannot be written"
+
+    async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
+        """Recover the arm after a stop that a person has checked; the station continues after a reset.
+
+        Args:
+            by: name and role of who gave it.
+        """
+        if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
+            return CommandDone(done=False, why="an inspection is under way")
+        log.info("a person at the cell asks for: %s", request.what)
+        try:
+            await self._devices.recover(request.what)
+            why = ""
+        except ArmFault as fault:
+            why = str(fault)
+        self._audit.log_command(by[0], "recover", request.what, why, by[1])
+        return CommandDone(done=not why, why=why)
+
+    async def _call_off(self) -> str:
+        service = self._service
+        if service.state not in UNJUDGED:
+            busy = STATES[service.state].refusal is Refusal.BUSY
+            return "the inspection is already judged" if busy else ""
+        service.conductor.post(Event.CALLED_OFF, "the PLC called the inspection off")
+        await service.conductor.until(lambda state: state not in UNJUDGED)
+        return ""
+
+    def reset_refusal(self) -> str:
+        """Return why a reset would do nothing now; empty if it would work."""
+        if self._service.stop_requested:
+            return "the station is told to end"
+        if stop := self._devices.active_stop:
+            why = str(stop).removesuffix(".")
+            return f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
+        busy = STATES[self._service.state].refusal is Refusal.BUSY
+        return "an inspection is under way; call it off first" if busy else ""
+
+    async def _reset(self) -> str:
+        service, state = self._service, self._service.state
+        if why_not := self.reset_refusal():
+            return why_not
+        service.stop_wanted = False
+        await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
+        if state in {State.IDLE, State.RETREATING_READY}:
+            return ""
+        service.reset_wanted = True
+        self._devices.confirmed_clear = True
+        if state is State.LATCHED:
+            service.conductor.post(Event.PERSON_CONFIRMED, "reset")
+        elif state is State.STOPPED:
+            service.conductor.post(Event.RESET)
+        else:
+            try:
+                await self._devices.restart_program()
+            except ArmFault as fault:
+                return str(fault)
+            if state is State.CARRIED:
+                service.conductor.post(Event.PERSON_CONFIRMED, "reset")
+        tried_s = time.monotonic()
+        reached = await service.conductor.until(
+            lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
+        )
+        if reached is not State.IDLE:
+            return self._sentence()
+        service.alarms.reset()
+        return ""
+
+    def _sentence(self) -> str:
+        faults = list(self._devices.faults.values())
+        return str(faults[0]) if faults else STATES[self._service.state].sentence

@@ -1,0 +1,61 @@
+"""State files of the home folder, written so that a crash leaves the old or the new content."""
+
+import contextlib
+import logging
+import os
+import tempfile
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+
+class StateFiles:
+    """Folder of state files. A file that cannot be read or written is logged, and never stops the station."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, name: str) -> bytes | None:
+        """Return a file's content; None if it is missing or cannot be read.
+
+        Args:
+            name: relative to the folder.
+        """
+        try:
+            return (self.folder / name).read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            log.warning("%s cannot be read: %s", self.folder / name, error.strerror)
+            return None
+
+    def write(self, name: str, data: bytes) -> bool:
+        """Replace a file atomically.
+
+        Args:
+            name: relative to the folder.
+            data: nothing is written if the file has this content already.
+
+        Returns:
+            Whether the file has this content now.
+        """
+        path = self.folder / name
+        if self.read(name) == data:
+            return True
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(data)
+                    file.flush()
+                    os.fsync(file.fileno())
+                Path(unfinished).replace(path)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    Path(unfinished).unlink()
+                raise
+        except OSError as error:
+            log.warning("%s cannot be written: %s", path, error.strerror)
+            return False
+        return True

@@ -1,0 +1,99 @@
+"""Simulated calibration rig: a ball between the twin's gel and sponge, without gripper and wire, for many repeats."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from station.calibration.rig import Place, Pressed
+from station.twin.contact import FruitOnGel, Pose
+from station.twin.digit.sensor import Condition, DigitSensor, Image
+from station.twin.fruit import Kind, draw_fruit
+from station.twin.gel import MM_PER_PX, Gel
+from station.twin.squeeze import Squeeze
+
+_HOLDER_MM = 18.0
+_FRAME_S, _STEP_S = 1 / 30, 1.3
+_COUNT_MM = 85 / 227
+_OPEN_MM, _CLOSED_COUNT, _FINGERS_MM = 53.0, 230, 32.0
+
+
+class SimulatedRig:
+    """A rig whose widths are whole counts of the gripper, and whose light drifts from step to step.
+
+    Args:
+        seed: of the sensor's noise and drift.
+        unit: of the sensor's light.
+        mm_per_px: the sensor's true scale.
+        kind: the object in the nest.
+        condition: fault of the sensor.
+        holder_mm: thickness of the ball's holder; it shifts the contact onset.
+        spill_mm: standard deviation of the ball's place.
+        frames_per_step: as the recipe's.
+    """
+
+    def __init__(
+        self,
+        seed: int = 1,
+        *,
+        unit: int | None = None,
+        mm_per_px: float = MM_PER_PX,
+        kind: Kind = Kind.RUBBER_BALL,
+        condition: Condition | None = None,
+        holder_mm: float = _HOLDER_MM,
+        spill_mm: float = 0.0,
+        frames_per_step: int = 1,
+    ) -> None:
+        self._gel = Gel(mm_per_px=mm_per_px)
+        self._fruit, self._holder_mm = draw_fruit(kind, seed), holder_mm
+        self._sensor = DigitSensor(seed, unit, mm_per_px=mm_per_px)
+        self.condition = condition or Condition()
+        self._spill, self._spill_mm = np.random.default_rng([seed, 9]), spill_mm
+        self._frames_per_step = frames_per_step
+        self._now_s, self._width_mm = 0.0, _OPEN_MM
+        self.released = 0
+        self.places: list[Place] = []
+        self._contact = FruitOnGel(self._fruit, Pose(), self._gel)
+
+    async def untouched(self, number: int) -> Sequence[Image]:
+        """Return frames with the jaws open; an object too wide for the open jaws still touches."""
+        self._width_mm = _OPEN_MM
+        self._now_s += _STEP_S
+        return self._frames(number)
+
+    async def press_to(self, width_mm: float) -> Pressed:
+        """Return a step's frames."""
+        count = round(_CLOSED_COUNT - (width_mm + _FINGERS_MM) / _COUNT_MM)
+        self._width_mm = (_CLOSED_COUNT - count) * _COUNT_MM - _FINGERS_MM
+        self._now_s += _STEP_S
+        return Pressed(self._width_mm, self._frames(self._frames_per_step))
+
+    async def lay(self, place: Place) -> None:
+        """Lay the ball at a place, with the place's deviation."""
+        self.places.append(place)
+        x_mm, y_mm = (mm + self._spill_mm * self._spill.standard_normal() for mm in place)
+        scale = self._gel.mm_per_px
+        self._contact = FruitOnGel(self._fruit, Pose(240 + x_mm / scale, 320 + y_mm / scale), self._gel)
+
+    async def release(self) -> None:
+        """Open the jaws."""
+        self.released += 1
+        self._width_mm = _OPEN_MM
+
+    @property
+    def closing_mm(self) -> float:
+        """Return the closing since the contact onset."""
+        return self._fruit.width_mm + self._holder_mm - self._width_mm
+
+    def true_area_px(self, width_mm: float) -> int:
+        """Return the area inside the visible edge at a width."""
+        closing_mm = self._fruit.width_mm + self._holder_mm - width_mm
+        return self._contact.pressed(Squeeze(self._fruit, self._gel).at(closing_mm)).true_area_px
+
+    def _frames(self, number: int) -> list[Image]:
+        squeezed = Squeeze(self._fruit, self._gel, held_s=_STEP_S).at(self.closing_mm)
+        dent = self._contact.pressed(squeezed).dent if squeezed.closing_mm > 0 else None
+        frames = []
+        for _ in range(number):
+            frames.append(self._sensor.frame(dent, self._now_s, self.condition))
+            self._now_s += _FRAME_S
+        return frames
