@@ -174,7 +174,7 @@ def anonymous(text):
 
 
 def test_what_operators_are_refused_with_is_said_in_every_language():
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("said.")}
+    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
     for module in ("readiness", "plc_commands", "operator_commands", "alarm_commands"):
         told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
         assert told - NOT_FOR_OPERATORS <= known, module

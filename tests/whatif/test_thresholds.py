@@ -109,7 +109,7 @@ class TestWhatAPressSays:
         assert one.length_mm == 45.4
 
         def by(limit_mm2):
-            area = (self.RECIPE.damage.area[0].model_copy(update={"area_mm2": limit_mm2}),)
+            area = (self.RECIPE.damage.area[-1].model_copy(update={"area_mm2": limit_mm2}),)
             damage = self.RECIPE.damage.model_copy(update={"area": area})
             return judge(self.press(), self.RECIPE.model_copy(update={"damage": damage})).outcome
 
