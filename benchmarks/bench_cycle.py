@@ -374,7 +374,7 @@ def overshoot_table(spent: Spent) -> list[str]:
 
 def draw(spent: Spent) -> None:
     """The floor's parts and ours, one bar for each fruit."""
-    figure = Figure(figsize=(9, 2.6), layout="constrained")
+    figure = Figure(figsize=(9, 3.0), layout="constrained")
     axes = figure.subplots()
     kinds = [kind for kind, _ in FRUIT]
     left = dict.fromkeys(kinds, 0.0)
@@ -391,7 +391,7 @@ def draw(spent: Spent) -> None:
     axes.barh(kinds, ours, left=[left[kind] for kind in kinds], label="ours", color="black")
     axes.set_xlabel("seconds from the trigger to the next")
     axes.invert_yaxis()
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.45), ncols=4, frameon=False, fontsize=8)
+    figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=8)
     with mpl.rc_context({"svg.hashsalt": "cycle-time"}):
         figure.savefig(CHART, metadata={"Date": None})
 
