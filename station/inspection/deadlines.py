@@ -1,4 +1,4 @@
-"""How long each phase and a whole inspection may take, from the recipe; late is a comparison of values."""
+"""Deadlines of each phase and of a whole inspection, from the recipe; late is a comparison of values."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a press says about its fruit in numbers: areas at given closings, the growth, and where the curve does not rise.
+"""Evidence of a press in numbers: areas at given closings, the growth, and where the curve does not rise.
 
 Every number is asked for twice: as the most that it may be, from all points, and as the least that it surely is,
 from trusted points alone. The first keeps a fruit from PASS, the second proves a FAIL.

@@ -1,4 +1,4 @@
-"""How long an inspection and its phases may take on this cell, and what is late now."""
+"""Cycle time budget: the deadlines of an inspection and its phases on this cell, and what is late now."""
 
 import time
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Which gripper the station has, how it is reached, and what its fingers are."""
+"""Settings of the gripper: its wire, its fingers and its times."""
 
 from typing import Literal, Self
 

@@ -1,4 +1,4 @@
-"""How the station inspects: where its processes meet, its deadlines, and what it makes of the gel's reference."""
+"""Settings of the inspection: the processes' channel, deadlines, and limits of a good reference."""
 
 from typing import Literal
 

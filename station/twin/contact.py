@@ -1,4 +1,4 @@
-"""What the gel's surface looks like under a fruit: the dent, and the truth that a measurement is judged by."""
+"""The gel's surface under a fruit: the dent, and the ground truth of a measurement."""
 
 from dataclasses import dataclass
 

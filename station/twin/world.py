@@ -1,4 +1,4 @@
-"""What lies between the fingers: one fruit in one pose, how far it is closed, and what that has done to it."""
+"""Physical state between the fingers: one fruit in one pose, its closing, and what that has done to it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What a measurement method says about one image."""
+"""Result of a measurement method for one image."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""How much a denoised image differs from the noisy one: the figures of the paper's Table 2."""
+"""Difference of a denoised image from the noisy one: the figures of the paper's Table 2."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What both nodes have in common: boot-up, NMT, error register and emergencies (CiA 301)."""
+"""Common part of both nodes: boot-up, NMT, error register and emergencies (CiA 301)."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What makes two frames of the same scene differ: pixel noise, streaks, row and frame offsets, slow drift of light.
+"""Noise between two frames of the same scene: pixel noise, streaks, row and frame offsets, slow drift of light.
 
 Levels are measured on real frames (`station.twin.digit.fit`). The real pixel noise is blotchy (colour is sampled
 at half the resolution and compressed): neighbours correlate as after a Gaussian blur of the widths below, and

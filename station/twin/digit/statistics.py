@@ -1,4 +1,4 @@
-"""How the noise of a series of frames is measured; the same for real frames and for the twin's."""
+"""Noise statistics of a series of frames; the same for real frames and for the twin's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where the fingers are and how fast they travel: counts, millimetres, speed and force settings.
+"""Position and speed of the fingers: counts, millimetres, speed and force settings.
 
 Source: Robotiq 2F-85 data sheet (85 mm, 20 to 150 mm/s) and `count` 3 to 230 as read on real fingers; the force
 range of 20 to 235 N and linear scales between the ends are unverified on hardware.

@@ -1,4 +1,4 @@
-"""What is between the fingers, as far as the gripper can feel it."""
+"""Load between the fingers, as far as the gripper can feel it."""
 
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,4 +1,4 @@
-"""How far along its path a motion is at a time."""
+"""Trapezoidal speed profile: the way along its path that a motion has made at a time."""
 
 import math
 from dataclasses import dataclass

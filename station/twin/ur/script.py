@@ -1,4 +1,4 @@
-"""What the controller does while ur-rtde's control script plays.
+"""Controller's part of ur-rtde's control script, while it plays.
 
 The uploaded text is recognised and not interpreted: this is the script's side of ur-rtde's register protocol, read from
 ur-rtde 1.6.5 (`scripts/rtde_control.script`, `include/ur_rtde/rtde.h`). `output_int_register_0` says ready (1) or done
