@@ -263,7 +263,10 @@ ROWS: tuple[Row, ...] = (
     Row((S.RECORDING_ACCEPT,), (E.RECORDED,), S.PLACING_ACCEPT, (A.PUBLISH, A.PLACE_ACCEPT)),
     Row((S.RECORDING_REJECT,), (E.RECORDED,), S.PLACING_REJECT, (A.PUBLISH, A.PLACE_REJECT)),
     Row(PLACING, (E.PLACED,), S.RETREATING_READY, (A.GO_HOME,)),
-    Row(LEAVING, (E.HOME,), S.CHECKING, (A.CHECK_DEVICES,)),
+    Row((S.RETREATING,), (E.HOME,), S.CHECKING, (A.CHECK_DEVICES,)),
+    # Checked while triggers are accepted: a readiness that the PLC has seen does not go away for a moment.
+    Row((S.RETREATING_READY,), (E.HOME,), S.IDLE, (A.CHECK_DEVICES,)),
+    Row((S.IDLE, S.ACCEPTING), (E.READY,), None),
     # The next trigger comes while the arm still leaves: it is accepted, and waits for the arm.
     Row((S.RETREATING_READY,), (E.TRIGGER,), S.RETREATING_ACCEPTING, (A.RECORD_TRIGGER,)),
     Row((S.RETREATING_ACCEPTING,), (E.HOME,), S.ACCEPTING),
