@@ -217,7 +217,8 @@ def roomy(settings_file: Callable[..., Path], tmp_path: Path) -> Callable[..., P
     def write(**service: Any) -> Path:
         file, recipe = settings_file(**service), tmp_path / "recipes" / "strawberry.yaml"
         values = json.loads(recipe.read_text())
-        values["damage"]["area"][-1]["area_mm2"] = 140
+        for limit, area_mm2 in zip(values["damage"]["area"], (115, 140), strict=True):
+            limit["area_mm2"] = area_mm2
         recipe.write_text(json.dumps(values))
         return file
 
