@@ -32,7 +32,7 @@ LOOKED_AT = [
     ("lens_fogged", 1.0, AlarmId.CAMERA_DIRTY, True),
     ("dirt", 5.0, AlarmId.REFERENCE_BAD, True),
     ("gel_torn", 1.0, AlarmId.REFERENCE_BAD, True),
-    ("lens_fogged", 0.55, AlarmId.REFERENCE_DRIFTING, False),
+    ("lens_fogged", 0.53, AlarmId.REFERENCE_DRIFTING, False),
 ]
 
 
