@@ -91,8 +91,8 @@ DOCUMENT = """\
 Written by `./run bench cycle`: medians of {repeats} inspections of each fruit on the twin with its arm, which waits
 above the nest, with a load of {load:.1f} on {cores} cores. *Next trigger* is where the station accepts one again:
 fruit and jaws are free, and the arm leaves meanwhile. *Fruit a minute* is measured in a row of {in_a_row}, each
-triggered as soon as it is accepted; the arm's way back is in it. The fruit lies in the middle. One that is centred
-takes some 0.5 s more, one that is pressed twice some 2 s. Unverified on hardware.
+triggered as soon as it is accepted; the arm's way back is in it. The fruit lies in the middle. One that is centred or
+pressed twice takes longer: [200 fruit of a mixed line](triggers.md). Unverified on hardware.
 
 {table}
 

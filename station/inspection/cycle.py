@@ -21,7 +21,6 @@ class Event(StrEnum):
     """Every device that an inspection needs answers, is able and was read just now; the records can be written."""
     TRIGGER = "trigger"
     TRIGGER_RECORDED = "trigger_recorded"
-    REFERENCE_TAKEN = "reference_taken"
     REFERENCE_BAD = "reference_bad"
     ARRIVED = "arrived"
     ONSET_FOUND = "onset_found"
@@ -93,11 +92,10 @@ class Action(StrEnum):
     """Answer the trigger under way with a refusal and take its record back."""
     ACCEPT_TRIGGER = "accept_trigger"
     """Answer the trigger: an inspection has begun. Its deadline starts."""
-    TAKE_REFERENCE = "take_reference"
-    """Begin the reference with the jaws fully open: REFERENCE_TAKEN, also while its frames still come and are examined,
-    or REFERENCE_BAD."""
+    CHECK_JAWS = "check_jaws"
+    """Make sure that the jaws are fully open, so that nothing touches the gel: JAWS_OPEN, or REFERENCE_BAD."""
     APPROACH = "approach"
-    """ARRIVED with a good reference, or REFERENCE_BAD."""
+    """Go to the fruit, and take the reference on the way: ARRIVED, or REFERENCE_BAD."""
     CLOSE_TO_ONSET = "close_to_onset"
     """ONSET_FOUND, OFF_MIDDLE or NO_ONSET."""
     CENTRE = "centre"
@@ -234,9 +232,9 @@ ROWS: tuple[Row, ...] = (
     Row((S.HOMING,), (E.HOME,), S.CHECKING, (A.CHECK_DEVICES,)),
     Row((S.CHECKING,), (E.READY,), S.IDLE),
     Row((S.IDLE,), (E.TRIGGER,), S.ACCEPTING, (A.RECORD_TRIGGER,)),
-    Row((S.ACCEPTING,), (E.TRIGGER_RECORDED,), S.REFERENCE, (A.ACCEPT_TRIGGER, A.TAKE_REFERENCE)),
+    Row((S.ACCEPTING,), (E.TRIGGER_RECORDED,), S.REFERENCE, (A.ACCEPT_TRIGGER, A.CHECK_JAWS)),
     # The inspection; an image is measured while the next step is made.
-    Row((S.REFERENCE,), (E.REFERENCE_TAKEN,), S.APPROACHING, (A.APPROACH,)),
+    Row((S.REFERENCE,), (E.JAWS_OPEN,), S.APPROACHING, (A.APPROACH,)),
     Row((S.APPROACHING,), (E.ARRIVED,), S.CLOSING_TO_ONSET, (A.CLOSE_TO_ONSET,)),
     Row((S.CLOSING_TO_ONSET,), (E.ONSET_FOUND,), S.MOVING, (A.CLOSE_STEP,)),
     Row((S.MOVING,), (E.REACHED,), S.SETTLING, (A.SETTLE,)),
@@ -271,7 +269,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.RETREATING_READY,), (E.TRIGGER,), S.RETREATING_ACCEPTING, (A.RECORD_TRIGGER,)),
     Row((S.RETREATING_ACCEPTING,), (E.HOME,), S.ACCEPTING),
     Row((S.RETREATING_ACCEPTING,), (E.TRIGGER_RECORDED,), S.RETREATING_ACCEPTED, (A.ACCEPT_TRIGGER,)),
-    Row((S.RETREATING_ACCEPTED,), (E.HOME,), S.REFERENCE, (A.TAKE_REFERENCE,)),
+    Row((S.RETREATING_ACCEPTED,), (E.HOME,), S.REFERENCE, (A.CHECK_JAWS,)),
     Row((S.RETREATING_READY,), (E.CAMERA_FAULT, E.RECORDS_FAULT, E.STOP), S.RETREATING),
     Row((S.RETREATING_ACCEPTING,), (E.STOP,), S.RETREATING, (A.REFUSE_TRIGGER,)),
     # It cannot be judged, and the arm can still move: the fruit is let go where it is.

@@ -206,9 +206,10 @@ class _Case:
             return ""
         if not self.findings:
             return "every limit is kept"
-        # Only an onset that excused steps hide may show itself with one more.
+        # Only an onset that excused steps hide may show itself, and with one step more.
         lasting = any(finding.reason is not Reason.AREA_NOT_RISING for finding in self.findings)
-        return "the fruit cannot pass any more" if lasting else ""
+        beyond = len(self.evidence.judged) - len(self.evidence.needed)
+        return "" if self.evidence.excused and not lasting and not beyond else "the fruit cannot pass any more"
 
 
 def _over_early_stop(evidence: Evidence, recipe: Recipe) -> Finding | None:

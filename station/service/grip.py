@@ -22,8 +22,8 @@ FRAME_DEADLINE_S = 1.0
 FINEST_STEP_MM = 0.4
 """A count of the gripper."""
 MOST_UNSEEN_MM = 3.0
-"""So far the fingers may have gone since the frame that was measured last; a frame's way into the measurement and the
-time between two frames make about 2 mm at the gripper's slowest 20 mm/s."""
+"""So far the fingers may have gone since the frame that was measured last: as far as the twin's flesh bears without
+yielding (the recipes' damage limits). What they go in fact is in docs/cycle-time.md."""
 _MOST_FAULTY_FRAMES = 10
 
 

@@ -37,41 +37,38 @@ class Inspector:
     """The actions that need the devices. Each ends with an event or a device's `StationError`.
 
     Args:
-        crew: the devices.
-        eye: the measurement.
         settings: placing, and how old a reference may be.
         arm: where it waits, and how it may follow a contact.
-        alarms: told of a reference that cannot serve.
+        alarms: raised for a reference that cannot serve.
         metrics: counts the frames.
         calibrated: how noisy the sensor is.
     """
 
     def __init__(
         self,
-        crew: DeviceManager,
-        eye: VisionWorker,
+        devices: DeviceManager,
+        vision: VisionWorker,
         settings: ServiceSettings,
         arm: ArmSettings,
         alarms: AlarmManager,
         metrics: Metrics,
         calibrated: ActiveCalibration,
     ) -> None:
-        self._crew, self._eye, self._settings, self._calibrated = crew, eye, settings, calibrated
+        self._devices, self._vision, self._settings, self._calibrated = devices, vision, settings, calibrated
         self._alarms, self._metrics, self._arm = alarms, metrics, arm
         self._reached: MoveResult | None = None
         self._glanced: MeasuredStep | None = None
-        self._examining: asyncio.Future[bool] | None = None
         self._goes_on = asyncio.Event()
         """Set when a measured step lets another one be made."""
 
     async def open_jaws(self) -> Event:
         """Let go of whatever is held."""
-        await self._crew.cell.gripper.open()
+        await self._devices.cell.gripper.open()
         return Event.JAWS_OPEN
 
     async def free_fruit(self, now: Inspection) -> Event:
         """Open only so far that the sensor can move beside the fruit, which may have rolled."""
-        gripper = self._crew.cell.gripper
+        gripper = self._devices.cell.gripper
         if now.met_mm is None:
             raise RuntimeError("a fruit is freed that was not met")
         await gripper.open(min(now.met_mm + FREED_BY_MM, gripper.max_width_mm))
@@ -82,7 +79,7 @@ class Inspector:
 
         From the nest, or from where it is not known, the arm goes over the place above it.
         """
-        arm = self._crew.cell.arm
+        arm = self._devices.cell.arm
 
         async def leave() -> None:
             if arm is not None:
@@ -90,12 +87,12 @@ class Inspector:
                     await arm.move_to("above_nest")
                 await arm.move_to(self._arm.waits_at)
 
-        await at_once(leave(), self._crew.cell.gripper.open())
+        await at_once(leave(), self._devices.cell.gripper.open())
         return Event.HOME
 
-    async def take_reference(self, now: Inspection) -> Event:
-        """Take the reference with the jaws open; a gripper that is not open may hold something against the gel."""
-        gripper = self._crew.cell.gripper
+    async def check_jaws(self, now: Inspection) -> Event:
+        """Make sure that the jaws are open before a reference is taken: else something may be held against the gel."""
+        gripper = self._devices.cell.gripper
         opened = await gripper.open()
         touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
         if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
@@ -104,21 +101,17 @@ class Inspector:
                 f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at them",
             )
             return Event.REFERENCE_BAD
-        self._crew.monitors[GRIPPER].report_success()
-        self._examining = asyncio.ensure_future(self._examined(now))
-        return Event.REFERENCE_TAKEN
+        self._devices.monitors[GRIPPER].report_success()
+        return Event.JAWS_OPEN
 
     async def approach(self, now: Inspection) -> Event:
         """Bring the jaws to the fruit, a little wider than it may be, while the reference is taken and examined."""
-        examining = self._examining
-        if examining is None:
-            raise RuntimeError("the arm approaches before a reference is taken")
         good: list[bool] = []
 
         async def examined() -> None:
-            good.append(await examining)
+            good.append(await self._examined(now))
 
-        jaws = self._crew.cell.gripper.open(self._width_around(now))
+        jaws = self._devices.cell.gripper.open(self._width_around(now))
         await at_once(self._grip(now).go("above_nest", "nest"), jaws, examined())
         return Event.ARRIVED if all(good) else Event.REFERENCE_BAD
 
@@ -128,20 +121,20 @@ class Inspector:
         widest_mm = max(
             recipe.expected_width.largest_mm, recipe.steps.start_width_mm or 0.0, now.met_mm or 0.0, now.onset_mm or 0.0
         )
-        return min(widest_mm + self._arm.jaw_clearance_mm, self._crew.cell.gripper.max_width_mm)
+        return min(widest_mm + self._arm.jaw_clearance_mm, self._devices.cell.gripper.max_width_mm)
 
     async def _examined(self, now: Inspection) -> bool:
         """Take the reference's frames, while nothing touches the gel, and examine them."""
         frames = await self._grip(now, self._count).sound_frames(now.active.recipe.imaging.reference_frames)
-        self._crew.monitors[CAMERA].report_success()
+        self._devices.monitors[CAMERA].report_success()
         now.reference_s = frames[-1].captured_s
         return await self._examine(now, frames)
 
     async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
-        """Whether the frames may serve as the reference; tells why not."""
+        """Whether the frames may serve as the reference; where not, the inspection and an alarm have the reason."""
         try:
             segmentation = gated(now.active.recipe.segmentation, self._calibrated.gate_factor)
-            image, looks = await self._eye.take_reference(frames, segmentation)
+            image, looks = await self._vision.take_reference(frames, segmentation)
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, str(error))
             self._alarms.raise_(error.alarm, str(error))
@@ -164,14 +157,14 @@ class Inspector:
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
         self._reached = self._glanced = None
-        await self._eye.begin_press()
+        await self._vision.begin_press()
         grip, plan = self._grip(now), now.active.recipe.steps
         try:
             if plan.start_width_mm is not None:
                 start = await grip.step(0, plan.start_width_mm)
             else:
                 met = await grip.sweep(self._touches)
-                stopped = await self._crew.cell.gripper.read()
+                stopped = await self._devices.cell.gripper.read()
                 now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
                 if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip, stopped)):
                     now.closings = 1
@@ -184,7 +177,7 @@ class Inspector:
             return Event.NO_ONSET
         now.steps.append(start)
         known = self._glanced is not None and self._glanced.step is start
-        now.seen.append(self._glanced if known and self._glanced else await self._eye.measure(start))
+        now.seen.append(self._glanced if known and self._glanced else await self._vision.measure(start))
         now.closings += 1
         off = self._off_middle(now, now.seen[-1])
         if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
@@ -192,13 +185,13 @@ class Inspector:
             return Event.OFF_MIDDLE
         if now.moved != NOT_MOVED and off is not None:
             now.measures["left_off_mm"] = round(off.length_mm, 2)
-        await self._eye.follow(now.seen[-1].contact)
+        await self._vision.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
     async def _first_contact(self, now: Inspection, grip: Grip, at: GripperReading) -> Way | None:
         """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
         step = GripStep(-1, MoveResult(at.width_mm, at.echoed_count, at), await grip.sound_frames(1))
-        return self._off_middle(now, await self._eye.measure(step))
+        return self._off_middle(now, await self._vision.measure(step))
 
     @staticmethod
     def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
@@ -215,7 +208,7 @@ class Inspector:
         now.measures.setdefault("off_down_mm", round(off.down_mm, 2))
         if off.length_mm < from_mm:
             told = "near enough"
-        elif self._crew.cell.arm is None:
+        elif self._devices.cell.arm is None:
             told = "no arm"
         elif too_far(off, now.moved, self._arm.centring.most_mm):
             told = "too far"
@@ -228,7 +221,7 @@ class Inspector:
 
     async def centre(self, now: Inspection) -> Event:
         """Go to where the contact will be in the field's middle; nothing moves where it is to be pressed as it is."""
-        arm, target = self._crew.cell.arm, now.target
+        arm, target = self._devices.cell.arm, now.target
         if arm is not None and target is not None:
             now.target = None
             try:
@@ -274,8 +267,8 @@ class Inspector:
         if reached is None:
             raise RuntimeError("a step is captured that was not reached")
         frames = await self._grip(now).sound_frames(recipe.imaging.frames_per_step)
-        self._crew.monitors[CAMERA].report_success()
-        self._crew.monitors[GRIPPER].report_success()
+        self._devices.monitors[CAMERA].report_success()
+        self._devices.monitors[GRIPPER].report_success()
         now.steps.append(GripStep(len(now.steps), reached, frames))
         held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
         if len(now.steps) > recipe.steps.number or held or now.next_width_mm <= 0:
@@ -284,7 +277,7 @@ class Inspector:
 
     async def measure(self, now: Inspection) -> Event:
         """Measure the captured step that is next in order, and say whether the recipe lets another one be made."""
-        now.seen.append(await self._eye.measure(now.steps[len(now.seen)]))
+        now.seen.append(await self._vision.measure(now.steps[len(now.seen)]))
         if early_stop(now.press(), now.active.recipe) is not None:
             return Event.EARLY_STOP
         self._goes_on.set()
@@ -312,16 +305,16 @@ class Inspector:
 
     async def place(self, now: Inspection) -> Event:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
-        carried = self._settings.placing == "arm" and self._crew.cell.arm is not None
+        carried = self._settings.placing == "arm" and self._devices.cell.arm is not None
         if carried:
             await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
         width_mm = None if carried else self._width_around(now)
         try:
-            await self._crew.cell.gripper.open(width_mm)
+            await self._devices.cell.gripper.open(width_mm)
         except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
             # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
             # unknown needs a person.
-            await self._crew.cell.gripper.open(width_mm)
+            await self._devices.cell.gripper.open(width_mm)
         return Event.PLACED
 
     @staticmethod
@@ -339,19 +332,19 @@ class Inspector:
 
     def _grip(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> Grip:
         deadline_s = FRAME_DEADLINE_S * self._settings.patience
-        return Grip(self._crew.cell, now.active.recipe, deadline_s, on_frame or self._look_ahead)
+        return Grip(self._devices.cell, now.active.recipe, deadline_s, on_frame or self._measure_ahead)
 
-    def _look_ahead(self, frame: Frame) -> None:
+    def _measure_ahead(self, frame: Frame) -> None:
         self._count(frame)
         if not frame.faults:
-            self._eye.measure_ahead(frame)
+            self._vision.measure_ahead(frame)
 
     def _count(self, frame: Frame) -> None:
         for fault in frame.faults or ("good",):
             self._metrics.frame(fault)
 
     async def _touches(self, step: GripStep) -> bool:
-        self._crew.monitors[CAMERA].report_success()
-        self._crew.monitors[GRIPPER].report_success()
-        self._glanced = await self._eye.measure(step)
+        self._devices.monitors[CAMERA].report_success()
+        self._devices.monitors[GRIPPER].report_success()
+        self._glanced = await self._vision.measure(step)
         return self._glanced.contact.is_firm

@@ -122,13 +122,13 @@ class ArmSettings(Settings):
         "above_nest",
         title="Waits at",
         description="Where the arm waits between two fruit. Above the nest it is there at once; at home it leaves the "
-        "room above the nest to the line, and each fruit takes some 1.5 s longer.",
+        "room above the nest to the line, and each fruit takes the way from there and back longer.",
     )
     jaw_clearance_mm: float = setting(
         3.0,
         title="Jaws' clearance",
         description="When the arm brings the jaws to a fruit they stand so much wider than the widest fruit that the "
-        "recipe expects: room for one beside the nest's middle.",
+        "recipe expects: room for one beside the nest's middle. A starting value without a source.",
         unit="mm",
         ge=0.0,
         le=30.0,

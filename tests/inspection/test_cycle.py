@@ -136,7 +136,7 @@ def test_an_orderly_stop_ends_everywhere_without_a_person(cycle_model):
 
 GOOD = [
     Event.READY, Event.UNFINISHED_CLOSED, Event.JAWS_OPEN, Event.RESET, Event.JAWS_OPEN, Event.HOME, Event.READY,
-    Event.TRIGGER, Event.TRIGGER_RECORDED, Event.REFERENCE_TAKEN, Event.ARRIVED, Event.ONSET_FOUND, Event.REACHED,
+    Event.TRIGGER, Event.TRIGGER_RECORDED, Event.JAWS_OPEN, Event.ARRIVED, Event.ONSET_FOUND, Event.REACHED,
     Event.SETTLED, Event.CAPTURED, Event.REACHED, Event.MEASURED, Event.SETTLED, Event.LAST_CAPTURED, Event.MEASURED,
     Event.JUDGED_ACCEPT, Event.RECORDED, Event.PLACED, Event.HOME, Event.READY,
 ]  # fmt: skip
@@ -167,7 +167,7 @@ def test_a_fruit_is_centred_and_looked_at_again_within_one_inspection():
     counted = Counter(actions)
     assert counted[Action.CLOSE_TO_ONSET] == 3
     assert counted[Action.CENTRE] == 2
-    assert counted[Action.TAKE_REFERENCE] == counted[Action.PUBLISH] == counted[Action.RECORD] == 1
+    assert counted[Action.CHECK_JAWS] == counted[Action.PUBLISH] == counted[Action.RECORD] == 1
     for place in (place for place, action in enumerate(actions) if action == Action.CENTRE):
         assert actions[place - 1] == Action.FREE_FRUIT, "the arm moves with open jaws alone"
 

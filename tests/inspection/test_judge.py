@@ -472,3 +472,19 @@ def test_an_onset_that_uncertain_steps_hide_gets_one_more_step_to_show_itself():
     more = replace(press, points=(*press.points, point(5.0, 102.0)))
     assert judge(more, DECIDING).outcome == "PASS"
     assert early_stop(more, DECIDING)
+
+
+def test_a_doubtful_onset_does_not_press_a_fruit_on_to_the_early_stop():
+    def late(to_mm: int, **second: object) -> Press:
+        points = [point(float(c), max(2.0, 30.0 * (c - 1.5))) for c in range(to_mm + 1)]
+        points[2] = replace(points[2], **second)
+        return Press(35.0, 0.4, tuple(points))
+
+    assert judge(late(4), DECIDING).reasons == (Reason.AREA_NOT_RISING,)
+    assert early_stop(late(3), DECIDING) is None
+    stop = early_stop(late(4), DECIDING)
+    assert stop is not None
+    assert "cannot pass any more" in stop.sentence
+    # An excused step may hide where the onset was; one more step tells, and a third tells nothing new.
+    hides = {"confidence": 0.1, "area_mm2": 60.0}
+    assert early_stop(late(5, **hides), DECIDING) is not None

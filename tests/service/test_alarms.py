@@ -52,7 +52,7 @@ def caused(cell, alarm):
     return cell.station.service.alarms.alarms.get(alarm).state in CAUSED
 
 
-FRAMES_UNDER_WAY = 20
+FRAMES_UNDER_WAY = 6
 
 
 def active(cell):

@@ -1,11 +1,14 @@
 """Triggers while the arm leaves the fruit before: accepted at once, begun when it has left, each with one outcome."""
 
 import asyncio
+import json
 
 import pytest
 
 from station.channel.line import CommandName
 from station.inspection.states import State
+from station.settings.gripper import GripperCalibration
+from station.twin.fruit import Kind, draw_fruit
 from station.vocabulary import Reason, Refusal
 
 
@@ -72,3 +75,25 @@ def test_a_stop_while_the_arm_leaves_lets_no_trigger_in(bench):
             await cell.reach(State.STOPPED)
 
     asyncio.run(scenario())
+
+
+def test_jaws_that_leave_are_wider_than_a_fruit_that_the_recipe_does_not_expect(bench, settings_file, tmp_path):
+    fruit = draw_fruit(Kind.BLUEBERRY, 1)
+
+    async def scenario():
+        file, recipe = settings_file(), tmp_path / "recipes" / "blueberry.yaml"
+        values = json.loads(recipe.read_text())
+        values["expected_width"]["largest_mm"] = round(fruit.width_mm - 1.0, 1)
+        recipe.write_text(json.dumps(values))
+        async with bench(file) as cell:
+            await cell.choose("blueberry")
+            gaps_mm = []
+            taken_mm = GripperCalibration().finger_offset_mm
+            cell.at(State.RETREATING_READY, lambda: gaps_mm.append(cell.twin.world.opening_mm() - taken_mm))
+            outcome = await cell.line.inspect()
+            await cell.line.ready()
+            return outcome, gaps_mm, cell.configuration.arm.jaw_clearance_mm
+
+    outcome, [gap_mm], clearance_mm = asyncio.run(scenario())
+    assert Reason.OUT_OF_RANGE in outcome.reasons
+    assert gap_mm > fruit.width_mm + clearance_mm - 0.75, "two counts of the gripper"
