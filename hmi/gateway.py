@@ -9,12 +9,12 @@ from typing import Self, TypeVar
 from hmi.sessions import Caller
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
-from station.channel.messages import ChannelError, DeadlineError, Message, RefusedError
+from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError
 from station.channel.panel import Actor
 from station.channel.panel_live import Fruit, GetFruit, GetPanelState, GetRecent, PanelState, PersonNoted, Recent
 from station.errors import StationError
 
-ReplyT = TypeVar("ReplyT", bound=Message)
+ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 STALE_S = 2.0
 """An older state is not shown as live."""
 DEADLINE_S = 2.0
@@ -69,7 +69,7 @@ class Gateway:
         """True while `state` is recent enough to be shown as live."""
         return self.age_s is not None and self.age_s <= STALE_S
 
-    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
+    async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
         """Send a request to the station and return its answer.
 
         Args:

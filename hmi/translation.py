@@ -1,5 +1,6 @@
 """Translation: message catalogues of the folder `locale`, one file for each page and language."""
 
+import io
 import json
 import re
 from collections.abc import Mapping
@@ -9,8 +10,11 @@ from functools import cache
 from pathlib import Path
 from string import Formatter
 
+import babel
+from babel.messages.pofile import read_po
 from markupsafe import Markup
 
+from station.messages.message import ENGLISH, Definition, Message, Renderer
 from station.settings.hmi import Language
 
 FOLDER = Path(__file__).with_name("locale")
@@ -56,6 +60,46 @@ def sentence_patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 
 
+@cache
+def translations(language: Language) -> Mapping[str, tuple[str, ...]]:
+    """Return the translations of the station's messages by their ids: one form, or one for each plural.
+
+    Args:
+        language: the folder below `locale` whose `.po` files are read.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for file in sorted((FOLDER / language).glob("*.po")):
+        for entry in read_po(io.BytesIO(file.read_bytes()), locale=language):
+            forms = tuple(entry.string) if isinstance(entry.string, list | tuple) else (entry.string,)
+            if entry.context and not entry.fuzzy:
+                found[entry.context] = tuple(form for form in forms if form)
+    return found
+
+
+@cache
+def renderer(language: Language) -> Renderer:
+    """Return how messages are written in a language: by its catalogue, and with its decimal sign.
+
+    Args:
+        language: English is the definitions' own.
+    """
+    if language == SOURCE:
+        return ENGLISH
+    rule = babel.Locale.parse(language).plural_form
+    known = translations(language)
+
+    def form(definition: Definition, count: float) -> str:
+        forms = known.get(definition.id)
+        if not forms:
+            return ENGLISH.form(definition, count)
+        return forms[0 if rule(count) == "one" else -1]
+
+    def number(value: float, digits: int | None) -> str:
+        return ENGLISH.number(value, digits).replace(".", _DECIMAL[language])
+
+    return Renderer(form, number)
+
+
 @dataclass(frozen=True, slots=True)
 class Locale:
     """Texts, numbers and times in one language."""
@@ -80,8 +124,14 @@ class Locale:
         """Translate a text that the station sends in English; unchanged if the catalogue has none."""
         return catalogue(self.language).get(key, english)
 
-    def sentence(self, english: str) -> str:
-        """Translate a sentence of the station; unchanged and marked as English if no pattern matches."""
+    def sentence(self, english: str | Message) -> str:
+        """Write a message in this language; in English, and marked as that, where it has no translation.
+
+        Args:
+            english: a message; as long as some of the station's rooms send sentences, also one of those.
+        """
+        if isinstance(english, Message):
+            return renderer(self.language).sentence(english)
         if self.language == SOURCE:
             return english
         found = self._translated(english)

@@ -1,13 +1,22 @@
 """Base classes of errors that a person can repair."""
 
+from station.messages.message import Message, verbatim
+
 
 class StationError(Exception):
-    """A failure with a message: place, expected value, remedy.
+    """A failure with a message: what is wrong, what it means, what to do.
 
     The command line shows the message alone and ends with exit code 1.
+
+    Args:
+        message: a defined one; words are kept as they are, and read in English everywhere.
     """
 
     exit_code = 1
+
+    def __init__(self, message: Message | str = "") -> None:
+        super().__init__(str(message))
+        self.message = verbatim(message) if isinstance(message, str) else message
 
 
 class BadInputError(StationError):

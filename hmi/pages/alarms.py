@@ -15,7 +15,7 @@ from hmi.roles import Right
 from hmi.sessions import Caller
 from hmi.translation import Locale
 from station.channel.line import CommandDone
-from station.channel.messages import Message, RefusedError
+from station.channel.messages import ChannelMessage, RefusedError
 from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
 from station.channel.panel_live import AlarmHistory, GetAlarmHistory
 
@@ -107,7 +107,7 @@ async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
     return go_to("/alarms")
 
 
-async def _done(gateway: Gateway, request: Message) -> None:
+async def _done(gateway: Gateway, request: ChannelMessage) -> None:
     done = await gateway.request(request, CommandDone)
     if not done.done:
         raise RefusedError(done.why)

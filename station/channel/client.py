@@ -13,13 +13,15 @@ from station.channel.messages import (
     ENVELOPE,
     LARGEST_MESSAGE_BYTES,
     ChannelError,
+    ChannelMessage,
     DeadlineError,
-    Message,
     RefusedError,
     check_endpoint,
 )
+from station.messages import channel as messages
+from station.messages.message import Message, verbatim
 
-ReplyT = TypeVar("ReplyT", bound=Message)
+ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 RECONNECT_MS = 10
 
 
@@ -53,7 +55,7 @@ class ChannelClient:
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+    async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
         """Send a request and return its reply.
 
         Args:
@@ -77,13 +79,13 @@ class ChannelClient:
                 status, body = await answer
         except TimeoutError:
             purpose = request.purpose or f"for {name}"
-            raise DeadlineError(f"{self._peer} gave no answer within {deadline_s:g} s when asked {purpose}") from None
+            raise DeadlineError(messages.NO_ANSWER(peer=self._peer, limit_s=deadline_s, purpose=purpose)) from None
         except zmq.ZMQError as error:
-            raise ChannelError(f"the channel to {self._peer} was closed") from error
+            raise ChannelError(messages.CHANNEL_CLOSED(peer=self._peer)) from error
         finally:
             self._waiting.pop(number, None)
         if status != b"ok":
-            raise RefusedError(body.decode("utf-8", "replace"))
+            raise RefusedError(_why(body))
         try:
             return reply.model_validate_json(body)
         except ValidationError as error:
@@ -99,7 +101,7 @@ class ChannelClient:
         self._context.term()
         for answer in self._waiting.values():
             if not answer.done():
-                answer.set_exception(ChannelError(f"the channel to {self._peer} was closed"))
+                answer.set_exception(ChannelError(messages.CHANNEL_CLOSED(peer=self._peer)))
 
     async def _receive(self) -> None:
         while True:
@@ -110,3 +112,10 @@ class ChannelClient:
             answer = self._waiting.get(number)
             if answer is not None and not answer.done():
                 answer.set_result((frames[1], frames[2]))
+
+
+def _why(body: bytes) -> Message:
+    try:
+        return Message.model_validate_json(body)
+    except ValidationError:
+        return verbatim(body.decode("utf-8", "replace"))

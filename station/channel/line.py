@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.vocabulary import OutcomeName, PackmlState, Reason, Refusal
 
 
@@ -29,7 +29,7 @@ class CommandName(StrEnum):
     """Acknowledge every alarm whose cause is gone."""
 
 
-class Outcome(Message):
+class Outcome(ChannelMessage):
     """The one outcome of an accepted trigger."""
 
     sequence: int = Field(ge=1, lt=2**32)
@@ -65,7 +65,7 @@ class Outcome(Message):
     """Likewise."""
 
 
-class Begin(Message):
+class Begin(ChannelMessage):
     """Inspect one fruit. Answered once the trigger is durable, before anything moves."""
 
     purpose: ClassVar[str] = "to begin an inspection"
@@ -78,7 +78,7 @@ class Begin(Message):
     """The grader's; 0 where none is given."""
 
 
-class BeginReply(Message):
+class BeginReply(ChannelMessage):
     """The trigger is accepted, or it is refused and nothing was started."""
 
     sequence: int | None = Field(default=None, ge=1, lt=2**32)
@@ -88,34 +88,34 @@ class BeginReply(Message):
     """From now: the latest time at which the station itself ends this inspection, if need be with NO_RESULT."""
 
 
-class AwaitOutcome(Message):
+class AwaitOutcome(ChannelMessage):
     """Wait for the outcome of an accepted inspection."""
 
     purpose: ClassVar[str] = "for an inspection's outcome"
     sequence: int = Field(ge=1, lt=2**32)
 
 
-class Published(Message):
+class Published(ChannelMessage):
     """The PLC can read this outcome now. It is final, also against another one that the station holds."""
 
     purpose: ClassVar[str] = "to note what the PLC was told"
     outcome: Outcome
 
 
-class Acknowledged(Message):
+class Acknowledged(ChannelMessage):
     """The PLC has taken the outcomes up to this sequence."""
 
     purpose: ClassVar[str] = "to note an acknowledgement"
     sequence: int = Field(ge=0, lt=2**32)
 
 
-class Resume(Message):
+class Resume(ChannelMessage):
     """Query the open inspections, after a start or a lost connection."""
 
     purpose: ClassVar[str] = "what is open"
 
 
-class Open(Message):
+class Open(ChannelMessage):
     """Inspections that are accepted and not acknowledged."""
 
     running: tuple[int, int] | None
@@ -124,7 +124,7 @@ class Open(Message):
     """Ended and not acknowledged, in order of sequence."""
 
 
-class RegisterView(Message):
+class RegisterView(ChannelMessage):
     """One register of the PLC's by its name, as text."""
 
     name: str
@@ -137,7 +137,7 @@ class RegisterView(Message):
     meaning: str
 
 
-class Line(Message):
+class Line(ChannelMessage):
     """State of the line at the interface, sent with every beat, for the station's alarms, metrics and pages."""
 
     purpose: ClassVar[str] = "for the station's state"
@@ -158,7 +158,7 @@ class Line(Message):
 PACKML_STATE_NUMBERS = {state: number for number, state in enumerate(PackmlState, start=1)}
 
 
-class StationState(Message):
+class StationState(ChannelMessage):
     """The station's state, the reply to `Line`."""
 
     boot: str = Field(min_length=1, max_length=64)
@@ -185,7 +185,7 @@ class StationState(Message):
     """A person wants to see the PLC's registers: the next beat is to bring them."""
 
 
-class Command(Message):
+class Command(ChannelMessage):
     """Execute a command of the PLC; answered when it is done."""
 
     purpose: ClassVar[str] = "to carry out a command"
@@ -193,7 +193,7 @@ class Command(Message):
     argument: int = Field(ge=0, le=65_535)
 
 
-class CommandDone(Message):
+class CommandDone(ChannelMessage):
     """Result of a command."""
 
     done: bool
@@ -201,5 +201,5 @@ class CommandDone(Message):
     """Empty where done."""
 
 
-class Noted(Message):
+class Noted(ChannelMessage):
     """The station has stored it durably."""

@@ -13,7 +13,7 @@ ENVELOPE = struct.Struct(">Qd")
 LARGEST_MESSAGE_BYTES = 16 * 1024 * 1024
 
 
-class Message(BaseModel):
+class ChannelMessage(BaseModel):
     """A request or a reply: strict, frozen, nothing unknown. Its class name is its name on the wire."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

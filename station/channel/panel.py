@@ -4,19 +4,19 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 
 RecoveryName = Literal["protective-stop", "power", "program"]
 
 
-class Actor(Message):
+class Actor(ChannelMessage):
     """Author of a request, authenticated by the pages; for the audit trail."""
 
     who: str = Field(min_length=1, max_length=64)
     role: str = Field(min_length=1, max_length=64)
 
 
-class Recover(Message):
+class Recover(ChannelMessage):
     """Recover the arm after a stop, when a person has inspected the cell. Answered with `CommandDone`.
 
     It enables the arm, and moves nothing; the station continues only after a reset.
@@ -26,13 +26,13 @@ class Recover(Message):
     what: RecoveryName
 
 
-class ListAlarms(Message):
+class ListAlarms(ChannelMessage):
     """Query the alarms that are not in their normal state. Answered with `AlarmList`."""
 
     purpose: ClassVar[str] = "for its alarms"
 
 
-class ListedAlarm(Message):
+class ListedAlarm(ChannelMessage):
     """One alarm, with its text in docs/alarms.md. Times are UTC, ms since 1970."""
 
     alarm: str
@@ -60,7 +60,7 @@ class ListedAlarm(Message):
     """Empty where it is not shelved."""
 
 
-class AlarmList(Message):
+class AlarmList(ChannelMessage):
     """Alarms, most urgent first; shelved ones are included."""
 
     alarms: tuple[ListedAlarm, ...]
@@ -68,7 +68,7 @@ class AlarmList(Message):
     """For so long one can be shelved at most."""
 
 
-class AlarmAction(Message):
+class AlarmAction(ChannelMessage):
     """Action of a person on one alarm; answered with `CommandDone`, and written to the audit trail."""
 
     alarm: str = Field(max_length=64)

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor, ListedAlarm, RecoveryName
 from station.vocabulary import OutcomeName, PackmlState
 
@@ -37,7 +37,7 @@ class OperatorCommandName(StrEnum):
     """The next fruit belongs to another lot, and gets the recipe that is then in force."""
 
 
-class OperatorCommand(Message):
+class OperatorCommand(ChannelMessage):
     """Execute an operator command. Answered with `OperatorCommandView`.
 
     The answer holds the result, or for a command in progress its state so far; `PanelState` reports the rest. Not
@@ -52,7 +52,7 @@ class OperatorCommand(Message):
     """Of a lot that is started; may be empty."""
 
 
-class OperatorCommandView(Message):
+class OperatorCommandView(ChannelMessage):
     """An operator command, in progress or ended."""
 
     ticket: int
@@ -67,7 +67,7 @@ class OperatorCommandView(Message):
     ended_utc_ms: int | None
 
 
-class PersonNoted(Message):
+class PersonNoted(ChannelMessage):
     """An event of a person's log-in or rights, for the audit trail. Answered with `line.Noted`."""
 
     purpose: ClassVar[str] = "to note who is at the panel"
@@ -78,13 +78,13 @@ class PersonNoted(Message):
     subject: str = Field(default="", max_length=200)
 
 
-class GetPanelState(Message):
+class GetPanelState(ChannelMessage):
     """Query the operator's summary. Answered with `PanelState`."""
 
     purpose: ClassVar[str] = "for its state"
 
 
-class RecipeNames(Message):
+class RecipeNames(ChannelMessage):
     """Names of a recipe."""
 
     number: int
@@ -100,7 +100,7 @@ class RecipeSummary(RecipeNames):
     """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
 
 
-class DeviceView(Message):
+class DeviceView(ChannelMessage):
     """State of a device."""
 
     name: str
@@ -110,7 +110,7 @@ class DeviceView(Message):
     """Since it was last found well; None where it never was."""
 
 
-class FruitSummary(Message):
+class FruitSummary(ChannelMessage):
     """One fruit's outcome in a list."""
 
     sequence: int
@@ -127,7 +127,7 @@ class FruitSummary(Message):
     """The curve's areas in the steps' order."""
 
 
-class Counts(Message):
+class Counts(ChannelMessage):
     """Numbers of fruit by outcome."""
 
     passed: int = 0
@@ -135,7 +135,7 @@ class Counts(Message):
     unjudged: int = 0
 
 
-class PanelState(Message):
+class PanelState(ChannelMessage):
     """The operator's summary of the station."""
 
     boot: str
@@ -184,27 +184,27 @@ class PanelState(Message):
     """The longest that an inspection may take by the active recipe and settings."""
 
 
-class GetRecent(Message):
+class GetRecent(ChannelMessage):
     """Query the latest fruit. Answered with `Recent`."""
 
     purpose: ClassVar[str] = "for the last fruit"
     most: int = Field(default=20, ge=1, le=200)
 
 
-class Recent(Message):
+class Recent(ChannelMessage):
     """Fruit, newest first."""
 
     fruit: tuple[FruitSummary, ...]
 
 
-class GetFruit(Message):
+class GetFruit(ChannelMessage):
     """Query one of the latest fruit in full. Answered with `Fruit`; refused if it is not among the latest any more."""
 
     purpose: ClassVar[str] = "for a fruit"
     sequence: int = Field(ge=1, lt=2**32)
 
 
-class CurvePointSummary(Message):
+class CurvePointSummary(ChannelMessage):
     """A point of the area curve."""
 
     closing_mm: float
@@ -212,7 +212,7 @@ class CurvePointSummary(Message):
     flagged: bool
 
 
-class LimitView(Message):
+class LimitView(ChannelMessage):
     """An area limit of the recipe."""
 
     closing_mm: float
@@ -220,7 +220,7 @@ class LimitView(Message):
     least_area_mm2: float
 
 
-class Fruit(Message):
+class Fruit(ChannelMessage):
     """One fruit in full."""
 
     short: FruitSummary
@@ -240,14 +240,14 @@ class Fruit(Message):
     """Of which step there is a picture; None for none."""
 
 
-class GetPicture(Message):
+class GetPicture(ChannelMessage):
     """Query a fruit's picture. Answered with `Picture`; refused if it is not stored any more."""
 
     purpose: ClassVar[str] = "for a picture"
     sequence: int = Field(ge=1, lt=2**32)
 
 
-class Picture(Message):
+class Picture(ChannelMessage):
     """An image with the contact's outline."""
 
     jpeg: str
@@ -258,13 +258,13 @@ class Picture(Message):
     """Corners of the contact's outer edge, x and y; empty where no contact was found."""
 
 
-class GetRecipes(Message):
+class GetRecipes(ChannelMessage):
     """Query the recipes to select from. Answered with `Recipes`."""
 
     purpose: ClassVar[str] = "for the recipes"
 
 
-class Recipes(Message):
+class Recipes(ChannelMessage):
     """Recipes in force, by their number."""
 
     recipes: tuple[RecipeSummary, ...]
@@ -274,14 +274,14 @@ class Recipes(Message):
     """Of the recipes' files."""
 
 
-class GetAlarmHistory(Message):
+class GetAlarmHistory(ChannelMessage):
     """Query recent changes of alarms. Answered with `AlarmHistory`."""
 
     purpose: ClassVar[str] = "for the alarms' history"
     most: int = Field(default=100, ge=1, le=1000)
 
 
-class AlarmChange(Message):
+class AlarmChange(ChannelMessage):
     """One change of one alarm."""
 
     utc_ms: int
@@ -290,7 +290,7 @@ class AlarmChange(Message):
     detail: str
 
 
-class AlarmHistory(Message):
+class AlarmHistory(ChannelMessage):
     """Changes, newest first."""
 
     changes: tuple[AlarmChange, ...]

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from station.channel.line import RegisterView
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_queries import Picture
 
@@ -15,13 +15,13 @@ HISTOGRAM_BINS = 32
 Serial = Annotated[str, Field(max_length=64)]
 
 
-class GetHealth(Message):
+class GetHealth(ChannelMessage):
     """Query the state of every part, with ages."""
 
     purpose: ClassVar[str] = "for the station's health"
 
 
-class PartHealth(Message):
+class PartHealth(ChannelMessage):
     """State of one part that an inspection needs."""
 
     name: str
@@ -32,7 +32,7 @@ class PartHealth(Message):
     remedy: str
 
 
-class Health(Message):
+class Health(ChannelMessage):
     """State of every part."""
 
     ready: bool
@@ -55,7 +55,7 @@ class Health(Message):
     simulated: bool
 
 
-class JogGripper(Message):
+class JogGripper(ChannelMessage):
     """Move the fingers, slowly and with the least force; in manual mode only. Answered with `Jogged`."""
 
     purpose: ClassVar[str] = "to jog the gripper"
@@ -65,7 +65,7 @@ class JogGripper(Message):
     actor: Actor
 
 
-class Jogged(Message):
+class Jogged(ChannelMessage):
     """Position of the fingers."""
 
     width_mm: float
@@ -73,7 +73,7 @@ class Jogged(Message):
     active: bool
 
 
-class SetLeds(Message):
+class SetLeds(ChannelMessage):
     """Set the sensor's light; in manual mode only. Answered with `LedsSet`."""
 
     purpose: ClassVar[str] = "to set the LEDs"
@@ -83,11 +83,11 @@ class SetLeds(Message):
     actor: Actor
 
 
-class LedsSet(Message):
+class LedsSet(ChannelMessage):
     """The camera has accepted the light setting."""
 
 
-class GetLiveImage(Message):
+class GetLiveImage(ChannelMessage):
     """Query the sensor's newest image."""
 
     purpose: ClassVar[str] = "for a live image"
@@ -97,7 +97,7 @@ class GetLiveImage(Message):
     """Monotonic time of the image that the asker has."""
 
 
-class LiveImage(Message):
+class LiveImage(ChannelMessage):
     """An image with its time and contact."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -119,13 +119,13 @@ class LiveImage(Message):
     """Why no contact was measured; empty if it was, or was not requested."""
 
 
-class GetCalibration(Message):
+class GetCalibration(ChannelMessage):
     """Query the sensor's calibration and its last verification."""
 
     purpose: ClassVar[str] = "for the calibration"
 
 
-class CheckView(Message):
+class CheckView(ChannelMessage):
     """One check of a calibration or verification."""
 
     name: str
@@ -135,7 +135,7 @@ class CheckView(Message):
     remedy: str
 
 
-class CalibrationView(Message):
+class CalibrationView(ChannelMessage):
     """One calibration or verification."""
 
     serial: str
@@ -149,7 +149,7 @@ class CalibrationView(Message):
     """Names of its plots, for `GetCalibrationPicture`."""
 
 
-class RunStep(Message):
+class RunStep(ChannelMessage):
     """One step reported by a calibration run."""
 
     number: int
@@ -158,7 +158,7 @@ class RunStep(Message):
     detail: str
 
 
-class CalibrationRunView(Message):
+class CalibrationRunView(ChannelMessage):
     """A calibration or verification, in progress or the last one."""
 
     kind: Literal["calibration", "verification"]
@@ -172,7 +172,7 @@ class CalibrationRunView(Message):
     """The result."""
 
 
-class CalibrationState(Message):
+class CalibrationState(ChannelMessage):
     """State of the sensor's calibration."""
 
     serial: str
@@ -191,7 +191,7 @@ class CalibrationState(Message):
     """Why no run can start now."""
 
 
-class GetCalibrationPicture(Message):
+class GetCalibrationPicture(ChannelMessage):
     """Query a plot of a calibration or verification. Answered with `Picture`."""
 
     purpose: ClassVar[str] = "for a calibration's plot"
@@ -199,7 +199,7 @@ class GetCalibrationPicture(Message):
     name: str = Field(pattern=r"^(area|field|reference)\.png$")
 
 
-class StartCalibrationRun(Message):
+class StartCalibrationRun(ChannelMessage):
     """Calibrate or verify, in manual mode: the gripper closes on the ball. Answered with `CalibrationRunView`."""
 
     purpose: ClassVar[str] = "to begin at the ball"
@@ -209,27 +209,27 @@ class StartCalibrationRun(Message):
     actor: Actor
 
 
-class ContinueCalibrationRun(Message):
+class ContinueCalibrationRun(ChannelMessage):
     """Confirm that the ball is in place. Answered with `CalibrationRunView`."""
 
     purpose: ClassVar[str] = "to go on at the ball"
     actor: Actor
 
 
-class EndCalibrationRun(Message):
+class EndCalibrationRun(ChannelMessage):
     """Cancel the run; the jaws open. Idempotent; answered with `CalibrationRunView`."""
 
     purpose: ClassVar[str] = "to call the run off"
     actor: Actor
 
 
-class GetRegisters(Message):
+class GetRegisters(ChannelMessage):
     """Query the PLC's registers; the PLC interface sends them with its next beat."""
 
     purpose: ClassVar[str] = "for the PLC's registers"
 
 
-class Registers(Message):
+class Registers(ChannelMessage):
     """All registers of the map, in the order of their addresses."""
 
     registers: tuple[RegisterView, ...]
@@ -237,7 +237,7 @@ class Registers(Message):
     """Since the PLC interface sent them; None if it has not yet."""
 
 
-class ReadLog(Message):
+class ReadLog(ChannelMessage):
     """Read the last lines of the log."""
 
     purpose: ClassVar[str] = "for the log"
@@ -246,7 +246,7 @@ class ReadLog(Message):
     """The least."""
 
 
-class LogLine(Message):
+class LogLine(ChannelMessage):
     """One line."""
 
     utc_ms: int
@@ -255,7 +255,7 @@ class LogLine(Message):
     text: str
 
 
-class Log(Message):
+class Log(ChannelMessage):
     """Lines since the start of the station's process, newest last."""
 
     lines: tuple[LogLine, ...]

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from station.channel.line import Outcome
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.vocabulary import OutcomeName, Reason
 
@@ -24,7 +24,7 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
 
 
-class Search(Message):
+class Search(ChannelMessage):
     """Conditions on inspections: all given ones have to be met."""
 
     lot: Annotated[str, Field(max_length=32)] | None = None
@@ -37,7 +37,7 @@ class Search(Message):
     reason: Reason | None = None
 
 
-class FindInspections(Message):
+class FindInspections(ChannelMessage):
     """Query one page of a search's results, newest first."""
 
     purpose: ClassVar[str] = "for inspections"
@@ -47,7 +47,7 @@ class FindInspections(Message):
     """Of the page before; None for the first."""
 
 
-class InspectionRow(Message):
+class InspectionRow(ChannelMessage):
     """One inspection in a list."""
 
     sequence: int
@@ -63,7 +63,7 @@ class InspectionRow(Message):
     duration_ms: int | None
 
 
-class InspectionPage(Message):
+class InspectionPage(ChannelMessage):
     """One page of a search's results."""
 
     rows: tuple[InspectionRow, ...]
@@ -71,14 +71,14 @@ class InspectionPage(Message):
     """The cursor of the next page; None for the last one."""
 
 
-class GetInspection(Message):
+class GetInspection(ChannelMessage):
     """Query all data of one inspection."""
 
     purpose: ClassVar[str] = "for an inspection"
     sequence: Sequence
 
 
-class CurvePointView(Message):
+class CurvePointView(ChannelMessage):
     """One width step."""
 
     step: int
@@ -93,7 +93,7 @@ class CurvePointView(Message):
     changed_area_px: int | None = None
 
 
-class ImageView(Message):
+class ImageView(ChannelMessage):
     """A stored image."""
 
     kind: Literal["reference", "step", "mask"]
@@ -103,7 +103,7 @@ class ImageView(Message):
     """Whether its file still exists."""
 
 
-class InspectionView(Message):
+class InspectionView(ChannelMessage):
     """All data of one inspection."""
 
     sequence: int
@@ -137,14 +137,14 @@ class InspectionView(Message):
     size_class: int | None = None
 
 
-class GetImage(Message):
+class GetImage(ChannelMessage):
     """Query a stored image's file."""
 
     purpose: ClassVar[str] = "for an image"
     sha256: Sha256
 
 
-class Picture(Message):
+class Picture(ChannelMessage):
     """A picture's file."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
@@ -152,7 +152,7 @@ class Picture(Message):
     data: bytes
 
 
-class GetStages(Message):
+class GetStages(ChannelMessage):
     """Query the measurement of one step's image, stage by stage, by the inspection's own recipe."""
 
     purpose: ClassVar[str] = "for a step's stages"
@@ -160,7 +160,7 @@ class GetStages(Message):
     step: int = Field(ge=0, le=1000)
 
 
-class Stages(Message):
+class Stages(ChannelMessage):
     """The stages' pictures in their order, measured again from the stored image."""
 
     pictures: tuple[tuple[str, Picture], ...]
@@ -168,7 +168,7 @@ class Stages(Message):
     """As measured again."""
 
 
-class ListLots(Message):
+class ListLots(ChannelMessage):
     """Query the latest lots, or one of them."""
 
     purpose: ClassVar[str] = "for the lots"
@@ -176,7 +176,7 @@ class ListLots(Message):
     name: Annotated[str, Field(max_length=32)] | None = None
 
 
-class LotView(Message):
+class LotView(ChannelMessage):
     """One lot."""
 
     name: str
@@ -186,13 +186,13 @@ class LotView(Message):
     revision: int
 
 
-class Lots(Message):
+class Lots(ChannelMessage):
     """Newest first."""
 
     lots: tuple[LotView, ...]
 
 
-class StartLot(Message):
+class StartLot(ChannelMessage):
     """Begin a lot. Idempotent; answered with `LotView`."""
 
     purpose: ClassVar[str] = "to begin a lot"
@@ -201,7 +201,7 @@ class StartLot(Message):
     actor: Actor
 
 
-class EndLot(Message):
+class EndLot(ChannelMessage):
     """End a lot. Idempotent; answered with `LotView`."""
 
     purpose: ClassVar[str] = "to end a lot"
@@ -209,7 +209,7 @@ class EndLot(Message):
     actor: Actor
 
 
-class ReadAudit(Message):
+class ReadAudit(ChannelMessage):
     """Query the latest rows of the audit trail."""
 
     purpose: ClassVar[str] = "for the audit trail"
@@ -220,7 +220,7 @@ class ReadAudit(Message):
     """With this text in their subject."""
 
 
-class AuditRowView(Message):
+class AuditRowView(ChannelMessage):
     """One row of the audit trail; `old` and `new` are JSON, shortened where they are long."""
 
     seq: int
@@ -234,13 +234,13 @@ class AuditRowView(Message):
     new: str
 
 
-class AuditRows(Message):
+class AuditRows(ChannelMessage):
     """Newest first."""
 
     rows: tuple[AuditRowView, ...]
 
 
-class StartExport(Message):
+class StartExport(ChannelMessage):
     """Export a search's results as a table, as a job."""
 
     purpose: ClassVar[str] = "to export inspections"
@@ -249,7 +249,7 @@ class StartExport(Message):
     actor: Actor
 
 
-class StartLotReport(Message):
+class StartLotReport(ChannelMessage):
     """Write a lot's report, as a job."""
 
     purpose: ClassVar[str] = "for a lot's report"
@@ -258,21 +258,21 @@ class StartLotReport(Message):
     actor: Actor
 
 
-class GetJob(Message):
+class GetJob(ChannelMessage):
     """Query the state of a job."""
 
     purpose: ClassVar[str] = "for a job"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
 
 
-class EndJob(Message):
+class EndJob(ChannelMessage):
     """Cancel a job. Idempotent; answered with `JobView`."""
 
     purpose: ClassVar[str] = "to call a job off"
     job: str = Field(pattern=r"^[0-9a-f]{32}$")
 
 
-class JobFile(Message):
+class JobFile(ChannelMessage):
     """A file that a job has written."""
 
     name: str
@@ -280,7 +280,7 @@ class JobFile(Message):
     media_type: str
 
 
-class JobView(Message):
+class JobView(ChannelMessage):
     """State of a job."""
 
     job: str
@@ -295,7 +295,7 @@ class JobView(Message):
     """Once it is done."""
 
 
-class ReadJobFile(Message):
+class ReadJobFile(ChannelMessage):
     """A piece of a file of a job that is done."""
 
     purpose: ClassVar[str] = "for a job's file"
@@ -304,7 +304,7 @@ class ReadJobFile(Message):
     offset: int = Field(default=0, ge=0, lt=2**50)
 
 
-class Chunk(Message):
+class Chunk(ChannelMessage):
     """A piece of a file; empty at its end."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")

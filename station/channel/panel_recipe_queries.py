@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_queries import Text, Why
 
@@ -17,13 +17,13 @@ Revision = Annotated[int, Field(ge=1, le=2**31)]
 Scalar = bool | int | float | str | None
 
 
-class ListRecipes(Message):
+class ListRecipes(ChannelMessage):
     """Query the state of all recipes."""
 
     purpose: ClassVar[str] = "for the recipes"
 
 
-class RecipeRow(Message):
+class RecipeRow(ChannelMessage):
     """State of one recipe."""
 
     name: str
@@ -44,7 +44,7 @@ class RecipeRow(Message):
     """Information, or an action for a person."""
 
 
-class Recipes(Message):
+class Recipes(ChannelMessage):
     """All recipes, by name."""
 
     rows: tuple[RecipeRow, ...]
@@ -58,7 +58,7 @@ class Recipes(Message):
     """A possible folder for a site's own."""
 
 
-class GetRecipe(Message):
+class GetRecipe(ChannelMessage):
     """Query one recipe's file, or one of its revisions."""
 
     purpose: ClassVar[str] = "for a recipe"
@@ -67,7 +67,7 @@ class GetRecipe(Message):
     """None for the file."""
 
 
-class RecipeView(Message):
+class RecipeView(ChannelMessage):
     """A recipe's text and values."""
 
     row: RecipeRow
@@ -75,7 +75,7 @@ class RecipeView(Message):
     values: dict[str, Any]
 
 
-class GetRecipeHistory(Message):
+class GetRecipeHistory(ChannelMessage):
     """Query a recipe's revisions, the newest first."""
 
     purpose: ClassVar[str] = "for a recipe's history"
@@ -84,7 +84,7 @@ class GetRecipeHistory(Message):
     """Of the page before; None for the first."""
 
 
-class Change(Message):
+class Change(ChannelMessage):
     """One value that differs; both as JSON."""
 
     path: str
@@ -92,7 +92,7 @@ class Change(Message):
     new: str
 
 
-class RevisionView(Message):
+class RevisionView(ChannelMessage):
     """One revision, with the differences from the one before it."""
 
     revision: int
@@ -111,14 +111,14 @@ class RevisionView(Message):
     changes: tuple[Change, ...]
 
 
-class RecipeHistory(Message):
+class RecipeHistory(ChannelMessage):
     """Newest first."""
 
     revisions: tuple[RevisionView, ...]
     below: int | None
 
 
-class CompareRecipe(Message):
+class CompareRecipe(ChannelMessage):
     """Query every value that differs between two forms of a recipe."""
 
     purpose: ClassVar[str] = "for a recipe's differences"
@@ -129,13 +129,13 @@ class CompareRecipe(Message):
     """A revision; None for the file."""
 
 
-class Changes(Message):
+class Changes(ChannelMessage):
     """In the order of the file."""
 
     changes: tuple[Change, ...]
 
 
-class SaveDraft(Message):
+class SaveDraft(ChannelMessage):
     """Change values in a recipe's file, with its comments, and record it as a draft. Answered with `RecipeRow`.
 
     Refused as a whole if the recipe would be invalid, or has changed since the author read it.
@@ -151,7 +151,7 @@ class SaveDraft(Message):
     actor: Actor
 
 
-class SubmitRecipe(Message):
+class SubmitRecipe(ChannelMessage):
     """Record a recipe's file as it is as a draft. Answered with `RecipeRow`."""
 
     purpose: ClassVar[str] = "to submit a recipe"
@@ -160,7 +160,7 @@ class SubmitRecipe(Message):
     actor: Actor
 
 
-class ApproveRecipe(Message):
+class ApproveRecipe(ChannelMessage):
     """Put a draft in force for the next lot; its author cannot. Answered with `RecipeRow`."""
 
     purpose: ClassVar[str] = "to approve a recipe"
@@ -170,7 +170,7 @@ class ApproveRecipe(Message):
     actor: Actor
 
 
-class RejectRecipe(Message):
+class RejectRecipe(ChannelMessage):
     """Retire a draft: it is not put in force. Answered with `RecipeRow`."""
 
     purpose: ClassVar[str] = "to reject a draft"
@@ -180,7 +180,7 @@ class RejectRecipe(Message):
     actor: Actor
 
 
-class RevertRecipe(Message):
+class RevertRecipe(ChannelMessage):
     """Put a revision's text back into the recipe's file. Answered with `RecipeRow`."""
 
     purpose: ClassVar[str] = "to put a recipe back"
@@ -191,7 +191,7 @@ class RevertRecipe(Message):
     actor: Actor
 
 
-class ExportRecipe(Message):
+class ExportRecipe(ChannelMessage):
     """Query a recipe's file with a first line that names it. Answered with `RecipeText`."""
 
     purpose: ClassVar[str] = "to export a recipe"
@@ -199,13 +199,13 @@ class ExportRecipe(Message):
     revision: Revision | None = None
 
 
-class RecipeText(Message):
+class RecipeText(ChannelMessage):
     """A recipe's YAML."""
 
     text: str
 
 
-class ImportRecipe(Message):
+class ImportRecipe(ChannelMessage):
     """Replace a recipe's file by a whole recipe. Answered with `RecipeRow`."""
 
     purpose: ClassVar[str] = "to import a recipe"
@@ -216,7 +216,7 @@ class ImportRecipe(Message):
     actor: Actor
 
 
-class GetPastCurves(Message):
+class GetPastCurves(ChannelMessage):
     """Query the latest judged curves of a recipe's fruit, for comparison with limits."""
 
     purpose: ClassVar[str] = "for past curves"
@@ -224,7 +224,7 @@ class GetPastCurves(Message):
     limit: int = Field(default=60, ge=1, le=MOST_CURVES)
 
 
-class PastCurve(Message):
+class PastCurve(ChannelMessage):
     """One fruit's curve."""
 
     sequence: int
@@ -239,13 +239,13 @@ class PastCurve(Message):
     """Of the last point that the judge needs."""
 
 
-class PastCurves(Message):
+class PastCurves(ChannelMessage):
     """Newest first."""
 
     curves: tuple[PastCurve, ...]
 
 
-class StartWhatIf(Message):
+class StartWhatIf(ChannelMessage):
     """Judge the last inspections again by the recipe's file as it is, as a job."""
 
     purpose: ClassVar[str] = "what a draft would have done"

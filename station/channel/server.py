@@ -10,12 +10,14 @@ import zmq
 import zmq.asyncio
 from pydantic import ValidationError
 
-from station.channel.messages import ENVELOPE, LARGEST_MESSAGE_BYTES, Message, check_endpoint
+from station.channel.messages import ENVELOPE, LARGEST_MESSAGE_BYTES, ChannelMessage, check_endpoint
 from station.errors import StationError
+from station.messages import channel as messages
+from station.messages.message import Message, verbatim
 
-Handler = Callable[[Any], Awaitable[Message]]
+Handler = Callable[[Any], Awaitable[ChannelMessage]]
 """Takes the request that it is registered for and gives the reply."""
-Handlers = Mapping[type[Message], Handler]
+Handlers = Mapping[type[ChannelMessage], Handler]
 
 log = logging.getLogger(__name__)
 
@@ -75,19 +77,23 @@ class ChannelServer:
 
     async def _carry_out(self, name: str, body: bytes, expires_s: float) -> tuple[bytes, bytes]:
         if time.monotonic() > expires_s:
-            return b"refused", f"{name} came after its deadline and was not begun".encode()
+            return _refused(messages.TOO_LATE(request=name))
         if name not in self._handlers:
-            return b"refused", f"{name} is no request that this process knows".encode()
+            return _refused(messages.UNKNOWN_REQUEST(request=name))
         kind, handler = self._handlers[name]
         try:
             request = kind.model_validate_json(body)
         except ValidationError as error:
-            return b"refused", f"{name} is malformed: {error}".encode()
+            return _refused(messages.MALFORMED_REQUEST(request=name, why=str(error)))
         try:
             reply = await handler(request)
         except StationError as error:
-            return b"refused", str(error).encode()
+            return _refused(error.message)
         except Exception as error:  # a handler's bug must not end the server
             log.exception("the handler of %s failed", name)
-            return b"failed", f"{type(error).__name__}: {error}".encode()
+            return _refused(verbatim(f"{type(error).__name__}: {error}"))
         return b"ok", reply.model_dump_json().encode()
+
+
+def _refused(why: Message) -> tuple[bytes, bytes]:
+    return b"refused", why.model_dump_json().encode()

@@ -9,7 +9,7 @@ import click
 
 from station.channel.client import ChannelClient
 from station.channel.line import CommandDone
-from station.channel.messages import DeadlineError, Message
+from station.channel.messages import ChannelMessage, DeadlineError
 from station.channel.panel import (
     AcknowledgeAlarm,
     AlarmList,
@@ -25,7 +25,7 @@ from station.records.texts import printable
 from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
 
-ReplyT = TypeVar("ReplyT", bound=Message)
+ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 _DEADLINE_S = 5.0
 _ROLE = "command line"
 _LONGEST_MINUTES = int(LONGEST_SHELVED_S // 60)
@@ -86,13 +86,13 @@ def unshelve(alarm: str, by: str, config: Path | None) -> None:
     click.echo(f"{alarm} is not shelved")
 
 
-def _order(config: Path | None, request: Message) -> None:
+def _order(config: Path | None, request: ChannelMessage) -> None:
     done = asyncio.run(_ask(config, request, CommandDone))
     if not done.done:
         raise StationError(done.why)
 
 
-async def _ask(config: Path | None, request: Message, reply: type[ReplyT]) -> ReplyT:
+async def _ask(config: Path | None, request: ChannelMessage, reply: type[ReplyT]) -> ReplyT:
     site = load_configuration(config)
     async with ChannelClient(line_endpoint(site.handshake, site.home), "the station") as station:
         try:

@@ -13,7 +13,7 @@ from station.calibration.model import Calibration, Verification
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
 from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     CalibrationRunView,
@@ -98,7 +98,7 @@ class PanelCalibration:
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
 
-    def handlers(self) -> dict[type[Message], Handler]:
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
         return {
             GetCalibration: self.state,

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel_queries import (
     AuditRows,
     AuditRowView,
@@ -60,7 +60,7 @@ class PanelHistory:
         self._records, self._worker, self._jobs = records, worker, jobs
         self._folder = records.folder
 
-    def handlers(self) -> dict[type[Message], Handler]:
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
         return {
             FindInspections: self.find,

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     HISTOGRAM_BINS,
@@ -98,7 +98,7 @@ class PanelMaintenance:
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
 
-    def handlers(self) -> dict[type[Message], Handler]:
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
         return {
             GetHealth: self.health,

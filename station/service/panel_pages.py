@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Mapping
 from typing import Self
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.server import Handler
 from station.records.records import Records
 from station.service.active_calibration import ActiveCalibration
@@ -68,7 +68,7 @@ class PanelPages:
         self._ball = PanelCalibration(
             configuration, devices, plc_commands, calibrated, records, audit, self._worker, maintenance.refusal
         )
-        self.handlers: dict[type[Message], Handler] = {
+        self.handlers: dict[type[ChannelMessage], Handler] = {
             **history.handlers(),
             **PanelPictures(records.folder, self._worker).handlers(),
             **recipes.handlers(),

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from station.calibration.gate import gated
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel_queries import GetImage, GetStages, Picture, Stages
 from station.channel.server import Handler
 from station.records.database import reading
@@ -36,7 +36,7 @@ class PanelPictures:
     def __init__(self, folder: Path, worker: PanelWorker) -> None:
         self._folder, self._worker = folder, worker
 
-    def handlers(self) -> dict[type[Message], Handler]:
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
         return {GetImage: self.image, GetStages: self.stages}
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import (
@@ -80,7 +80,7 @@ class PanelRecipes:
         self._editable = self._folder.resolve() != shipped_folder().resolve()
         self._records, self._worker, self._jobs = records_folder(home), worker, jobs
 
-    def handlers(self) -> dict[type[Message], Handler]:
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
         return {
             ListRecipes: self.recipes,

@@ -48,10 +48,7 @@ class SettingsError(BadInputError):
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__(self.problems)
-
-    def __str__(self) -> str:
-        return "\n".join(str(problem) for problem in self.problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
 class Contradiction(ValueError):  # noqa: N818 (pydantic's validators raise it; it reaches users as problems)

@@ -11,38 +11,38 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from station.channel.client import ChannelClient
-from station.channel.messages import ChannelError, DeadlineError, Message, RefusedError, check_endpoint
+from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError, check_endpoint
 from station.channel.server import ChannelServer
 from station.errors import BadInputError, StationError
 
 
-class Add(Message):
+class Add(ChannelMessage):
     a: int
     b: int
 
 
-class Sleep(Message):
+class Sleep(ChannelMessage):
     purpose = "to rest a while"
     duration_s: float
 
 
-class Refuse(Message):
+class Refuse(ChannelMessage):
     pass
 
 
-class Break(Message):
+class Break(ChannelMessage):
     pass
 
 
-class Unknown(Message):
+class Unknown(ChannelMessage):
     pass
 
 
-class Sum(Message):
+class Sum(ChannelMessage):
     total: int
 
 
-class Other(Message):
+class Other(ChannelMessage):
     text: str
 
 

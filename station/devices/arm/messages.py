@@ -2,19 +2,19 @@
 
 from typing import ClassVar
 
-from station.channel.messages import Message
+from station.channel.messages import ChannelMessage
 
 Six = tuple[float, float, float, float, float, float]
 Position = tuple[float, float, float]
 
 
-class Watch(Message):
+class Watch(ChannelMessage):
     """Connect to receive the controller's state."""
 
     purpose: ClassVar[str] = "to receive the controller's state"
 
 
-class Command(Message):
+class Command(ChannelMessage):
     """Connect to command the arm, which uploads the control program."""
 
     purpose: ClassVar[str] = "to start the control program"
@@ -24,20 +24,20 @@ class Command(Message):
     watchdog_hz: float
 
 
-class Upload(Message):
+class Upload(ChannelMessage):
     """Send the control program again over the present connection and check that it plays."""
 
     purpose: ClassVar[str] = "to upload the control program again"
 
 
-class Beat(Message):
+class Beat(ChannelMessage):
     """Read the state; the station is healthy for so long from now."""
 
     purpose: ClassVar[str] = "for the arm's state"
     healthy_for_s: float
 
 
-class Beside(Message):
+class Beside(ChannelMessage):
     """Compute the joint positions of a tool pose with an offset and the same orientation."""
 
     purpose: ClassVar[str] = "for the way to a place beside"
@@ -46,7 +46,7 @@ class Beside(Message):
     """Along the tool's own x, y and z."""
 
 
-class Move(Message):
+class Move(ChannelMessage):
     """Start a motion to joint positions, straight for the tool or straight for the joints."""
 
     purpose: ClassVar[str] = "to begin a motion"
@@ -58,21 +58,21 @@ class Move(Message):
     """rad/s², or mm/s² if straight."""
 
 
-class Reachable(Message):
+class Reachable(ChannelMessage):
     """Check that joint positions are within the safety limits and have a solution."""
 
     purpose: ClassVar[str] = "whether the pose is reachable"
     joints_rad: Six
 
 
-class Halt(Message):
+class Halt(ChannelMessage):
     """Brake to rest."""
 
     purpose: ClassVar[str] = "to brake"
     deceleration_rad_s2: float
 
 
-class Outcome(Message):
+class Outcome(ChannelMessage):
     """Success, or ur-rtde's output after a failure."""
 
     done: bool
@@ -81,7 +81,7 @@ class Outcome(Message):
     """Result of `Beside`."""
 
 
-class Snapshot(Message):
+class Snapshot(ChannelMessage):
     """The controller's state."""
 
     age_s: float

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
-from station.channel.messages import ChannelError, Message
+from station.channel.messages import ChannelError, ChannelMessage
 from station.devices.arm.faults import ArmCause, ArmFault
 
-ReplyT = TypeVar("ReplyT", bound=Message)
+ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 LAST_WORDS = 5
 LONGEST_LINE = 65536
 FOLDER = "fruit-station-arm-"
@@ -100,7 +100,7 @@ class ArmProcess:
         """Whether the process is gone."""
         return self._process.returncode is not None
 
-    async def request(self, request: Message, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+    async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
         """Send a request to the process; the wait ends also when the process dies.
 
         Raises:

@@ -1,0 +1,241 @@
+"""Message: what the station says, as an id with typed parameters; a sentence is made where somebody reads it."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from string import Formatter
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Message(BaseModel):
+    """An id and its parameters; made by calling a `Definition`. As text it is its English sentence."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    id: str = Field(min_length=1)
+    parameters: dict[str, "int | float | str | Message | tuple[Message, ...]"] = Field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return ENGLISH.sentence(self)
+
+    def __hash__(self) -> int:
+        return hash((self.id, tuple(self.parameters.items())))
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number.
+
+    Attributes:
+        digits: behind the decimal sign; None for as few as it has, six figures at most.
+    """
+
+    digits: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A text that is the same in every language: a name, an address, a path, what a library said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nested:
+    """Another message."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """Several messages, one after the other.
+
+    Attributes:
+        separator: between two.
+    """
+
+    separator: str = ", "
+
+
+Kind = Number | Name | Nested | Listed
+_ACCEPTED: dict[type[Any], type[Any] | tuple[type[Any], ...]] = {
+    Number: (int, float),
+    Name: str,
+    Nested: Message,
+    Listed: tuple,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """One thing that the station can say. Call it with its parameters to get a `Message`."""
+
+    id: str
+    """Room and what is said, as `gripper.too_hot`; also the context of its translations."""
+    english: str
+    """The sentence, with each parameter in braces. Where it depends on a number, the form for one."""
+    parameters: Mapping[str, Kind]
+    plural: str = ""
+    """The form for other numbers than one; empty where there is one form."""
+    counted: str = ""
+    """The parameter that decides between the two."""
+
+    def __call__(self, **parameters: Any) -> Message:
+        """Make the message.
+
+        Args:
+            parameters: one for each of the definition's; a sequence of messages for one that is listed.
+
+        Raises:
+            TypeError: a parameter is missing, unknown or of another type.
+        """
+        if parameters.keys() != self.parameters.keys():
+            raise TypeError(
+                f"{self.id} takes {', '.join(self.parameters) or 'no parameters'}, got {sorted(parameters)}"
+            )
+        values = {name: tuple(value) if isinstance(value, list) else value for name, value in parameters.items()}
+        for name, value in values.items():
+            kind = type(self.parameters[name])
+            if not isinstance(value, _ACCEPTED[kind]) or isinstance(value, bool):
+                raise TypeError(f"{self.id}: {name} is a {kind.__name__.lower()}, got {value!r}")
+        return Message(id=self.id, parameters=values)
+
+
+_DEFINITIONS: dict[str, Definition] = {}
+
+
+def define(id: str, english: str, **parameters: Kind) -> Definition:  # noqa: A002 (the field's word, and positional)
+    """Define a message; Babel finds the call and takes id and sentence from it.
+
+    Args:
+        id: unique.
+        english: the sentence, each parameter in braces.
+        parameters: what kind each of them is.
+
+    Raises:
+        ValueError: the id is taken, or the braces are not the parameters.
+    """
+    return _kept(Definition(id, english, parameters))
+
+
+def define_plural(id: str, english: str, plural: str, counted: str, **parameters: Kind) -> Definition:  # noqa: A002
+    """Define a message whose form depends on a number.
+
+    Args:
+        id: unique.
+        english: the sentence for one.
+        plural: the sentence for all other numbers.
+        counted: the parameter that decides.
+        parameters: what kind each of them is.
+
+    Raises:
+        TypeError: what decides is no number among the parameters.
+        ValueError: the id is taken, or the braces are not the parameters.
+    """
+    if not isinstance(parameters.get(counted), Number):
+        raise TypeError(f"{id}: {counted} is no number among its parameters")
+    if missing := parameters.keys() - {counted} - fields(plural):
+        raise ValueError(f"{id}: the plural lacks {sorted(missing)}")
+    return _kept(Definition(id, english, parameters, plural, counted))
+
+
+def fields(sentence: str) -> set[str]:
+    """Return the names in a sentence's braces.
+
+    Raises:
+        ValueError: the braces do not pair.
+    """
+    return {name for _, name, _, _ in Formatter().parse(sentence) if name is not None}
+
+
+def definition(id: str) -> Definition | None:  # noqa: A002
+    """Find a definition; None of an id that this version does not have, as of a record that a later one wrote."""
+    return _DEFINITIONS.get(id)
+
+
+def definitions() -> Iterator[Definition]:
+    """Yield all definitions, in the order of their ids."""
+    yield from (_DEFINITIONS[each] for each in sorted(_DEFINITIONS))
+
+
+def _kept(new: Definition) -> Definition:
+    if new.id in _DEFINITIONS:
+        raise ValueError(f"{new.id} is defined twice")
+    if (found := fields(new.english)) - new.parameters.keys() or new.parameters.keys() - found - {new.counted}:
+        raise ValueError(f"{new.id}: the sentence has {sorted(found)}, the parameters are {sorted(new.parameters)}")
+    _DEFINITIONS[new.id] = new
+    return new
+
+
+@dataclass(frozen=True, slots=True)
+class Renderer:
+    """A reader's language: how definitions and numbers are written in it."""
+
+    form: Callable[[Definition, float], str]
+    """The sentence of a definition for a count; the count is 1 where it has one form."""
+    number: Callable[[float, int | None], str]
+    """A number with so many digits behind the decimal sign, None for as few as it has."""
+
+    def sentence(self, message: Message) -> str:
+        """Write a message as a sentence; one of an unknown id as that id with its parameters.
+
+        Args:
+            message: what was said.
+        """
+        known = definition(message.id)
+        if known is None or message.parameters.keys() != known.parameters.keys():
+            return f"{message.id} {' '.join(f'{name}={value}' for name, value in message.parameters.items())}".strip()
+        count = message.parameters.get(known.counted, 1)
+        form = self.form(known, count if isinstance(count, int | float) else 1)
+        return form.format(
+            **{name: self._written(value, known.parameters[name]) for name, value in message.parameters.items()}
+        )
+
+    def _written(self, value: object, kind: Kind) -> str:
+        if isinstance(value, Message):
+            return self.sentence(value)
+        if isinstance(value, tuple) and isinstance(kind, Listed):
+            return kind.separator.join(self.sentence(each) for each in value)
+        if isinstance(value, int | float):
+            return self.number(value, kind.digits if isinstance(kind, Number) else None)
+        return str(value)
+
+
+def _english_number(value: float, digits: int | None) -> str:
+    return f"{value:g}" if digits is None else f"{value:.{digits}f}"
+
+
+ENGLISH = Renderer(lambda known, count: known.plural if known.plural and count != 1 else known.english, _english_number)
+"""For logs and the command line."""
+
+VERBATIM = define("text.verbatim", "{text}", text=Name())
+"""Words that are not the station's: a library's, the operating system's, a person's; or of records before messages."""
+
+
+def verbatim(text: str) -> Message:
+    """Make a message of words that are not the station's own.
+
+    Args:
+        text: shown as it is in every language.
+    """
+    return VERBATIM(text=text)
+
+
+def message_of(error: BaseException) -> Message:
+    """Return what an error says: its message, or its own words.
+
+    Args:
+        error: any.
+    """
+    said = getattr(error, "message", None)
+    return said if isinstance(said, Message) else verbatim(str(error) or type(error).__name__)
+
+
+def joined(messages: Sequence[Message]) -> Message:
+    """Make one message of several sentences.
+
+    Args:
+        messages: one or more; one alone is returned as it is.
+    """
+    return messages[0] if len(messages) == 1 else SENTENCES(sentences=tuple(messages))
+
+
+SENTENCES = define("text.sentences", "{sentences}", sentences=Listed(" "))
