@@ -89,6 +89,8 @@ class Met(NamedTuple):
 
 Touches = Callable[[GripStep], Awaitable[bool]]
 """Says whether the gel is touched in a step's frames."""
+GoesOn = Callable[[GripStep], Awaitable[bool]]
+"""Says whether the fingers may close further than in a step's frames."""
 
 
 async def at_once(*works: Coroutine[None, None, object]) -> None:
@@ -264,17 +266,54 @@ class Grip:
             before = nearer or before
         return before, start
 
+    async def close_on(self, width_mm: float, goes_on: GoesOn) -> MoveResult:
+        """Close to a width without a stop, and hand on every frame that was captured on the way.
+
+        Args:
+            width_mm: the width to ask for; less than 0 is 0.
+            goes_on: gets each frame with the width at its capture, and says whether the fingers may close further.
+
+        Returns:
+            Where the fingers came to rest.
+        """
+        readings = [await self._cell.gripper.read()]
+        newer_than_s = readings[0].at_s
+        moving = asyncio.ensure_future(self.close_to(width_mm))
+        try:
+            while not moving.done():
+                passing = asyncio.ensure_future(self._passing(newer_than_s, readings))
+                try:
+                    await asyncio.wait({passing, moving}, return_when=asyncio.FIRST_COMPLETED)
+                    if not passing.done():
+                        break
+                    step = await passing
+                finally:
+                    passing.cancel()
+                newer_than_s = step.last_frame.captured_s
+                if step.move.width_mm < readings[0].width_mm and not await goes_on(step):
+                    await self._halt(moving)
+                    at = await self._cell.gripper.read()
+                    return MoveResult(at.width_mm, at.echoed_count, at)
+            return await moving
+        finally:
+            moving.cancel()
+            await asyncio.gather(moving, return_exceptions=True)
+
     async def _seen(
         self, newer_than_s: float, readings: list[GripperReading], touches: Touches
     ) -> tuple[GripStep, bool]:
-        """The next frame with the width at its capture, interpolated; and whether it shows a contact."""
+        """The next frame with the width at its capture; and whether it shows a contact."""
+        step = await self._passing(newer_than_s, readings)
+        return step, await touches(step)
+
+    async def _passing(self, newer_than_s: float, readings: list[GripperReading]) -> GripStep:
+        """The next frame with the width at its capture, interpolated between readings."""
         frame = await self._sound_frame(newer_than_s)
         readings.append(await self._cell.gripper.read())
         times_s, widths_mm = [each.at_s for each in readings], [each.width_mm for each in readings]
         width_mm = float(np.interp(frame.captured_s, times_s, widths_mm))
         at_capture = replace(readings[-1], width_mm=width_mm, at_s=frame.captured_s)
-        step = GripStep(-1, MoveResult(width_mm, at_capture.echoed_count, at_capture), (frame,))
-        return step, await touches(step)
+        return GripStep(-1, MoveResult(width_mm, at_capture.echoed_count, at_capture), (frame,))
 
     async def _halt(self, moving: asyncio.Future[MoveResult]) -> None:
         """Stop the fingers where they are."""

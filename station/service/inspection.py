@@ -2,10 +2,12 @@
 
 import time
 from dataclasses import dataclass, field
+from math import ceil
 
 from station.channel.line import Outcome
 from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
+from station.inspection.evidence import AT_MM
 from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.second_press import together
@@ -54,8 +56,10 @@ class Inspection:
     """Where the sensor is, from its place at the taught nest."""
     target: Way | None = None
     """Where it has to go before the next closing; None where it stays."""
+    closed_steps: int = 0
+    """Steps of the recipe by which the jaws have closed since the first image."""
     steps: list[GripStep] = field(default_factory=list)
-    """Captured, in order."""
+    """Captured, in order; more than `closed_steps` where they are also taken while the jaws close."""
     seen: list[MeasuredStep] = field(default_factory=list)
     """Measured, in order."""
     earlier: list[Press] = field(default_factory=list)
@@ -74,7 +78,21 @@ class Inspection:
     @property
     def next_width_mm(self) -> float:
         """The width of the next step, counted from the measured width of the first."""
-        return self.steps[0].move.width_mm - len(self.steps) * self.active.recipe.steps.step_mm
+        return self._width_after(self.closed_steps + 1)
+
+    @property
+    def deciding_width_mm(self) -> float:
+        """The width of the first step that reaches the last damage threshold."""
+        return self._width_after(self.steps_to_decide)
+
+    @property
+    def steps_to_decide(self) -> int:
+        """How many steps from the first image reach the last damage threshold."""
+        recipe = self.active.recipe
+        return min(recipe.steps.number, ceil((recipe.damage.area[-1].closing_mm - AT_MM) / recipe.steps.step_mm))
+
+    def _width_after(self, steps: int) -> float:
+        return self.steps[0].move.width_mm - steps * self.active.recipe.steps.step_mm
 
     @property
     def presses_made(self) -> int:
@@ -111,7 +129,7 @@ class Inspection:
         Args:
             met_mm: the width at which this closing met the fruit.
         """
-        self.met_mm, self.before_onset_mm = met_mm, None
+        self.met_mm, self.before_onset_mm, self.closed_steps = met_mm, None, 0
         self.steps.clear()
         self.seen.clear()
 

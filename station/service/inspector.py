@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 from station.calibration.gate import gated
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -238,15 +239,42 @@ class Inspector:
         return Event.CENTRED
 
     async def close_step(self, now: Inspection) -> Event:
-        """Close by one step, counted in measured widths from the first.
+        """Close by one step, counted in measured widths from the first, or by all that the recipe makes without a stop.
 
         The step before is measured meanwhile, unless it may be the last: then its measurement comes first.
         """
         if self._may_decide(now) and len(now.seen) < len(now.steps):
             self._goes_on.clear()
             await self._goes_on.wait()
-        self._reached = await self._grip(now).close_to(now.next_width_mm)
+        if self._closes_on(now):
+            await self._close_on(now)
+        else:
+            self._reached = await self._grip(now).close_to(now.next_width_mm)
+            now.closed_steps += 1
         return Event.REACHED
+
+    @staticmethod
+    def _closes_on(now: Inspection) -> bool:
+        """Whether the next steps are made without a stop."""
+        return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
+
+    async def _close_on(self, now: Inspection) -> None:
+        """Close without a stop to where the last damage threshold is reached, measuring each frame on the way.
+
+        The fingers stop sooner where an area ends the steps.
+        """
+        now.closed_steps = now.steps_to_decide
+
+        async def goes_on(step: GripStep) -> bool:
+            now.steps.append(replace(step, number=len(now.steps)))
+            now.seen.append(await self._vision.measure(now.steps[-1]))
+            if early_stop(now.press(), now.active.recipe) is None:
+                return True
+            now.closed_steps = now.active.recipe.steps.number  # no step after this image
+            return False
+
+        # The frames are measured one by one: none is measured ahead, since each follows the one before.
+        self._reached = await self._grip(now, self._count).close_on(now.deciding_width_mm, goes_on)
 
     @staticmethod
     def _may_decide(now: Inspection) -> bool:
@@ -257,8 +285,12 @@ class Inspector:
         return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.area[-1].closing_mm - AT_MM
 
     async def settle(self, now: Inspection) -> Event:
-        """Let fruit and gel come to rest: every step waits as long, because fruit creeps."""
-        await asyncio.sleep(now.active.recipe.imaging.settle_s)
+        """Let fruit and gel come to rest: every step waits as long, because fruit creeps.
+
+        Not after closing without a stop: the image belongs to those taken on the way.
+        """
+        on_the_way = now.active.recipe.steps.measured == "while_closing" and now.closed_steps <= now.steps_to_decide
+        await asyncio.sleep(0.0 if on_the_way else now.active.recipe.imaging.settle_s)
         return Event.SETTLED
 
     async def capture(self, now: Inspection) -> Event:
@@ -271,7 +303,7 @@ class Inspector:
         self._devices.monitors[GRIPPER].report_success()
         now.steps.append(GripStep(len(now.steps), reached, frames))
         held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
-        if len(now.steps) > recipe.steps.number or held or now.next_width_mm <= 0:
+        if now.closed_steps >= recipe.steps.number or held or now.next_width_mm <= 0:
             return Event.LAST_CAPTURED
         return Event.CAPTURED
 

@@ -92,6 +92,13 @@ class WidthSteps(Settings):
         "step, for research.",
     )
 
+    measured: Annotated[Literal["at_rest", "while_closing"], Field(exclude_if=lambda way: way == "at_rest")] = setting(
+        default="at_rest",
+        title="Measured",
+        description="`while_closing` makes the steps up to the last damage threshold without a stop, each camera image "
+        "with the width at its capture: a second less a fruit. `at_rest` stops for each.",
+    )
+
     @property
     def travel_mm(self) -> float:
         """Closing from the start to the last image, mm."""
@@ -104,6 +111,8 @@ class WidthSteps(Settings):
             wrong.append((("start_width_mm",), "expected a width, as start is 'width'"))
         if self.start == "onset" and self.start_width_mm is not None:
             wrong.append((("start_width_mm",), f"expected null, as start is 'onset', got {self.start_width_mm:g}"))
+        if self.start == "width" and self.measured == "while_closing":
+            wrong.append((("measured",), "expected 'at_rest', as start is 'width': the way to the limits is not known"))
         if self.start_width_mm is not None and self.travel_mm > self.start_width_mm:
             wrong.append((("number",), f"expected steps within the start width, got {self.travel_mm:g} mm of closing"))
         if self.travel_mm > self.closing_limit_mm:

@@ -101,6 +101,7 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
         "steps.start": (own.steps.start, draft.steps.start),
         "steps.start_width_mm": (own.steps.start_width_mm, draft.steps.start_width_mm),
         "steps.step_mm": (own.steps.step_mm, draft.steps.step_mm),
+        "steps.measured": (own.steps.measured, draft.steps.measured),
     }
     other = [name for name, (before, after) in pairs.items() if before != after]
     return f"the draft presses otherwise ({', '.join(other)})" if other else ""
@@ -155,7 +156,7 @@ def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict |
     verdict = judge(press, draft)
     proven = verdict.outcome == "FAIL"
     void = bool(press.interruptions) or not _fits(press.onset_mm, draft)
-    ended = len(press.points) > draft.steps.number or (
+    ended = _at_its_last_step(press, draft) or (
         not stopped and draft.steps.number == own.steps.number and len(press.points) == len(whole.points)
     )
     if proven or void or ended or verdict.stopped is not None:
@@ -169,11 +170,18 @@ def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict |
 
 def _until_stop(press: Press, draft: Recipe) -> Press:
     """Return the existing points that the draft would have taken."""
-    points = press.points[: draft.steps.number + 1]
+    last_mm = draft.steps.travel_mm + draft.steps.step_mm / 2
+    points = tuple(point for point in press.points if point.closing_mm < last_mm)
     for number in range(1, len(points)):
         if early_stop(replace(press, points=points[:number]), draft) is not None:
             return replace(press, points=points[:number])
     return replace(press, points=points)
+
+
+def _at_its_last_step(press: Press, draft: Recipe) -> bool:
+    """Check whether the closing of the last step was reached, to half a step: a gripper has counts."""
+    half_mm = draft.steps.step_mm / 2
+    return bool(press.points) and press.points[-1].closing_mm > draft.steps.travel_mm - half_mm
 
 
 def _stopping(draft: Recipe) -> Recipe:

@@ -1,0 +1,67 @@
+"""A press that is measured while the jaws close: one motion to the last limit, and nothing missed of what stops it."""
+
+import asyncio
+import json
+
+import pytest
+
+from station.records.database import reading, records_folder
+from station.vocabulary import Reason
+from station.whatif.replay import recipe_of_snapshot, replay
+from station.whatif.stored import read_stored, snapshots
+
+
+@pytest.fixture
+def inspected(bench, settings_file, tmp_path):
+    """A blueberry that is measured while the jaws close, perhaps with a low limit; its outcome and its record."""
+
+    def run(limit_mm2=None):
+        file, place = settings_file(), tmp_path / "recipes" / "blueberry.yaml"
+        recipe = json.loads(place.read_text())
+        recipe["steps"]["measured"] = "while_closing"
+        if limit_mm2 is not None:
+            recipe["damage"]["area"][0] |= {"area_mm2": limit_mm2, "least_area_mm2": 0.0}
+            recipe["early_stop"]["area_mm2"] = limit_mm2
+        place.write_text(json.dumps(recipe))
+
+        async def scenario():
+            async with bench(file) as cell:
+                await cell.choose("blueberry")
+                cell.lay("blueberry", 1)
+                await cell.line.ready()
+                outcome = await cell.line.inspect()
+                record = await cell.station.service.registry.records.inspection(outcome.sequence)
+                return outcome, record
+
+        return asyncio.run(scenario())
+
+    return run
+
+
+@pytest.mark.timeout(180)
+def test_a_fruit_is_decided_by_one_motion_and_its_images_say_the_same_again(inspected, tmp_path):
+    outcome, record = inspected()
+    judged = record.judged
+    assert outcome.outcome == "PASS", judged.explanation
+    closings_mm = [point.closing_mm for point in judged.curve]
+    assert closings_mm == sorted(closings_mm)
+    on_the_way = [each for each in closings_mm if 0 < each < 2.9]
+    assert len(on_the_way) >= 2, "frames on the way, each with its width"
+    assert 2.97 <= closings_mm[-1] < 3.4, "the last image is at rest where the limit is"
+    with reading(records_folder(tmp_path / "home")) as connection:
+        [stored] = read_stored(connection, [outcome.sequence], tmp_path, with_images=False)
+        [own] = map(recipe_of_snapshot, snapshots(connection, "blueberry").values())
+    assert own is not None
+    assert own.steps.measured == "while_closing"
+    again = replay(stored, own, own)
+    assert (again.after, again.faithful) == ("PASS", True)
+
+
+@pytest.mark.timeout(180)
+def test_an_area_over_the_early_stop_ends_the_motion_on_its_way(inspected):
+    outcome, record = inspected(limit_mm2=8.0)
+    curve = record.judged.curve
+    assert outcome.outcome == "NO_RESULT"
+    assert Reason.EARLY_STOP in outcome.reasons
+    assert curve[-1].area_mm2 > 8.0
+    assert curve[-1].closing_mm < 2.9, "it stopped before the limit's closing"
