@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, HTTPException, Path, Query
 from hmi.access import HmiNow
 from hmi.api_access import changer, reader
 from hmi.api_model import (
+    ApiMessage,
     Error,
     HealthAnswer,
     InspectionDetails,
@@ -69,10 +70,11 @@ async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
     return HealthAnswer(
         ready=reply.ready,
-        why=reply.why,
+        why=str(reply.why or ""),
+        why_message=reply.why and ApiMessage.of(reply.why),
         mode=reply.mode,
         simulated=reply.simulated,
-        parts=[Part(**part.model_dump()) for part in reply.parts],
+        parts=[Part.of(part) for part in reply.parts],
         versions=reply.versions,
     )
 

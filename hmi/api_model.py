@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from station.channel.panel_maintenance_queries import PartHealth
 from station.channel.panel_queries import InspectionRow, InspectionView, LotView
+from station.messages.message import Message
 from station.vocabulary import OutcomeName
 
 LotName = Annotated[str, Field(min_length=1, max_length=32, pattern=r"^[ -~]*[!-~][ -~]*$")]
@@ -25,14 +27,44 @@ class Error(Model):
     detail: str = Field(description="One sentence, with what to do.")
 
 
+class ApiMessage(Model):
+    """What the station says, as data."""
+
+    id: str = Field(description="Stays the same when the text is reworded.")
+    parameters: dict[str, int | float | str | Message | tuple[Message, ...]] = Field(
+        description="Values of the text, by name; each may be a message itself."
+    )
+    text: str = Field(description="In English.")
+
+    @classmethod
+    def of(cls, message: Message) -> "ApiMessage":
+        """Convert the station's message."""
+        return cls(id=message.id, parameters=message.parameters, text=str(message))
+
+
 class Part(Model):
     """One part that an inspection needs."""
 
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
     age_s: float | None = Field(description="Since it was last heard.")
-    detail: str
-    remedy: str
+    detail: str = Field(description="The observation; empty where ok.")
+    remedy: str = Field(description="What to do; empty where ok.")
+    detail_message: ApiMessage | None
+    remedy_message: ApiMessage | None
+
+    @classmethod
+    def of(cls, part: PartHealth) -> "Part":
+        """Convert the station's answer."""
+        return cls(
+            name=part.name,
+            state=part.state,
+            age_s=part.age_s,
+            detail=str(part.detail or ""),
+            remedy=str(part.remedy or ""),
+            detail_message=part.detail and ApiMessage.of(part.detail),
+            remedy_message=part.remedy and ApiMessage.of(part.remedy),
+        )
 
 
 class HealthAnswer(Model):
@@ -40,6 +72,7 @@ class HealthAnswer(Model):
 
     ready: bool = Field(description="A trigger would be accepted now.")
     why: str = Field(description="Why not, with the remedy; empty where ready.")
+    why_message: ApiMessage | None
     mode: int = Field(description="PackML: 1 production, 2 maintenance, 3 manual.")
     simulated: bool
     parts: list[Part]

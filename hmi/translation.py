@@ -14,7 +14,7 @@ import babel
 from babel.messages.pofile import read_po
 from markupsafe import Markup
 
-from station.messages.message import ENGLISH, Definition, Message, Renderer
+from station.messages.message import ENGLISH, VERBATIM, Definition, Message, Renderer
 from station.settings.hmi import Language
 
 FOLDER = Path(__file__).with_name("locale")
@@ -124,14 +124,18 @@ class Locale:
         """Translate a text that the station sends in English; unchanged if the catalogue has none."""
         return catalogue(self.language).get(key, english)
 
-    def sentence(self, english: str | Message) -> str:
+    def sentence(self, english: str | Message | None) -> str:
         """Write a message in this language; in English, and marked as that, where it has no translation.
 
         Args:
-            english: a message; as long as some of the station's rooms send sentences, also one of those.
+            english: a message, None for an empty text; as long as some rooms send sentences, also one of those.
         """
+        if english is None:
+            return ""
         if isinstance(english, Message):
-            return renderer(self.language).sentence(english)
+            if english.id != VERBATIM.id:
+                return renderer(self.language).sentence(english)
+            english = str(english)
         if self.language == SOURCE:
             return english
         found = self._translated(english)

@@ -22,7 +22,8 @@ from plc_interface.modbus.write_lock import WriterChange
 from plc_interface.register_map import BY_NAME
 from plc_interface.register_values import formatted_registers
 from plc_interface.station_link import StationLink, now
-from station.channel.line import Line
+from station.channel.line import Line, LineFault
+from station.messages.message import verbatim
 from station.settings.plc import HandshakeSettings
 
 _CONTROL = BY_NAME["control"]
@@ -149,7 +150,7 @@ class Interface:
         }
 
     def _line(self) -> Line:
-        faults = (*((self._journal.trouble,) if self._journal.trouble else ()), *self._output.faults)
+        faults = (*_journal_fault(self._journal.trouble), *self._output.faults)
         counters = {**self._server_counts(), **self._output.counters}
         state, station = line(self._state, counters, faults), self._state.station
         if station is None or not station.registers_wanted:
@@ -161,6 +162,10 @@ class Interface:
             self._timer.cancel()
         due_s = next_due_s(self._state)
         self._timer = None if due_s is None else self._loop.call_at(due_s, lambda: self.feed(ev.Tick(now())))
+
+
+def _journal_fault(trouble: str) -> tuple[LineFault, ...]:
+    return (LineFault(part="journal", what=verbatim(trouble)),) if trouble else ()
 
 
 def _ipv4(peer: Peer | None) -> int:

@@ -17,7 +17,8 @@ from plc_interface.can.errors import (
 )
 from plc_interface.can.line_io import LineIo
 from plc_interface.pending_rejects_file import PendingRejectFile
-from station.channel.line import Outcome
+from station.channel.line import LineFault, Outcome
+from station.messages.message import verbatim
 from station.settings.can import CanSettings
 
 REJECTS_LANE = 1
@@ -59,8 +60,8 @@ class LineOutput(Protocol):
         ...
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Return one sentence for each fault."""
+    def faults(self) -> tuple[LineFault, ...]:
+        """Return the present faults."""
         ...
 
     @property
@@ -73,7 +74,7 @@ class NoOutput:
     """No output: the line's PLC diverts."""
 
     ready = True
-    faults: tuple[str, ...] = ()
+    faults: tuple[LineFault, ...] = ()
     counters: Mapping[str, int] = {}
 
     async def start(self) -> None:
@@ -186,9 +187,12 @@ class RejectGate:
         return None if count is None else count.value
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Return faults of the bus, its nodes and recent actuations, each prefixed with CAN."""
-        return tuple(f"CAN: {fault}" for fault in self._io.faults)
+    def faults(self) -> tuple[LineFault, ...]:
+        """Return the faults of the bus, its nodes and recent reject actuations."""
+        return (
+            *(LineFault(part="can", what=verbatim(fault)) for fault in self._io.bus_faults),
+            *(LineFault(part="reject", what=verbatim(fault)) for fault in self._io.reject_faults),
+        )
 
     @property
     def counters(self) -> Mapping[str, int]:

@@ -170,7 +170,7 @@ class StationLink:
             log.warning("%s", error)
             self._feed(ev.CommandFailed(now(), action.number))
         else:
-            self._feed(ev.CommandAnswered(now(), action.number, done.done, done.why))
+            self._feed(ev.CommandAnswered(now(), action.number, done.done, str(done.why or "")))
 
     async def _note(self) -> None:
         """Send notes one after the other: an acknowledgement never overtakes its outcome."""

@@ -110,7 +110,7 @@ async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
 async def _done(gateway: Gateway, request: ChannelMessage) -> None:
     done = await gateway.request(request, CommandDone)
     if not done.done:
-        raise RefusedError(done.why)
+        raise RefusedError(done.why or "")
 
 
 def place(alarm: str) -> str:

@@ -96,7 +96,7 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
         if (await _health(hmi))["health"].mode == int(mode):
             break
     if command.state == "failed":
-        raise RefusedError(command.why)
+        raise RefusedError(command.why or "")
     return go_to("/maintenance/hand")
 
 

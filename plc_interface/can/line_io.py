@@ -104,10 +104,15 @@ class LineIo:
         return next(iter(self._emergencies.values()), "")
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Return the faults of the bus, its nodes and recent reject actuations, one sentence each."""
+    def bus_faults(self) -> tuple[str, ...]:
+        """Return the faults of the bus and its nodes."""
         trouble = (self._trouble,) if self._trouble else ()
-        return (*trouble, *self._emergencies.values(), *self._rejects.faults)
+        return (*trouble, *self._emergencies.values())
+
+    @property
+    def reject_faults(self) -> tuple[str, ...]:
+        """Return the failed reject actuations since the last acknowledgement."""
+        return tuple(self._rejects.faults)
 
     def give_up(self, error: RejectError) -> None:
         """Count a reject actuation that is not ordered at all, and store it as a fault."""

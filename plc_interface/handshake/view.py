@@ -7,7 +7,8 @@ from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot
 from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
 from plc_interface.register_map import BY_NAME
-from station.channel.line import PACKML_STATE_NUMBERS, Line, Outcome, StationState
+from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
+from station.messages.message import verbatim
 
 Value = int | float | str | None
 
@@ -27,7 +28,7 @@ def view(state: State) -> dict[str, Value]:
             "counters_reset_utc_ms": state.reset_utc_ms}  # fmt: skip
 
 
-def line(state: State, counters: Mapping[str, int], faults: tuple[str, ...]) -> Line:
+def line(state: State, counters: Mapping[str, int], faults: tuple[LineFault, ...]) -> Line:
     """Return the line's state, sent to the station with every beat."""
     return Line(
         plc_connected=state.writer,
@@ -35,7 +36,7 @@ def line(state: State, counters: Mapping[str, int], faults: tuple[str, ...]) -> 
         enabled=state.arming is Arming.ARMED,
         waiting=len(state.queue),
         counters={**state.counters, **counters},
-        faults=(*(fault.value for fault in state.faults), *faults),
+        faults=(*(LineFault(part="handshake", what=verbatim(fault.value)) for fault in state.faults), *faults),
     )
 
 

@@ -6,11 +6,12 @@ either side `Resume` returns the inspections that are accepted and not yet ackno
 """
 
 from enum import StrEnum
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from station.channel.messages import ChannelMessage
+from station.messages.message import Message
 from station.vocabulary import OutcomeName, PackmlState, Reason, Refusal
 
 
@@ -137,6 +138,14 @@ class RegisterView(ChannelMessage):
     meaning: str
 
 
+class LineFault(ChannelMessage):
+    """A fault of the PLC interface or of the CAN node."""
+
+    part: Literal["handshake", "journal", "can", "reject"]
+    """`reject` for a reject actuation that failed or was not ordered; `can` for the bus and its nodes."""
+    what: Message
+
+
 class Line(ChannelMessage):
     """State of the line at the interface, sent with every beat, for the station's alarms, metrics and pages."""
 
@@ -149,8 +158,7 @@ class Line(ChannelMessage):
     """Outcomes that the PLC has not acknowledged."""
     counters: dict[str, int]
     """By name, as in the register map."""
-    faults: tuple[str, ...]
-    """Of the interface and the CAN node, one sentence each."""
+    faults: tuple[LineFault, ...]
     registers: tuple[RegisterView, ...] = ()
     """In the order of their addresses; only if requested by the station, once."""
 
@@ -167,8 +175,8 @@ class StationState(ChannelMessage):
     """False while anything that inspecting needs makes no progress; the heartbeat to the PLC stops."""
     ready: bool
     """A trigger would be accepted now."""
-    why_not_ready: str
-    """One sentence with the remedy; empty where ready."""
+    why_not_ready: Message | None
+    """With the remedy; None where ready."""
     packml_state: PackmlState | None
     """None while it is unknown, as after a start; 0 in the register map."""
     mode: int = Field(ge=1, le=3)
@@ -197,8 +205,8 @@ class CommandDone(ChannelMessage):
     """Result of a command."""
 
     done: bool
-    why: str
-    """Empty where done."""
+    why: Message | None
+    """None where done."""
 
 
 class Noted(ChannelMessage):

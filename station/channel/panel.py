@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from station.channel.messages import ChannelMessage
+from station.messages.message import Message
 
 RecoveryName = Literal["protective-stop", "power", "program"]
 
@@ -45,7 +46,7 @@ class ListedAlarm(ChannelMessage):
     """Its cause is there, or it is latched, and it is not shelved."""
     latched: bool
     """Active until a person has reset it, and never shelved."""
-    detail: str
+    detail: Message | None
     """The observation when it was last raised."""
     since_utc_ms: int = Field(ge=0)
     raised: int = Field(ge=0)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor, ListedAlarm, RecoveryName
+from station.messages.message import Message
 from station.vocabulary import OutcomeName, PackmlState
 
 LONGEST_LOT = 32
@@ -60,8 +61,8 @@ class OperatorCommandView(ChannelMessage):
     order: OperatorCommandName
     argument: str
     state: Literal["executing", "done", "failed"]
-    why: str
-    """The error; else empty."""
+    why: Message | None
+    """The error; else None."""
     who: str
     began_utc_ms: int
     ended_utc_ms: int | None
@@ -104,8 +105,8 @@ class DeviceView(ChannelMessage):
     """State of a device."""
 
     name: str
-    fault: str
-    """Empty where it is well."""
+    fault: Message | None
+    """None where it is healthy."""
     age_s: float | None
     """Since it was last found well; None where it never was."""
 
@@ -143,13 +144,13 @@ class PanelState(ChannelMessage):
     utc_ms: int
     state: str
     """As `station.inspection.states.State` has it."""
-    sentence: str
-    """The present activity, in English."""
+    activity: Message
+    """The present activity."""
     packml_state: PackmlState | None
     mode: int
     ready: bool
-    why_not_ready: str
-    """One sentence with the remedy; empty where ready."""
+    why_not_ready: Message | None
+    """With the remedy; None where ready."""
     busy: bool
     """A fruit is being inspected."""
     needs_person: bool
@@ -165,9 +166,9 @@ class PanelState(ChannelMessage):
     plc_names_lots: bool
     plc_connected: bool
     plc_alive: bool
-    line_trouble: str
-    check_due: str
-    """Why the check with the ball is required before any fruit; empty if it is not."""
+    line_trouble: Message | None
+    check_due: Message | None
+    """Why the check with the ball is required before any fruit; None if it is not."""
     alarms: tuple[ListedAlarm, ...]
     """Those that are not normal, most urgent first; those that are shelved are among them."""
     devices: tuple[DeviceView, ...]
@@ -270,7 +271,7 @@ class Recipes(ChannelMessage):
     recipes: tuple[RecipeSummary, ...]
     active: RecipeSummary | None
     """The recipe of the next fruit; during a lot it may be an older revision."""
-    problems: tuple[str, ...]
+    problems: tuple[Message, ...]
     """Of the recipes' files."""
 
 
@@ -287,7 +288,7 @@ class AlarmChange(ChannelMessage):
     utc_ms: int
     id: str
     change: str
-    detail: str
+    detail: Message | None
 
 
 class AlarmHistory(ChannelMessage):

@@ -8,6 +8,7 @@ from station.channel.line import RegisterView
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_queries import Picture
+from station.messages.message import Message
 
 MOST_LINES = 500
 HISTOGRAM_BINS = 32
@@ -28,28 +29,29 @@ class PartHealth(ChannelMessage):
     state: Literal["ok", "degraded", "fault", "unknown"]
     age_s: float | None
     """Since it was last heard; None where never."""
-    detail: str
-    remedy: str
+    detail: Message | None
+    remedy: Message | None
+    """None only if ok."""
 
 
 class Health(ChannelMessage):
     """State of every part."""
 
     ready: bool
-    why: str
+    why: Message | None
     mode: int
     """PackML: 1 production, 2 maintenance, 3 manual."""
-    state: str
-    """In words."""
-    jog_refused: str
-    """Why jogging is refused now, with what to do; empty if it is allowed."""
+    state: Message
+    """The present activity."""
+    jog_refused: Message | None
+    """Why jogging is refused now, with what to do; None if it is allowed."""
     parts: tuple[PartHealth, ...]
     devices: dict[str, str]
     versions: dict[str, str]
     progress_age_s: dict[str, float]
     records: dict[str, int]
     """Bytes and counts of the records."""
-    records_error: str
+    records_error: Message | None
     calibration_age_s: float | None
     verification_age_s: float | None
     simulated: bool
@@ -115,8 +117,8 @@ class LiveImage(ChannelMessage):
     """None where no contact was measured."""
     area_mm2: float | None
     flags: tuple[str, ...]
-    contact: str
-    """Why no contact was measured; empty if it was, or was not requested."""
+    contact: Message | None
+    """Why no contact was measured; None if it was, or was not requested."""
 
 
 class GetCalibration(ChannelMessage):
@@ -164,12 +166,12 @@ class CalibrationRunView(ChannelMessage):
     kind: Literal["calibration", "verification"]
     state: Literal["running", "waiting", "passed", "failed", "ended"]
     """`waiting` for the person to lay the ball."""
-    request: str
-    """The person's next action; empty for none."""
+    request: Message | None
+    """The person's next action."""
     steps: tuple[RunStep, ...]
     """The last of each title."""
-    result: str
-    """The result."""
+    result: Message | None
+    """None while it runs."""
 
 
 class CalibrationState(ChannelMessage):
@@ -184,10 +186,10 @@ class CalibrationState(ChannelMessage):
     verification_age_s: float | None
     oldest_days: float
     verify_every_h: float | None
-    trouble: str
+    trouble: Message | None
     ball_mm: float
     run: CalibrationRunView | None
-    run_refused: str
+    run_refused: Message | None
     """Why no run can start now."""
 
 

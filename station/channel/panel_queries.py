@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field
 from station.channel.line import Outcome
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
+from station.messages.message import Message
 from station.vocabulary import OutcomeName, Reason
 
 LARGEST_PAGE = 100
@@ -289,8 +290,8 @@ class JobView(ChannelMessage):
     done: int
     of: int
     """0 where it is not known."""
-    message: str
-    """Its message: its last output if it failed."""
+    message: Message | None
+    """Why it failed: a limit of the queue, or the command's last output."""
     files: tuple[JobFile, ...]
     """Once it is done."""
 

@@ -7,6 +7,7 @@ from pydantic import Field
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_queries import Text, Why
+from station.messages.message import Message
 
 LARGEST_TEXT = 100_000
 """Letters of a recipe's file."""
@@ -40,7 +41,7 @@ class RecipeRow(ChannelMessage):
     """The revision that waits for approval."""
     waiting_author: str
     waiting_reason: str
-    note: str
+    note: Message | None
     """Information, or an action for a person."""
 
 
@@ -48,7 +49,7 @@ class Recipes(ChannelMessage):
     """All recipes, by name."""
 
     rows: tuple[RecipeRow, ...]
-    problems: tuple[str, ...]
+    problems: tuple[Message, ...]
     """Problems of the folder's files."""
     editable: bool
     """Whether the folder is the site's; the shipped one belongs to the software."""

@@ -89,7 +89,7 @@ def unshelve(alarm: str, by: str, config: Path | None) -> None:
 def _order(config: Path | None, request: ChannelMessage) -> None:
     done = asyncio.run(_ask(config, request, CommandDone))
     if not done.done:
-        raise StationError(done.why)
+        raise StationError(done.why or "")
 
 
 async def _ask(config: Path | None, request: ChannelMessage, reply: type[ReplyT]) -> ReplyT:
@@ -108,7 +108,7 @@ def _format(each: ListedAlarm) -> str:
         head = (
             f"{each.alarm} ({each.priority}) is shelved until {_time(each.shelved_until_utc_ms)} by {each.shelved_by}"
         )
-    return "\n  ".join([head, each.detail or each.cause, f"{each.consequence} {each.action}"])
+    return "\n  ".join([head, str(each.detail or each.cause), f"{each.consequence} {each.action}"])
 
 
 def _time(utc_ms: int) -> str:

@@ -86,7 +86,7 @@ async def _recovered_by_the_station(configuration: Configuration, what: Recovery
         deadline_s = configuration.arm.recovery_deadline_s + _STATION_DEADLINE_S
         done = await station.request(Recover(what=what), CommandDone, deadline_s=deadline_s)
     if not done.done:
-        raise StationError(done.why)
+        raise StationError(done.why or "")
     return True
 
 

@@ -1,13 +1,14 @@
 """The life of alarms as values: what is active, seen, shelved, latched (ANSI/ISA-18.2-2016, alarm states)."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Self
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from station.inspection.alarm_table import ALARMS, WORD_BITS, AlarmId, urgency
+from station.messages.message import Message, message_in
 
 LONGEST_SHELVED_S = 8 * 3600.0
 """One shift: what is hidden for longer is not an alarm."""
@@ -97,7 +98,7 @@ class Alarm:
 
     id: AlarmId
     state: AlarmState = AlarmState.NORMAL
-    detail: str = ""
+    detail: Message | None = None
     """What was seen when it was last raised."""
     since_s: float = 0.0
     """When it became active."""
@@ -130,7 +131,7 @@ class Alarms:
         """One alarm."""
         return self.known.get(alarm) or Alarm(alarm)
 
-    def raise_(self, alarm: AlarmId, now_s: float, detail: str) -> Self:
+    def raise_(self, alarm: AlarmId, now_s: float, detail: Message | None) -> Self:
         """Its cause is there. An active one stays as it is, with the new detail; a chattering one counts."""
         was = self.get(alarm)
         if was.state in CAUSED and was.quiet_since_s is None:
@@ -219,7 +220,7 @@ class Alarms:
 
     def to_data(self) -> list[dict[str, Any]]:
         """Plain data to remember over a restart."""
-        return [{**asdict(alarm), "raises_s": list(alarm.raises_s)} for alarm in self.known.values()]
+        return [_ROW.dump_python(alarm, mode="json") for alarm in self.known.values()]
 
     @classmethod
     def from_data(cls, data: object) -> Self:
@@ -260,6 +261,8 @@ _ROW = TypeAdapter(Alarm)
 
 def _alarm(row: object) -> Alarm | None:
     """A remembered alarm; None where its id is no longer known, or its state is none of its life's."""
+    if isinstance(row, dict) and isinstance(row.get("detail"), str):  # of versions before messages
+        row = {**row, "detail": message_in(row["detail"])}
     try:
         alarm = _ROW.validate_python(row)
     except ValidationError:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from string import Formatter
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 
 class Message(BaseModel):
@@ -227,6 +227,23 @@ def message_of(error: BaseException) -> Message:
     """
     said = getattr(error, "message", None)
     return said if isinstance(said, Message) else verbatim(str(error) or type(error).__name__)
+
+
+def message_in(text: str) -> Message | None:
+    """Read a message that a text field holds as JSON; the words of versions before messages as they are.
+
+    Args:
+        text: empty for no message.
+    """
+    try:
+        return Message.model_validate_json(text) if text else None
+    except ValidationError:
+        return verbatim(text)
+
+
+def text_of(message: Message | None) -> str:
+    """Write a message as JSON for a text field; None as an empty text."""
+    return "" if message is None else message.model_dump_json()
 
 
 def joined(messages: Sequence[Message]) -> Message:

@@ -3,6 +3,7 @@
 import time
 from pathlib import Path
 
+from station.messages.message import Message, joined, verbatim
 from station.outbox.status import DestinationStatus, outbox_folder, read_status
 from station.settings.outbox import OutboxSettings
 
@@ -18,18 +19,19 @@ class OutboxMonitor:
         self._enabled = settings.postgresql.enabled or settings.mqtt.enabled
         self._began_s = time.monotonic()
 
-    def alarm_detail(self) -> str:
-        """Return what is delayed, in a sentence each; empty for nothing, and if no destination is enabled."""
+    def alarm_detail(self) -> Message | None:
+        """Return what is delayed; None for nothing, and if no destination is enabled."""
         if not self._enabled:
-            return ""
+            return None
         status, now_s = read_status(self._folder), time.time()
         silent_s = time.monotonic() - self._began_s
         if status is not None:  # the status of an earlier start does not count
             silent_s = min(silent_s, now_s - status.utc_ms / 1000)
         if silent_s > LOST_S:
-            return f"the outbox's process has not been heard for {silent_s:.0f} s"
+            return verbatim(f"the outbox's process has not been heard for {silent_s:.0f} s")
         told = {} if status is None or now_s - status.utc_ms / 1000 > LOST_S else status.destinations
-        return "; ".join(text for name, each in told.items() if (text := self._of(name, each, now_s)))
+        late = [verbatim(text) for name, each in told.items() if (text := self._of(name, each, now_s))]
+        return joined(late) if late else None
 
     def _of(self, name: str, each: DestinationStatus, now_s: float) -> str:
         since_utc_ms = each.away_since_utc_ms if each.waiting is None else each.oldest_utc_ms

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from station.calibration.model import Calibration, Verification
 from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
+from station.messages.message import Message, verbatim
 from station.settings.configuration import Configuration
 from station.vision.scale import TYPICAL_STANDARD_UNCERTAINTY
 
@@ -90,39 +91,42 @@ class ActiveCalibration:
             None if verified is None else verified.drift,
         )
 
-    def refusal(self) -> str:
-        """Return why inspections are refused, with the remedy; empty if all that is required was done."""
+    def refusal(self) -> Message | None:
+        """Return why inspections are refused, with the remedy; None if all that is required was done."""
         limit_h, calibration = self._settings.verify_every_h, self.calibration
         if calibration is None and (self._required or limit_h is not None):
-            return (
+            return verbatim(
                 "The sensor is not calibrated: calibrate it with the ball on the page Maintenance in manual mode, "
                 "or by `station calibrate` with the station stopped."
             )
         if limit_h is None:
-            return ""
+            return None
         verified, age_s = self._verification, self.figures.verification_age_s
         how = "on the page Maintenance in manual mode, or by `station verify` with the station stopped."
         if verified is None or age_s is None:
-            return f"The calibration was never verified, and it is demanded: verify it with the ball; {how}"
+            return verbatim(f"The calibration was never verified, and it is demanded: verify it with the ball; {how}")
         if not verified.passed:
-            return f"The last verification failed: mend what its page names, then verify again; {how}"
+            return verbatim(f"The last verification failed: mend what its page names, then verify again; {how}")
         if age_s > limit_h * _HOUR_S:
             old = f"{age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed"
-            return f"The last verification is {old}: verify with the ball; {how}"
-        return ""
+            return verbatim(f"The last verification is {old}: verify with the ball; {how}")
+        return None
 
-    def alarm_detail(self) -> str:
-        """Return the detail of the alarm calibration_old; empty for no alarm."""
+    def alarm_detail(self) -> Message | None:
+        """Return the detail of the alarm calibration_old; None for no alarm."""
         calibration, verified = self.calibration, self._verification
         if calibration is None:
-            return "the sensor is not calibrated: calibrate it first" if self._required and self._serial() else ""
+            needed = self._required and self._serial()
+            return verbatim("the sensor is not calibrated: calibrate it first") if needed else None
         age_days = (self.figures.age_s or 0.0) / _DAY_S
         if age_days > self._settings.oldest_days:
-            return f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"
+            return verbatim(
+                f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"
+            )
         if verified is not None and not verified.passed:
             failed = ", ".join(check.name for check in verified.checks if not check.passed)
-            return f"the last verification, {verified.id}, failed: {failed}"
-        return ""
+            return verbatim(f"the last verification, {verified.id}, failed: {failed}")
+        return None
 
     def _refresh(self) -> None:
         serial = self._serial()

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from station.errors import StationError
+from station.messages.message import Message, verbatim
 from station.recipe_store.difference import format_differences
 from station.recipe_store.recipe_state import Control, FileState, RecipeState
 from station.recipe_store.revision import RecipeStoreError
@@ -71,8 +72,8 @@ class ActiveRecipes:
         self._controls: dict[int, Control] = {}
         self._noticed: set[tuple[str, str]] = set()
         self._signature: Hashable = None
-        self.problems: tuple[str, ...] = ()
-        """Problems of the files at the last reading; one sentence each."""
+        self.problems: tuple[Message, ...] = ()
+        """Problems of the files at the last reading."""
         self.noticed: list[AuditEntry] = []
         """Audit entries of drafts and gaps that were found; the caller that queues them empties the list."""
 
@@ -96,11 +97,13 @@ class ActiveRecipes:
             states, broken = (), (f"the recipes in force are those kept in {_CONTROLS}: {error}",)
         controls = {each.name: each.control for each in states if each.control is not None}
         if not begun and not controls:
-            self.problems = broken
+            self.problems = tuple(map(verbatim, broken))
             self._take(stored.values())
             return
         self._audit_files(states)
-        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in states if each.note)]))
+        self.problems = tuple(
+            dict.fromkeys([*map(verbatim, broken), *(verbatim(each.note) for each in states if each.note)])
+        )
         gone = {each.name for each in states if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
         self._store_controls(controls)

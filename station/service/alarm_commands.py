@@ -16,6 +16,7 @@ from station.channel.server import Handlers
 from station.errors import BadInputError
 from station.inspection.alarm_table import ALARMS, AlarmId, anchor
 from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
+from station.messages.message import verbatim
 from station.records.audit import AuditEntry, validate_entry
 from station.service.alarm_manager import AlarmManager
 from station.service.audit_logger import AuditLogger, alarm_entry
@@ -95,11 +96,11 @@ class AlarmCommands:
     def _done(self, changed: bool, entry: AuditEntry) -> CommandDone:  # noqa: FBT001 (an answer handed on)
         if changed:
             self._audit.log(entry)
-        return CommandDone(done=True, why="")
+        return CommandDone(done=True, why=None)
 
 
 def _refused(why: str) -> CommandDone:
-    return CommandDone(done=False, why=why)
+    return CommandDone(done=False, why=verbatim(why))
 
 
 def _listed(alarm: Alarm) -> ListedAlarm:

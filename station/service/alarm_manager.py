@@ -17,6 +17,7 @@ from station.devices.gripper.errors import (
 from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.alarms import CAUSED, Alarms
+from station.messages.message import Message, message_in, message_of, text_of, verbatim
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
@@ -101,7 +102,7 @@ class AlarmManager:
         """Return all alarms, as a value."""
         return self._alarms
 
-    def raise_(self, alarm: AlarmId, detail: str) -> None:
+    def raise_(self, alarm: AlarmId, detail: Message | None) -> None:
         """Raise an alarm; it is published once for as long as its cause is present.
 
         Args:
@@ -115,15 +116,15 @@ class AlarmManager:
         """Mark an alarm's cause as gone; an alarm whose cause was not present does not change."""
         if alarm in self._present:
             self._present.discard(alarm)
-            self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared", "")
+            self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared")
 
-    def update(self, alarm: AlarmId, detail: str) -> None:
+    def update(self, alarm: AlarmId, detail: Message | None) -> None:
         """Raise the alarm if `detail` is given, else clear it.
 
         Args:
-            detail: the finding; empty if the cause is gone.
+            detail: the finding; None if the cause is gone.
         """
-        if detail:
+        if detail is not None:
             self.raise_(alarm, detail)
         else:
             self.clear(alarm)
@@ -140,8 +141,8 @@ class AlarmManager:
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
             if alarm not in self._device_alarms.values():
                 self.clear(alarm)
-        if told is not None:
-            self.raise_(told, str(fault))
+        if told is not None and fault is not None:
+            self.raise_(told, message_of(fault))
 
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm.
@@ -149,7 +150,7 @@ class AlarmManager:
         Returns:
             Whether that changed anything.
         """
-        return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged", "")
+        return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged")
 
     def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
         """Shelve an alarm for a time.
@@ -162,7 +163,7 @@ class AlarmManager:
         Returns:
             Whether that changed anything.
         """
-        detail = f"for {for_s:.0f} s by {by}: {reason}"
+        detail = verbatim(f"for {for_s:.0f} s by {by}: {reason}")
         return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
 
     def unshelve(self, alarm: AlarmId) -> bool:
@@ -171,7 +172,7 @@ class AlarmManager:
         Returns:
             Whether that changed anything.
         """
-        return self._set(self._alarms.unshelve(alarm), alarm, "unshelved", "")
+        return self._set(self._alarms.unshelve(alarm), alarm, "unshelved")
 
     def acknowledge_returned(self) -> None:
         """Acknowledge every alarm that has returned to normal: the PLC's command."""
@@ -198,7 +199,7 @@ class AlarmManager:
                 {
                     "id": row.id,
                     "state": row.state,
-                    "detail": row.detail,
+                    "detail": message_in(row.detail),
                     "since_s": row.raised_utc_ms / 1000,
                     "raised": 1,
                     "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
@@ -222,7 +223,7 @@ class AlarmManager:
                     alarm.state,
                     round(1000 * alarm.since_s),
                     utc_ms(),
-                    alarm.detail,
+                    text_of(alarm.detail),
                     None if alarm.shelved_until_s is None else round(1000 * alarm.shelved_until_s),
                     alarm.shelved_by,
                 )
@@ -235,13 +236,16 @@ class AlarmManager:
             else:
                 del self._unsaved[: len(entries)]
 
-    def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: str) -> bool:
+    def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: Message | None = None) -> bool:
         if alarms.get(alarm) == self._alarms.get(alarm):
             return False
         self._alarms = alarms
-        self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, detail)][-_MOST_UNSAVED:]
+        self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, text_of(detail))][-_MOST_UNSAVED:]
         level = logging.WARNING if change == "raised" else logging.INFO
-        log.log(level, "alarm %s %s%s", alarm, change, f": {detail}" if detail else "")
+        if detail is None:
+            log.log(level, "alarm %s %s", alarm, change)
+        else:
+            log.log(level, "alarm %s %s: %s", alarm, change, detail)
         self._publish_active()
         return True
 

@@ -5,6 +5,7 @@ import logging
 from typing import Any
 
 from station.channel.line import Command, CommandDone
+from station.messages.message import Message
 from station.records.audit import AuditEntry
 from station.records.errors import BadRecordError, RecordsError
 from station.records.records import Records
@@ -43,18 +44,20 @@ class AuditLogger:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._queued.set()
 
-    def log_command(self, who: str, command: str, subject: str, why_not: str, role: str = "", **old: Any) -> None:
+    def log_command(
+        self, who: str, command: str, subject: str, why_not: Message | None, role: str = "", **old: Any
+    ) -> None:
         """Queue the entry of a command that was carried out or refused.
 
         Args:
             who: `plc`, `panel` or a person's name.
             command: name of the command.
             subject: object of the command.
-            why_not: reason of the refusal; empty if it was carried out.
+            why_not: reason of the refusal; None if it was carried out.
             role: of `who`; by default the same as `who`.
             **old: values before the command, where they matter.
         """
-        new = {"done": not why_not} | ({"why": why_not} if why_not else {})
+        new = {"done": why_not is None} | ({} if why_not is None else {"why": str(why_not)})
         self.log(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
 
     async def run(self) -> None:
@@ -94,7 +97,7 @@ def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, 
         old: the value before; None if unknown.
         by: name and role of who gave it.
     """
-    new = {"argument": command.argument, **done.model_dump()}
+    new = {"argument": command.argument, "done": done.done, "why": str(done.why or "")}
     return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
 
 

@@ -12,6 +12,7 @@ from station.devices.gripper.errors import GripperEmergencyStopError, GripperErr
 from station.errors import StationError
 from station.inspection.cycle import START, Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
+from station.messages.message import Message, message_of, verbatim
 from station.records.errors import RecordsError
 from station.service.grip import FramesError
 
@@ -58,7 +59,7 @@ class Happened(NamedTuple):
     """An event on its way to the table."""
 
     event: Event
-    why: str
+    why: Message | None
     by: "asyncio.Task[None] | None"
     """The action that ended with it; None where it came from elsewhere."""
 
@@ -79,7 +80,7 @@ class Performer(Protocol):
         """Stop the devices where they are; bounded, and raises nothing."""
         ...
 
-    def raise_alarm(self, told: Raise, why: str) -> None:
+    def raise_alarm(self, told: Raise, why: Message | None) -> None:
         """Raise an alarm.
 
         Args:
@@ -137,19 +138,19 @@ class Conductor:
         """For how long."""
         return time.monotonic() - self.entered_s
 
-    def post(self, event: Event, why: str = "") -> None:
+    def post(self, event: Event, why: Message | None = None) -> None:
         """Tell that something happened, from outside of the actions.
 
         Args:
             event: what.
-            why: for a person, one sentence; may be empty.
+            why: for a person.
         """
         self._events.put_nowait(Happened(event, why, None))
 
     async def run(self) -> None:
         """Take events until cancelled; then what is under way is cancelled too."""
         try:
-            await self._act(START.actions, Happened(Event.RESET, "", None))
+            await self._act(START.actions, Happened(Event.RESET, None, None))
             while True:
                 try:
                     async with asyncio.timeout(TICK_S):
@@ -205,7 +206,7 @@ class Conductor:
             work = self._performer.perform(action, because)
         except Exception as error:  # a bug in one action must end in an outcome, not in silence
             log.exception("action %s", action)
-            self.post(Event.INTERNAL_FAULT, str(error))
+            self.post(Event.INTERNAL_FAULT, message_of(error))
             return
         if work is not None:
             task = asyncio.create_task(self._end_with_event(action, work), name=f"action {action}")
@@ -214,15 +215,15 @@ class Conductor:
     async def _end_with_event(self, action: Action, work: Work) -> None:
         me = asyncio.current_task()
         try:
-            event, why = await work(), ""
+            event, why = await work(), None
         except StationError as fault:
-            event, why = event_of(fault), str(fault)
+            event, why = event_of(fault), message_of(fault)
             self._performer.failed(fault)
             if event is Event.INTERNAL_FAULT:
                 log.exception("action %s", action)
         except Exception as error:  # as above
             log.exception("action %s", action)
-            event, why = Event.INTERNAL_FAULT, f"{type(error).__name__}: {error}"
+            event, why = Event.INTERNAL_FAULT, verbatim(f"{type(error).__name__}: {error}")
         if event is not None:
             self._events.put_nowait(Happened(event, why, me))
         elif me is not None:

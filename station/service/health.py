@@ -3,8 +3,8 @@
 import asyncio
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import uvicorn
 from starlette.applications import Starlette
@@ -12,6 +12,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from station.messages.message import Message
 from station.service.metrics import Metrics
 from station.supervision.serving import CLOSE_S, AddressError, Server, listen
 
@@ -27,9 +28,9 @@ class Dependency:
     """`degraded` still inspects."""
     age_s: float | None
     """Since its last sign of life; None if there was none."""
-    detail: str = ""
-    remedy: str = ""
-    """Empty only if ok."""
+    detail: Message | None = None
+    remedy: Message | None = None
+    """None only if ok."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,8 @@ class Readiness:
     """Readiness for a trigger, with the reason if not ready."""
 
     ready: bool
-    why: str
-    """One sentence with the remedy; empty if ready."""
+    why: Message | None
+    """With the remedy; None if ready."""
     dependencies: tuple[Dependency, ...]
 
 
@@ -170,7 +171,23 @@ class HealthServer:
 
     async def _readyz(self, _request: Request) -> Response:
         readiness = self._readiness()
-        return JSONResponse(asdict(readiness), status_code=200 if readiness.ready else 503)
+        return JSONResponse(_readiness_json(readiness), status_code=200 if readiness.ready else 503)
 
     async def _version_page(self, _request: Request) -> Response:
         return JSONResponse(self._version)
+
+
+def _readiness_json(readiness: Readiness) -> dict[str, Any]:
+    """Return the body of /readyz: each message as its English sentence, and beside it as id and parameters."""
+    dependencies = [
+        {"name": each.name, "state": each.state, "age_s": each.age_s}
+        | _message_json("detail", each.detail)
+        | _message_json("remedy", each.remedy)
+        for each in readiness.dependencies
+    ]
+    return {"ready": readiness.ready} | _message_json("why", readiness.why) | {"dependencies": dependencies}
+
+
+def _message_json(name: str, message: Message | None) -> dict[str, Any]:
+    said = None if message is None else message.model_dump(mode="json")
+    return {name: str(message or ""), f"{name}_message": said}

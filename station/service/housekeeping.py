@@ -10,6 +10,7 @@ from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event
 from station.inspection.states import State
+from station.messages.message import Message, joined, message_of, verbatim
 from station.records.errors import RecordsError
 from station.service.active_calibration import ActiveCalibration
 from station.service.active_recipes import ActiveRecipes
@@ -43,9 +44,9 @@ class Housekeeping:
         metrics: gets the readiness.
         liveness: gets this task's progress.
         calibrated: age of the sensor's calibration.
-        hmi_fault: returns the fault of the HMI's process; empty for none.
-        outbox: returns the outbox's delay, empty for none.
-        broken: error of the configuration at the start; empty for none.
+        hmi_fault: returns the fault of the HMI's process; None for none.
+        outbox: returns the outbox's delay, None for none.
+        broken: error of the configuration at the start; None for none.
         reserve_mb: free disk space below which nothing is inspected.
         longest_pause_s: between two attempts to recover something.
     """
@@ -61,10 +62,10 @@ class Housekeeping:
         metrics: Metrics,
         liveness: Liveness,
         calibrated: ActiveCalibration,
-        hmi_fault: Callable[[], str],
-        outbox: Callable[[], str],
+        hmi_fault: Callable[[], Message | None],
+        outbox: Callable[[], Message | None],
         *,
-        broken: str,
+        broken: Message | None,
         reserve_mb: int,
         longest_pause_s: float,
     ) -> None:
@@ -157,18 +158,20 @@ class Housekeeping:
         for name, watch in self._devices.monitors.items():
             alarms.set_device_fault(name, watch.reported_fault)
         fault = service.registry.fault
-        alarms.update(AlarmId.RECORDS_NOT_WRITABLE, "" if fault is None else str(fault))
+        alarms.update(AlarmId.RECORDS_NOT_WRITABLE, None if fault is None else message_of(fault))
         free_mb = service.registry.records.status().free_bytes / _MB
         alarms.update(
             AlarmId.DISK_LOW,
-            f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve"
+            verbatim(f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve")
             if free_mb < 2 * self._reserve_mb
-            else "",
+            else None,
         )
         alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
-        alarms.update(AlarmId.RECIPE_BROKEN, "; ".join(self._recipes.problems))
+        problems = self._recipes.problems
+        alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
         alarms.update(
-            AlarmId.NO_RECIPE, "" if service.active is not None else "No recipe was ever chosen, or it is gone."
+            AlarmId.NO_RECIPE,
+            None if service.active is not None else verbatim("No recipe was ever chosen, or it is gone."),
         )
         alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
         alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
@@ -178,24 +181,26 @@ class Housekeeping:
         self._check_clock()
 
     def _count_restarts(self) -> None:
-        many: list[str] = []
+        many: list[Message] = []
         for name, program in restarts.read().items():
             for _ in range(program.total - self._restarts_counted.get(name, 0)):
                 self._metrics.restarted(name)
             self._restarts_counted[name] = program.total
             lately = program.within(_MANY_WITHIN_S)
             if program.given_up:
-                many.append(f"the process {name} ended again and again and is not started any more")
+                many.append(verbatim(f"the process {name} ended again and again and is not started any more"))
             elif lately >= _MANY_RESTARTS:
-                many.append(f"the process {name} was started again {lately} times within {_MANY_WITHIN_S:g} s")
-        self._service.alarms.update(AlarmId.PROCESS_RESTARTS, "; ".join(many))
+                many.append(
+                    verbatim(f"the process {name} was started again {lately} times within {_MANY_WITHIN_S:g} s")
+                )
+        self._service.alarms.update(AlarmId.PROCESS_RESTARTS, joined(many) if many else None)
 
     def _check_clock(self) -> None:
         alarms = self._service.alarms
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
             step_s = offset_s - self._clock_offset_s
-            alarms.raise_(AlarmId.CLOCK_STEPPED, f"the machine's clock was set by {step_s:+.0f} s")
+            alarms.raise_(AlarmId.CLOCK_STEPPED, verbatim(f"the machine's clock was set by {step_s:+.0f} s"))
         else:
             alarms.clear(AlarmId.CLOCK_STEPPED)
         self._clock_offset_s = offset_s

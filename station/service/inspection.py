@@ -11,6 +11,7 @@ from station.inspection.evidence import AT_MM
 from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.second_press import together
+from station.messages.message import Message
 from station.records.first_press import first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
@@ -104,17 +105,17 @@ class Inspection:
         """The measured width of the first contact; None before it."""
         return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
 
-    def interrupt(self, reason: Reason, why: str) -> None:
+    def interrupt(self, reason: Reason, why: Message | None) -> None:
         """Something from outside the measurement ended or spoilt it.
 
         Args:
             reason: for the PLC.
-            why: for a person, one sentence.
+            why: for a person.
         """
         if reason not in self.interruptions:
             self.interruptions.append(reason)
-        if why and why not in self.explanation:
-            self.explanation.append(why)
+        if why is not None and str(why) not in self.explanation:
+            self.explanation.append(str(why))
 
     def press_again(self) -> None:
         """Begin another press on the fruit. Of the one before stays what was measured, not its images."""

@@ -16,6 +16,7 @@ from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
+from station.messages.message import Message, message_of, verbatim
 from station.records.model import Image
 from station.service.active_calibration import ActiveCalibration
 from station.service.alarm_manager import AlarmManager
@@ -99,7 +100,10 @@ class Inspector:
         if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
             now.interrupt(
                 Reason.REFERENCE_BAD,
-                f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at them",
+                verbatim(
+                    f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at "
+                    "them"
+                ),
             )
             return Event.REFERENCE_BAD
         self._devices.monitors[GRIPPER].report_success()
@@ -137,8 +141,8 @@ class Inspector:
             segmentation = gated(now.active.recipe.segmentation, self._calibrated.gate_factor)
             image, looks = await self._vision.take_reference(frames, segmentation)
         except BadReferenceError as error:
-            now.interrupt(Reason.REFERENCE_BAD, str(error))
-            self._alarms.raise_(error.alarm, str(error))
+            now.interrupt(Reason.REFERENCE_BAD, message_of(error))
+            self._alarms.raise_(error.alarm, message_of(error))
             self._metrics.reference_refused(error.alarm)
             return False
         now.reference_image = Image("reference", None, image)
@@ -149,7 +153,7 @@ class Inspector:
             self._alarms.clear(alarm)
         drift, most = looks.drift_levels, self._settings.reference.most_drift_levels
         halfway = f"the light differs from the golden reference's by {drift:.0f} grey levels; {most:g} are too many"
-        self._alarms.update(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else "")
+        self._alarms.update(AlarmId.REFERENCE_DRIFTING, verbatim(halfway) if drift > most / 2 else None)
         self._metrics.reference(0.0, drift)
         now.measures["reference_drift_levels"] = round(drift, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
@@ -174,7 +178,7 @@ class Inspector:
                 before, start = await grip.onset(met, self._touches)
                 now.before_onset_mm = None if before is None else before.move.width_mm
         except (NothingTouchedError, UnseenContactError) as error:
-            now.interrupt(Reason.NO_CONTACT, str(error))
+            now.interrupt(Reason.NO_CONTACT, message_of(error))
             return Event.NO_ONSET
         now.steps.append(start)
         known = self._glanced is not None and self._glanced.step is start
@@ -322,8 +326,10 @@ class Inspector:
         if age_s > self._settings.reference.oldest_s:
             now.interrupt(
                 Reason.REFERENCE_BAD,
-                f"the reference was {age_s:.0f} s old at the last step, at most "
-                f"{self._settings.reference.oldest_s:g} s are allowed",
+                verbatim(
+                    f"the reference was {age_s:.0f} s old at the last step, at most "
+                    f"{self._settings.reference.oldest_s:g} s are allowed"
+                ),
             )
         recipe = now.active.recipe
         now.verdict = judge(now.press(), recipe)
@@ -350,13 +356,13 @@ class Inspector:
         return Event.PLACED
 
     @staticmethod
-    def close_as_no_result(now: Inspection, because: Event, why: str) -> None:
+    def close_as_no_result(now: Inspection, because: Event, why: Message | None) -> None:
         """End an inspection that cannot be judged, with what was measured so far.
 
         Args:
             now: the inspection.
             because: the event that ended it.
-            why: for a person, one sentence; may be empty.
+            why: for a person.
         """
         now.interrupt(REASONS[because], why)
         now.verdict = judge(now.press(), now.active.recipe)

@@ -12,6 +12,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.errors import StationError
 from station.inspection.cycle import UNJUDGED, WAITING
 from station.inspection.states import State
+from station.messages.message import Message, message_of, verbatim
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
@@ -113,7 +114,7 @@ class OperatorCommands:
             order=request.order,
             argument=request.argument,
             state="executing",
-            why="",
+            why=None,
             who=request.person.who,
             began_utc_ms=utc_ms(),
             ended_utc_ms=None,
@@ -131,15 +132,17 @@ class OperatorCommands:
         try:
             why = await self._execute(request)
         except StationError as error:
-            why = str(error)
-        ended = entry.model_copy(update={"state": "failed" if why else "done", "why": why, "ended_utc_ms": utc_ms()})
+            why = message_of(error)
+        ended = entry.model_copy(
+            update={"state": "done" if why is None else "failed", "why": why, "ended_utc_ms": utc_ms()}
+        )
         self._recent = deque((ended if each.ticket == entry.ticket else each for each in self._recent), _REMEMBERED)
 
-    async def _execute(self, request: OperatorCommand) -> str:
+    async def _execute(self, request: OperatorCommand) -> Message | None:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
         if order in _COMMANDS:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
-                return f"{order}: {argument!r} is no number"
+                return verbatim(f"{order}: {argument!r} is no number")
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
             return (await self._plc_commands.execute(command, by)).why
         match order:
@@ -154,33 +157,33 @@ class OperatorCommands:
         self._audit.log_command(by[0], order, argument, why, by[1])
         return why
 
-    async def _recover(self, what: str, by: tuple[str, str]) -> str:
+    async def _recover(self, what: str, by: tuple[str, str]) -> Message | None:
         for standing in self.recoveries:
             if standing == what:
                 return (await self._plc_commands.recover(Recover(what=standing), by)).why
-        return "there is nothing to recover from any more"
+        return verbatim("there is nothing to recover from any more")
 
-    async def _start_lot(self, name: str, grower: str) -> str:
+    async def _start_lot(self, name: str, grower: str) -> Message | None:
         if self._lots.plc_names:
-            return "the line's PLC names the lots"
+            return verbatim("the line's PLC names the lots")
         if not name.strip() or len(name) > LONGEST_LOT or not (name.isascii() and name.isprintable()):
-            return f"{name!r} is no lot's name: 1 to {LONGEST_LOT} letters, digits and signs"
+            return verbatim(f"{name!r} is no lot's name: 1 to {LONGEST_LOT} letters, digits and signs")
         if grower:
             try:
                 await self._records.change(lambda connection: start_lot(connection, name, grower))
             except RecordsError as error:
-                return str(error)
+                return message_of(error)
         self._lots.set_lot(name)
-        return ""
+        return None
 
-    async def _end_lot(self) -> str:
+    async def _end_lot(self) -> Message | None:
         name = self._lots.named
         if not name:
-            return "no lot was started at the panel"
+            return verbatim("no lot was started at the panel")
         with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
         self._lots.set_lot("")
-        return ""
+        return None
 
 
 def _under_way(entry: OperatorCommandView, request: OperatorCommand) -> bool:

@@ -4,6 +4,7 @@ from collections import deque
 
 from station.channel.line import Outcome
 from station.inspection.alarm_table import AlarmId
+from station.messages.message import verbatim
 from station.service.alarm_manager import AlarmManager
 from station.vocabulary import OutcomeName
 
@@ -27,7 +28,11 @@ class OutcomeMonitor:
         self._last.append(outcome.outcome)
         last = list(self._last)
         unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
-        self._alarms.update(AlarmId.MANY_NO_RESULT, f"the last {_MANY} fruit could not be judged" if unjudged else "")
+        self._alarms.update(
+            AlarmId.MANY_NO_RESULT, verbatim(f"the last {_MANY} fruit could not be judged") if unjudged else None
+        )
         failed = last.count("FAIL")
         many = failed > _LAST / 2
-        self._alarms.update(AlarmId.REJECT_RATE, f"{failed} of the last {len(last)} fruit failed" if many else "")
+        self._alarms.update(
+            AlarmId.REJECT_RATE, verbatim(f"{failed} of the last {len(last)} fruit failed") if many else None
+        )

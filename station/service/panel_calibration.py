@@ -30,6 +30,7 @@ from station.channel.panel_maintenance_queries import (
 from station.channel.panel_queries import Picture
 from station.channel.server import Handler
 from station.errors import BadInputError, StationError
+from station.messages.message import Message, joined, message_of, verbatim
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
 from station.service.active_calibration import ActiveCalibration
@@ -54,9 +55,9 @@ class _Run:
     kind: Literal["calibration", "verification"]
     actor: Actor
     state: Literal["running", "waiting", "passed", "failed", "ended"] = "running"
-    request: str = ""
+    request: Message | None = None
     steps: dict[str, RunStep] = field(default_factory=dict)
-    told: str = ""
+    result: Message | None = None
     laid: asyncio.Event = field(default_factory=asyncio.Event)
     task: asyncio.Task[None] | None = None
 
@@ -86,7 +87,7 @@ class PanelCalibration:
         records: Records,
         audit: AuditLogger,
         worker: PanelWorker,
-        refusal: Callable[[], str],
+        refusal: Callable[[], Message | None],
     ) -> None:
         self._site, self._devices, self._plc_commands, self._calibrated = (
             configuration,
@@ -172,7 +173,7 @@ class PanelCalibration:
         run = self._run
         if run is None or run.state != "waiting":
             raise BadInputError("nothing waits for the ball at this moment; look at the run again")
-        run.state, run.request = "running", ""
+        run.state, run.request = "running", None
         run.laid.set()
         return _run_view(run)
 
@@ -186,31 +187,31 @@ class PanelCalibration:
             await self.close()
         return _run_view(run)
 
-    def _why_not(self, serial: str) -> str:
+    def _why_not(self, serial: str) -> Message | None:
         if self._run is not None and self._run.open:
-            return f"{_NAMES[self._run.kind]} is under way: let it end, or call it off."
+            return verbatim(f"{_NAMES[self._run.kind]} is under way: let it end, or call it off.")
         if not serial:
-            return "This camera is no sensor that could be calibrated."
+            return verbatim("This camera is no sensor that could be calibrated.")
         return self._refusal()
 
     async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:
         try:
-            words = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
+            result = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
         except asyncio.CancelledError:
-            run.state, run.told = "ended", "called off: nothing was stored"
+            run.state, run.result = "ended", verbatim("called off: nothing was stored")
             raise
         except (StationError, ValueError) as error:
-            run.state, run.told = "failed", str(error)
+            run.state, run.result = "failed", message_of(error)
             if isinstance(error, StationError):
                 self._devices.report_fault(error)
         else:
-            run.state, run.told = ("failed", words) if words else ("passed", "")
+            run.state, run.result = ("passed", None) if result is None else ("failed", result)
         finally:
-            run.request = ""
+            run.request = None
             self._plc_commands.kept_manual = ""
             self._devices.use(by_inspection=False)
 
-    async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> str:
+    async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
         bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
         draft = await CalibrationProcedure(
@@ -231,9 +232,8 @@ class PanelCalibration:
         await self._records.change(
             lambda connection: (append_audit(connection, entry), self._store.add_calibration(new, files))
         )
-        return ""
 
-    async def _verify(self, run: _Run) -> str:
+    async def _verify(self, run: _Run) -> Message | None:
         calibration = self._calibrated.calibration
         if calibration is None:
             raise BadInputError("the sensor is not calibrated: calibrate it first")
@@ -260,13 +260,14 @@ class PanelCalibration:
         await self._records.change(
             lambda connection: (append_audit(connection, entry), self._store.add_verification(made, files))
         )
-        return "; ".join(f"{check.name}: {check.found}: {check.remedy}" for check in made.checks if not check.passed)
+        failed = [verbatim(f"{check.name}: {check.found}: {check.remedy}") for check in made.checks if not check.passed]
+        return joined(failed) if failed else None
 
     async def _lay(self, run: _Run, place: Place) -> None:
         """Request the ball from the person, and wait until it is in place."""
         run.laid.clear()
         run.state = "waiting"
-        run.request = (
+        run.request = verbatim(
             f"Lay the ball {place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its "
             "first place, and take your hands away."
         )
@@ -318,7 +319,7 @@ def _note_step(run: _Run, progress: Progress) -> None:
 
 def _run_view(run: _Run) -> CalibrationRunView:
     return CalibrationRunView(
-        kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), result=run.told
+        kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), result=run.result
     )
 
 

@@ -19,6 +19,7 @@ from typing import Literal
 
 from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobView
 from station.errors import StationError
+from station.messages.message import Message, verbatim
 
 FOLDER = "panel_jobs"
 LONGEST_S = 1800.0
@@ -55,7 +56,7 @@ class Job:
     arguments: Sequence[str]
     of: int = 0
     state: Literal["waiting", "running", "done", "failed", "ended"] = "waiting"
-    message: str = ""
+    message: Message | None = None
     task: asyncio.Task[None] | None = field(default=None, repr=False)
 
     @property
@@ -176,11 +177,11 @@ class PanelJobs:
                 async with asyncio.timeout(LONGEST_S):
                     code, words = await self._run_command(job)
             job.state = "failed" if code else "done"
-            job.message = words
+            job.message = verbatim(words) if words else None
         except TimeoutError:
-            job.state, job.message = "failed", f"it was not done within {LONGEST_S / 60:g} min; ask for less"
+            job.state, job.message = "failed", verbatim(f"it was not done within {LONGEST_S / 60:g} min; ask for less")
         except OSError as error:
-            job.state, job.message = "failed", f"it could not be started: {error.strerror}"
+            job.state, job.message = "failed", verbatim(f"it could not be started: {error.strerror}")
         except asyncio.CancelledError:
             job.state = "ended"
             raise

@@ -31,6 +31,7 @@ from station.channel.server import Handler
 from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
+from station.messages.message import Message, verbatim
 from station.records.audit import AuditEntry
 from station.service.active_calibration import ActiveCalibration
 from station.service.audit_logger import AuditLogger
@@ -109,20 +110,20 @@ class PanelMaintenance:
             ReadLog: self.log_lines,
         }
 
-    def refusal(self) -> str:
-        """Return why nothing may be moved by hand now, with the remedy; empty if it may."""
+    def refusal(self) -> Message | None:
+        """Return why nothing may be moved by hand now, with the remedy; None if it may."""
         service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
         if service.stop_requested:
-            return "The station is told to end."
+            return verbatim("The station is told to end.")
         if facts.refusal is Refusal.BUSY:
-            return "An inspection is under way: wait for its end."
+            return verbatim("An inspection is under way: wait for its end.")
         if mode != MANUAL:
-            return f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then."
+            return verbatim(f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then.")
         if service.state not in _JOGGED:
-            return facts.sentence
+            return verbatim(facts.sentence)
         if self._plc_commands.kept_manual and not self._moving.locked():
-            return f"{self._plc_commands.kept_manual} is under way: let it end, or call it off."
-        return ""
+            return verbatim(f"{self._plc_commands.kept_manual} is under way: let it end, or call it off.")
+        return None
 
     async def health(self, _request: GetHealth) -> Health:
         """Return the health of all dependencies."""
@@ -136,7 +137,7 @@ class PanelMaintenance:
             ready=readiness.ready,
             why=readiness.why,
             mode=self._plc_commands.mode,
-            state=STATES[self._service.state].sentence,
+            state=verbatim(STATES[self._service.state].sentence),
             jog_refused=self.refusal(),
             parts=tuple(
                 PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
@@ -153,7 +154,7 @@ class PanelMaintenance:
                 "images_waiting": status.images_waiting,
                 "writes": status.writes,
             },
-            records_error=status.error,
+            records_error=verbatim(status.error) if status.error else None,
             calibration_age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
             simulated=self._devices.simulated,
@@ -200,12 +201,12 @@ class PanelMaintenance:
         """Return the newest image; it is measured only while nothing is inspected."""
         frame = await self._devices.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
         active = self._service.active
-        why = ""
+        why = None
         if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
-            why = "An inspection is under way: the image is shown as it is."
+            why = verbatim("An inspection is under way: the image is shown as it is.")
         elif request.contact and active is None:
-            why = "No recipe is active: its method measures the contact."
-        segmentation = active.recipe.segmentation if request.contact and active is not None and not why else None
+            why = verbatim("No recipe is active: its method measures the contact.")
+        segmentation = active.recipe.segmentation if request.contact and active is not None and why is None else None
         return await self._worker.do(lambda: self._live(frame, segmentation, why))
 
     async def registers(self, _request: GetRegisters) -> Registers:
@@ -223,13 +224,13 @@ class PanelMaintenance:
 
     def _check(self, actor: Actor, command: str, subject: str) -> None:
         if why := self.refusal():
-            self._note(actor, command, subject, {"done": False, "why": why})
+            self._note(actor, command, subject, {"done": False, "why": str(why)})
             raise NotNowError(why)
 
     def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
         self._audit.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
 
-    def _live(self, frame: Frame, segmentation: Segmentation | None, why: str) -> LiveImage:
+    def _live(self, frame: Frame, segmentation: Segmentation | None, why: Message | None) -> LiveImage:
         image, contact = frame.image, None
         shown = image
         if segmentation is not None:
@@ -252,22 +253,22 @@ class PanelMaintenance:
             contact=why,
         )
 
-    def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, str]:
+    def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, Message | None]:
         """Return the contact against the golden reference, or why none is measured."""
         path = self._calibrated.golden() or self._home / GOLDEN
         try:
             key = (path, path.stat().st_mtime_ns, segmentation)
         except OSError:
-            return None, "There is no golden reference yet: calibrate, or let the station inspect once."
+            return None, verbatim("There is no golden reference yet: calibrate, or let the station inspect once.")
         if self._method is None or self._method[0] != key:
             picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
             if picture is None:
-                return None, f"The golden reference {path.name} cannot be read: calibrate again."
+                return None, verbatim(f"The golden reference {path.name} cannot be read: calibrate again.")
             self._method = key, make_method([np.asarray(picture, np.uint8)], segmentation)
         try:
-            return self._method[1].measure(image), ""
+            return self._method[1].measure(image), None
         except ValueError:
-            return None, "The image has another size than the golden reference: calibrate again."
+            return None, verbatim("The image has another size than the golden reference: calibrate again.")
 
 
 def _outlined(image: Image, contact: Contact) -> Image:

@@ -38,6 +38,7 @@ from station.errors import BadInputError, StationError
 from station.inspection.evidence import Evidence
 from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import SizedLimits
+from station.messages.message import verbatim
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
@@ -106,7 +107,7 @@ class PanelRecipes:
             rows = tuple(_row(standing) for standing in standings)
             return Recipes(
                 rows=rows,
-                problems=tuple(map(str, problems)),
+                problems=tuple(verbatim(str(each)) for each in problems),
                 editable=self._editable,
                 folder=str(self._folder),
                 own_folder=str(self._own_folder),
@@ -272,7 +273,7 @@ def _row(standing: RecipeState) -> RecipeRow:
         waiting=waiting.revision if waiting else None,
         waiting_author=waiting.author if waiting else "",
         waiting_reason=waiting.reason if waiting else "",
-        note=standing.note,
+        note=verbatim(standing.note) if standing.note else None,
     )
 
 

@@ -28,6 +28,7 @@ from station.channel.panel_live import (
 )
 from station.channel.server import Handlers
 from station.inspection.states import STATES
+from station.messages.message import Message, message_in, message_of, verbatim
 from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
 from station.records.records import Records
@@ -119,10 +120,10 @@ class PanelServer:
         """Cancel the commands under way."""
         await self._operator_commands.close()
 
-    def hmi_fault(self) -> str:
-        """Return the fault of the HMI's process; empty for none, and before its first message."""
+    def hmi_fault(self) -> Message | None:
+        """Return the fault of the HMI's process; None for none, and before its first message."""
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
-        return f"the pages' process has not asked for {age_s:.0f} s" if age_s > SILENT_S else ""
+        return verbatim(f"the pages' process has not asked for {age_s:.0f} s") if age_s > SILENT_S else None
 
     async def _state(self, _request: GetPanelState) -> PanelState:
         self._heard_s = time.monotonic()
@@ -133,7 +134,7 @@ class PanelServer:
             boot=line.boot,
             utc_ms=utc_ms(),
             state=service.state,
-            sentence=facts.sentence,
+            activity=verbatim(facts.sentence),
             packml_state=line.packml_state,
             mode=line.mode,
             ready=line.ready,
@@ -152,7 +153,7 @@ class PanelServer:
             check_due=self._calibrated.refusal(),
             alarms=self._alarms.active(),
             devices=tuple(
-                DeviceView(name=name, fault="" if watch.fault is None else str(watch.fault), age_s=watch.age_s)
+                DeviceView(name=name, fault=watch.fault and message_of(watch.fault), age_s=watch.age_s)
                 for name, watch in self._devices.monitors.items()
             ),
             orders=self._operator_commands.recent,
@@ -185,7 +186,8 @@ class PanelServer:
         rows = await self._records.alarm_log(request.most)
         return AlarmHistory(
             changes=tuple(
-                AlarmChange(utc_ms=row.utc_ms, id=row.id, change=row.change, detail=row.detail) for row in rows
+                AlarmChange(utc_ms=row.utc_ms, id=row.id, change=row.change, detail=message_in(row.detail))
+                for row in rows
             )
         )
 

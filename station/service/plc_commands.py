@@ -12,6 +12,7 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
+from station.messages.message import Message, message_of, verbatim
 from station.service.active_recipes import ActiveRecipes
 from station.service.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
 from station.service.device_manager import DeviceManager
@@ -94,14 +95,15 @@ class PlcCommands:
         """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
         return self._registers
 
-    def line_fault(self) -> str:
-        """Return the line's fault, as far as known; empty for none."""
+    def line_fault(self) -> Message | None:
+        """Return the line's fault, as far as known."""
         age_s = self.line_age_s
         if self._line is None or age_s is None:
-            return ""
+            return None
         if age_s > LINE_SILENT_S:
-            return f"the PLC interface has not been heard for {age_s:.0f} s"
-        return "" if self._line.plc_alive or not self._line.enabled else "the PLC's heartbeat stands still"
+            return verbatim(f"the PLC interface has not been heard for {age_s:.0f} s")
+        beats = self._line.plc_alive or not self._line.enabled
+        return None if beats else verbatim("the PLC's heartbeat stands still")
 
     def update_line_alarms(self) -> None:
         """Raise and clear the alarms of the line's state."""
@@ -109,12 +111,11 @@ class PlcCommands:
         if line is None or age_s is None:
             return
         silent = age_s > LINE_SILENT_S
-        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else "")
-        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, "" if silent else self.line_fault())
-        can = [fault for fault in line.faults if fault.startswith("CAN:")]
-        shots = [fault for fault in can if fault.startswith(("CAN: shot ", "CAN: the gate reports"))]
-        alarms.update(AlarmId.GATE_NOT_FIRED, next(iter(shots), ""))
-        alarms.update(AlarmId.CAN_NODE_LOST, next((fault for fault in can if fault not in shots), ""))
+        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else None)
+        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, None if silent else self.line_fault())
+        faults = {fault.part: fault.what for fault in reversed(line.faults)}
+        alarms.update(AlarmId.GATE_NOT_FIRED, faults.get("reject"))
+        alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command.
@@ -129,10 +130,10 @@ class PlcCommands:
                 async with asyncio.timeout(DEADLINE_S):
                     why = await self._execute(command)
             except TimeoutError:
-                why = f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._sentence()}"
-        if why:
+                why = verbatim(f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._activity()}")
+        if why is not None:
             log.warning("%s was not done: %s", command.command, why)
-        done = CommandDone(done=not why, why=why)
+        done = CommandDone(done=why is None, why=why)
         self._audit.log(command_entry(command, done, before, by))
         if command.command in _ON_ALARMS:
             now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
@@ -152,7 +153,7 @@ class PlcCommands:
             case _:
                 return {"state": str(self._service.state)}
 
-    async def _execute(self, command: Command) -> str:
+    async def _execute(self, command: Command) -> Message | None:
         match command.command:
             case CommandName.CHANGE_RECIPE:
                 return await self._change_recipe(command.argument)
@@ -164,29 +165,31 @@ class PlcCommands:
                 return self._set_mode(command.argument)
             case CommandName.CLEAR_ALARMS:
                 self._service.alarms.acknowledge_returned()
-                return ""
+                return None
 
-    def _set_mode(self, mode: int) -> str:
+    def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
-            return f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)"
+            return verbatim(f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)")
         if self.kept_manual and mode != self.mode:
-            return f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there"
+            return verbatim(f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there")
         self.mode = mode
-        return ""
+        return None
 
-    async def _change_recipe(self, number: int) -> str:
+    async def _change_recipe(self, number: int) -> Message | None:
         await asyncio.to_thread(self._recipes.read)
         found = self._recipes.find(number)
         if found is None:
             known = ", ".join(map(str, self._recipes.numbers)) or "none"
-            return f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._recipes.problems)
+            return verbatim(
+                f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._recipes.problems)
+            )
         widest_mm = self._devices.cell.gripper.max_width_mm
         if found.recipe.expected_width.smallest_mm >= widest_mm:
-            return f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm"
+            return verbatim(f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm")
         try:
             self._service.pacing.expected(found.recipe)
         except BadInputError as error:
-            return str(error)
+            return message_of(error)
         self.recipe_changing = True
         try:
             await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
@@ -195,24 +198,28 @@ class PlcCommands:
         finally:
             self.recipe_changing = False
         if not kept:
-            return f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
-        return ""
+            return verbatim(
+                f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
+            )
+        return None
 
-    async def stop(self) -> str:
+    async def stop(self) -> Message | None:
         """Accept no trigger until the next reset, also over a restart; the fruit under way is inspected to its end.
 
         Returns:
-            Why the stop is not complete; empty if it is.
+            Why the stop is not complete; None if it is.
         """
         service = self._service
         service.stop_wanted = True
         kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
-            service.conductor.post(Event.STOP, "a person stops the station at the panel")
+            service.conductor.post(Event.STOP, verbatim("a person stops the station at the panel"))
         reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
         if reached not in WAITING:
-            return "the station was started again meanwhile"
-        return "" if kept else "the station stands, but its next start forgets that: the home folder cannot be written"
+            return verbatim("the station was started again meanwhile")
+        if kept:
+            return None
+        return verbatim("the station stands, but its next start forgets that: the home folder cannot be written")
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Recover the arm after a stop that a person has checked; the station continues after a reset.
@@ -221,65 +228,67 @@ class PlcCommands:
             by: name and role of who gave it.
         """
         if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
-            return CommandDone(done=False, why="an inspection is under way")
+            return CommandDone(done=False, why=verbatim("an inspection is under way"))
         log.info("a person at the cell asks for: %s", request.what)
         try:
             await self._devices.recover(request.what)
-            why = ""
+            why = None
         except ArmFault as fault:
-            why = str(fault)
+            why = message_of(fault)
         self._audit.log_command(by[0], "recover", request.what, why, by[1])
-        return CommandDone(done=not why, why=why)
+        return CommandDone(done=why is None, why=why)
 
-    async def _call_off(self) -> str:
+    async def _call_off(self) -> Message | None:
         service = self._service
         if service.state not in UNJUDGED:
             busy = STATES[service.state].refusal is Refusal.BUSY
-            return "the inspection is already judged" if busy else ""
-        service.conductor.post(Event.CALLED_OFF, "the PLC called the inspection off")
+            return verbatim("the inspection is already judged") if busy else None
+        service.conductor.post(Event.CALLED_OFF, verbatim("the PLC called the inspection off"))
         await service.conductor.until(lambda state: state not in UNJUDGED)
-        return ""
+        return None
 
-    def reset_refusal(self) -> str:
-        """Return why a reset would do nothing now; empty if it would work."""
+    def reset_refusal(self) -> Message | None:
+        """Return why a reset would do nothing now; None if it would work."""
         if self._service.stop_requested:
-            return "the station is told to end"
+            return verbatim("the station is told to end")
         if stop := self._devices.active_stop:
             why = str(stop).removesuffix(".")
-            return f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
+            return verbatim(
+                f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
+            )
         busy = STATES[self._service.state].refusal is Refusal.BUSY
-        return "an inspection is under way; call it off first" if busy else ""
+        return verbatim("an inspection is under way; call it off first") if busy else None
 
-    async def _reset(self) -> str:
+    async def _reset(self) -> Message | None:
         service, state = self._service, self._service.state
         if why_not := self.reset_refusal():
             return why_not
         service.stop_wanted = False
         await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
         if state in {State.IDLE, State.RETREATING_READY}:
-            return ""
+            return None
         service.reset_wanted = True
         self._devices.confirmed_clear = True
         if state is State.LATCHED:
-            service.conductor.post(Event.PERSON_CONFIRMED, "reset")
+            service.conductor.post(Event.PERSON_CONFIRMED, verbatim("reset"))
         elif state is State.STOPPED:
             service.conductor.post(Event.RESET)
         else:
             try:
                 await self._devices.restart_program()
             except ArmFault as fault:
-                return str(fault)
+                return message_of(fault)
             if state is State.CARRIED:
-                service.conductor.post(Event.PERSON_CONFIRMED, "reset")
+                service.conductor.post(Event.PERSON_CONFIRMED, verbatim("reset"))
         tried_s = time.monotonic()
         reached = await service.conductor.until(
             lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
         )
         if reached is not State.IDLE:
-            return self._sentence()
+            return self._activity()
         service.alarms.reset()
-        return ""
+        return None
 
-    def _sentence(self) -> str:
+    def _activity(self) -> Message:
         faults = list(self._devices.faults.values())
-        return str(faults[0]) if faults else STATES[self._service.state].sentence
+        return message_of(faults[0]) if faults else verbatim(STATES[self._service.state].sentence)

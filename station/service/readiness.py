@@ -2,6 +2,7 @@
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
+from station.messages.message import Message, message_of, verbatim
 from station.service.active_calibration import ActiveCalibration
 from station.service.active_recipes import ActiveRecipes
 from station.service.device_manager import DeviceManager
@@ -41,33 +42,33 @@ class Interlock:
         self._service, self._devices, self._plc_commands = service, devices, plc_commands
         self._recipes, self._liveness = recipes, liveness
 
-    def refusal(self) -> tuple[Refusal | None, str]:
-        """Return why no trigger is accepted, for the PLC and for a person; None and empty if one is."""
+    def refusal(self) -> tuple[Refusal | None, Message | None]:
+        """Return why no trigger is accepted, for the PLC and for a person; both None if one is."""
         service, facts = self._service, STATES[self._service.state]
         if service.stop_requested:
-            return Refusal.NOT_READY, "The station is told to end; start it again."
+            return Refusal.NOT_READY, verbatim("The station is told to end; start it again.")
         if facts.refusal is not None:
-            return facts.refusal, self._trouble() or facts.sentence
+            return facts.refusal, self._trouble() or verbatim(facts.sentence)
         if service.stop_wanted:
-            return Refusal.NOT_READY, "A person has stopped the station at the panel; start it there."
+            return Refusal.NOT_READY, verbatim("A person has stopped the station at the panel; start it there.")
         return self._idle_refusal()
 
-    def _idle_refusal(self) -> tuple[Refusal | None, str]:
+    def _idle_refusal(self) -> tuple[Refusal | None, Message | None]:
         service = self._service
         if stuck := self._liveness.stuck():
             names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
-            return Refusal.NOT_READY, f"No progress of {names}: restart the station if it stays."
+            return Refusal.NOT_READY, verbatim(f"No progress of {names}: restart the station if it stays.")
         if self._plc_commands.recipe_changing:
-            return Refusal.RECIPE_CHANGING, "The recipe is being changed; wait a moment."
+            return Refusal.RECIPE_CHANGING, verbatim("The recipe is being changed; wait a moment.")
         if service.active is None:
             numbers = ", ".join(map(str, self._recipes.numbers)) or "none: see `station recipes check`"
             why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
-            return Refusal.NOT_READY, f"{why}No recipe is active: choose one by its number ({numbers})."
+            return Refusal.NOT_READY, verbatim(f"{why}No recipe is active: choose one by its number ({numbers}).")
         if why := self._calibrated.refusal():
             return Refusal.NOT_READY, why
         if self._plc_commands.mode != PRODUCTION:
-            return Refusal.NOT_READY, "The station is not in production mode: set mode 1."
-        return None, ""
+            return Refusal.NOT_READY, verbatim("The station is not in production mode: set mode 1.")
+        return None, None
 
     def state(self) -> StationState:
         """Return the whole state, as the PLC interface gets it with every beat."""
@@ -102,8 +103,8 @@ class Interlock:
                 name,
                 "ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
                 watch.age_s,
-                "" if watch.fault is None else str(watch.fault),
-                "" if watch.fault is None else "see the detail, and `station devices check`",
+                None if watch.fault is None else message_of(watch.fault),
+                None if watch.fault is None else verbatim("see the detail, and `station devices check`"),
             )
             for name, watch in self._devices.monitors.items()
         ]
@@ -113,23 +114,27 @@ class Interlock:
         fault, status = self._service.registry.fault, self._service.registry.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
-        return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
+        return Dependency("records", "fault", status.last_write_age_s, verbatim(fault.cause), verbatim(fault.remedy))
 
     def _line(self) -> Dependency:
         age_s = self._plc_commands.line_age_s
         if age_s is None:
             return Dependency(
-                "plc", "unknown", None, "the PLC interface has not asked yet", "start it: station plc run"
+                "plc",
+                "unknown",
+                None,
+                verbatim("the PLC interface has not asked yet"),
+                verbatim("start it: station plc run"),
             )
         if trouble := self._plc_commands.line_fault():
-            return Dependency("plc", "fault", age_s, trouble, "see the detail")
+            return Dependency("plc", "fault", age_s, trouble, verbatim("see the detail"))
         return Dependency("plc", "ok", age_s)
 
-    def _trouble(self) -> str:
+    def _trouble(self) -> Message | None:
         if self._service.state not in _DEVICES_DECIDE:
-            return ""
+            return None
         faults = [
             *self._devices.faults.values(),
             *([self._service.registry.fault] if self._service.registry.fault else []),
         ]
-        return str(faults[0]) if faults else ""
+        return message_of(faults[0]) if faults else None

@@ -11,6 +11,7 @@ from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.states import STATES, State
+from station.messages.message import Message, message_of, verbatim
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
@@ -136,7 +137,9 @@ class Service:
             self.on_published(outcome)
         running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
-            self.conductor.post(Event.CALLED_OFF, "the PLC was given another outcome for this fruit meanwhile")
+            self.conductor.post(
+                Event.CALLED_OFF, verbatim("the PLC was given another outcome for this fruit meanwhile")
+            )
 
     # Actions of the cycle: see `Performer`.
 
@@ -186,7 +189,7 @@ class Service:
         """Stop the devices where they are."""
         await self._devices.halt()
 
-    def raise_alarm(self, told: Raise, why: str) -> None:
+    def raise_alarm(self, told: Raise, why: Message | None) -> None:
         """Raise an alarm of the cycle."""
         self.alarms.raise_(told.alarm, why)
 
@@ -223,7 +226,7 @@ class Service:
         self._report_late()
         if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
-            self.conductor.post(Event.STOP, "the station is told to end")
+            self.conductor.post(Event.STOP, verbatim("the station is told to end"))
 
     def device_changed(self, fault: StationError | None) -> None:
         """Handle a monitor's report that a device's state has changed.
@@ -232,7 +235,7 @@ class Service:
             fault: from now on; None for no fault.
         """
         if fault is not None:
-            self.conductor.post(event_of(fault), str(fault))
+            self.conductor.post(event_of(fault), message_of(fault))
 
     # The actions.
 
@@ -310,7 +313,7 @@ class Service:
         if found is not None:
             self._late_in = self.state
             what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
-            why = f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed"
+            why = verbatim(f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed")
             self.conductor.post(found.event, why)
 
     async def _close_refused(self) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from station.channel.server import ChannelServer
 from station.errors import StationError
 from station.inspection.states import STATES
+from station.messages.message import verbatim
 from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
 from station.records.errors import RecordsError
@@ -140,7 +141,7 @@ class Station:
             calibrated,
             panel.hmi_fault,
             OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
-            broken=self._broken,
+            broken=verbatim(self._broken) if self._broken else None,
             reserve_mb=configuration.records.free_reserve_mb,
             longest_pause_s=settings.retry_longest_s,
         )

@@ -22,7 +22,7 @@ def test_the_nodes_are_configured_and_operational(on_bus):
         count = rig.io.encoder_count()
         assert count is not None
         assert 0 <= count.age_s <= 1.0
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
         assert rig.io.why_not_ready == ""
         assert rig.io.counters["bring_ups"] == 1
         await rig.io.start()
@@ -49,11 +49,11 @@ def test_a_node_that_is_not_right_is_named_and_taken_once_it_is(on_bus, fault, s
         rig.io.renew_health(40)
         await rig.until(lambda: said in rig.io.why_not_ready)
         assert not rig.io.ready
-        assert any(said in text for text in rig.io.faults)
+        assert any(said in text for text in rig.io.bus_faults)
         assert not rig.nodes.gate.operational
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
         assert rig.io.counters["bring_up_failures"] >= 1
 
     on_bus(scenario)
@@ -74,7 +74,7 @@ def test_a_missing_interface_is_one_sentence_and_stays_tried(on_bus):
             await rig.until(lambda: missing.counters.get("bring_up_failures", 0) >= 2)
             assert "the CAN interface socketcan nocan7 cannot be opened: " in missing.why_not_ready
             assert "; " in missing.why_not_ready
-            assert missing.faults == (missing.why_not_ready,)
+            assert missing.bus_faults == (missing.why_not_ready,)
         finally:
             await missing.stop()
 

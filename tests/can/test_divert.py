@@ -31,7 +31,7 @@ def test_shots_are_fired_at_their_counts_and_echoed_by_sequence(on_bus):
         fired = [(shot.sequence, shot.lane, shot.pulse_ms) for shot in rig.nodes.gate.fired]
         assert fired == [(70_002 % 65536, 1, 40), (70_001 % 65536, 2, 40)]
         assert rig.io.counters["shots_fired"] == 2
-        assert rig.io.faults == ()
+        assert rig.io.reject_faults == ()
 
     on_bus(scenario, pulse_ms=40)
 
@@ -61,9 +61,9 @@ def test_a_count_that_is_past_is_refused_and_nothing_is_sent(on_bus):
             await rig.io.divert(9, 1, count)
         assert raised.value.sequence == 9
         assert "shots_ordered" not in rig.io.counters
-        assert rig.io.faults == (str(raised.value),)
+        assert rig.io.reject_faults == (str(raised.value),)
         rig.io.acknowledge_faults()
-        assert rig.io.faults == ()
+        assert rig.io.reject_faults == ()
 
     on_bus(scenario)
 
@@ -88,7 +88,7 @@ def test_the_gate_itself_refuses_what_is_late_or_bad(on_bus):
         assert reports == [(1, 2), (2, 4), (3, 4)]
         assert not rig.nodes.gate.fired
         await rig.until(lambda: rig.io.counters.get("echoes_unknown") == 3)
-        assert "reports shot 1, which was not ordered" in rig.io.faults[0]
+        assert "reports shot 1, which was not ordered" in rig.io.reject_faults[0]
 
     on_bus(scenario)
 
@@ -119,7 +119,7 @@ def test_a_missing_echo_is_a_fault_with_the_sequence(on_bus):
         with pytest.raises(EchoMissingError, match="shot 8: the belt is past count"):
             await shot
         assert rig.io.counters["echoes_missing"] == 2
-        assert [text.split(":")[0] for text in rig.io.faults] == ["shot 7", "shot 8"]
+        assert [text.split(":")[0] for text in rig.io.reject_faults] == ["shot 7", "shot 8"]
 
     on_bus(scenario)
 
@@ -130,7 +130,7 @@ def test_an_echo_under_another_sequence_is_no_echo(on_bus):
         rig.faults.set("wrong")
         with pytest.raises(EchoMissingError, match="shot 20"):
             await (await rig.order(20, 400))
-        assert "the gate reports shot 21, which was not ordered" in rig.io.faults[0]
+        assert "the gate reports shot 21, which was not ordered" in rig.io.reject_faults[0]
         assert rig.io.counters["echoes_unknown"] == 1
 
     on_bus(scenario)

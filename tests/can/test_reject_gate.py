@@ -126,8 +126,9 @@ def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, o
         rig.gate.publish(outcome(9, "FAIL", rig.gate.encoder_count() + off))
         await rig.until(lambda: rig.gate.faults)
         (fault,) = rig.gate.faults
-        assert fault.startswith("CAN: shot 9: ")
-        assert why in fault
+        assert fault.part == "reject"
+        assert str(fault.what).startswith("shot 9: ")
+        assert why in str(fault.what)
         await rig.until(lambda: not rig.gate._due)
         assert fired(rig) == []
         assert rig.gate.counters["can_shots_failed"] == 1

@@ -42,7 +42,7 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         await rig.until(lambda: gate.read(0x1001) == 0)
         assert gate.output == 0
         assert not gate.fired
-        assert [text.split(" before")[0] for text in rig.io.faults] == ["shot 1: the gate was lost"]
+        assert [text.split(" before")[0] for text in rig.io.reject_faults] == ["shot 1: the gate was lost"]
 
     on_bus(scenario, safe_output=0b101)
 
@@ -83,7 +83,7 @@ def test_a_lost_node_is_named_and_found_again(on_bus, fault, name):
         await rig.until(lambda: rig.io.ready)
         assert rig.io.counters["nodes_lost"] == 1
         assert rig.io.counters["bring_ups"] == 2
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
 
     on_bus(scenario)
 
@@ -111,10 +111,12 @@ def test_a_count_that_is_not_renewed_is_unknown(on_bus):
         encoder.write(0x1800, 5, 60_000)
         await rig.until(lambda: rig.io.encoder_count() is None)
         assert "the encoder's count is not known" in rig.io.why_not_ready
-        await rig.until(lambda: any("it lost the encoder's count (emergency 0x8250" in text for text in rig.io.faults))
+        await rig.until(
+            lambda: any("it lost the encoder's count (emergency 0x8250" in text for text in rig.io.bus_faults)
+        )
         encoder.write(0x1800, 5, 10)
         encoder._due_s = 0.0  # it would only look at its timer when that is over
-        await rig.until(lambda: rig.io.ready and rig.io.faults == ())
+        await rig.until(lambda: rig.io.ready and rig.io.bus_faults == ())
         assert rig.io.counters["bring_ups"] == 1
 
     on_bus(scenario)
@@ -130,11 +132,11 @@ def test_an_emergency_is_named_and_goes_with_its_reset(on_bus):
             "look for what blocks the flap, and at its valve"
         )
         assert rig.io.why_not_ready == said
-        assert rig.io.faults == (said,)
+        assert rig.io.bus_faults == (said,)
         assert rig.io.counters["emergencies"] == 1
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
 
     on_bus(scenario)
 
@@ -174,7 +176,7 @@ def test_a_bus_that_stays_off_is_said(on_bus):
                 wire.send(off)
                 await asyncio.sleep(0.01)
             assert not rig.io.ready
-            assert any("is bus-off after too many errors" in text for text in rig.io.faults)
+            assert any("is bus-off after too many errors" in text for text in rig.io.bus_faults)
         finally:
             wire.shutdown()
         await rig.until(lambda: rig.io.ready)
@@ -235,7 +237,7 @@ def test_frames_of_no_sense_are_counted_and_change_nothing(on_bus):
         rig.run_belt()
         assert (await shot).sequence == 1
         assert rig.io.counters["bring_ups"] == brought_up
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
 
     on_bus(scenario)
 
@@ -244,7 +246,7 @@ def test_the_gate_names_an_order_of_the_wrong_length(on_bus):
     async def scenario(rig):
         await rig.ready()
         rig.io._link.send(0x210, struct.pack("<H", 3))
-        await rig.until(lambda: any("emergency 0x8210" in text for text in rig.io.faults))
+        await rig.until(lambda: any("emergency 0x8210" in text for text in rig.io.bus_faults))
         assert not rig.nodes.gate.fired
 
     on_bus(scenario)
@@ -272,7 +274,7 @@ def test_a_station_that_falls_ill_during_the_bring_up_ends_it_and_blames_nobody(
         await rig.until(lambda: rig.io._link)
         rig.io.renew_health(0)
         await rig.until(lambda: rig.io._link is None)
-        assert rig.io.faults == ()
+        assert rig.io.bus_faults == ()
         assert "bring_up_failures" not in rig.io.counters
         rig.faults.clear()
         await rig.ready()

@@ -13,9 +13,10 @@ from station.channel.panel_live import (
     Recipes,
     RecipeSummary,
 )
+from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
 
-DUE = (
+DUE = verbatim(
     "The calibration was never verified, and it is demanded: verify it with the ball; on the page Maintenance in "
     "manual mode, or by `station verify` with the station stopped."
 )
@@ -23,12 +24,12 @@ DUE = (
 
 def state(check_due):
     order = OperatorCommandView(
-        ticket=1, order=OperatorCommandName.CHOOSE_RECIPE, argument="2", state="done", why="", who="Ana",
+        ticket=1, order=OperatorCommandName.CHOOSE_RECIPE, argument="2", state="done", why=None, who="Ana",
         began_utc_ms=1, ended_utc_ms=2,
     )  # fmt: skip
     recipe = RecipeNames(number=2, name="blueberry", title="Blueberry", revision="1")
     return PanelState.model_construct(
-        boot="1", utc_ms=1, state="idle", sentence="", packml_state=None, mode=1, ready=not check_due,
+        boot="1", utc_ms=1, state="idle", activity=verbatim(""), packml_state=None, mode=1, ready=not check_due,
         why_not_ready=check_due, busy=False, needs_person=False, stopping=False, simulated=False, recipe=recipe,
         check_due=check_due, alarms=(), devices=(), orders=(order,), may=(), recoveries=(),
     )  # fmt: skip
@@ -43,7 +44,7 @@ def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypa
         return Recipes(recipes=(chosen,), active=chosen, problems=())
 
     monkeypatch.setattr(gateway, "request", answer)
-    for due in (DUE, ""):
+    for due in (DUE, None):
         gateway.state = state(due)
         status, _, body = pages("GET", path, headers={"accept-language": "de"})
         text = re.sub(r"\s+", " ", body.decode())

@@ -19,6 +19,7 @@ from station.inspection.alarms import (
     AlarmState,
 )
 from station.inspection.cycle import TABLE, Raise
+from station.messages.message import verbatim
 from station.twin.digit.server import digit_faults
 from station.twin.robotiq.faults import gripper_faults
 from station.twin.ur.controller import arm_faults
@@ -42,7 +43,7 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
 
 
 def test_an_alarm_beyond_the_words_bits_is_the_error_code_and_no_bit():
-    alarms = Alarms().raise_(AlarmId.OUTBOX_BEHIND, 1.0, "")
+    alarms = Alarms().raise_(AlarmId.OUTBOX_BEHIND, 1.0, None)
     assert (alarms.word, alarms.error_code) == (0, ALARMS[AlarmId.OUTBOX_BEHIND].number)
 
 
@@ -60,10 +61,10 @@ def test_the_cycle_raises_alarms_that_a_person_must_end_only_where_one_is_needed
 
 
 def test_the_common_life():
-    alarms = Alarms().raise_(LOW, 10.0, "2 GB left")
+    alarms = Alarms().raise_(LOW, 10.0, verbatim("2 GB left"))
     assert (alarms.get(LOW).state, alarms.get(LOW).since_s) == (AlarmState.UNACKNOWLEDGED, 10.0)
-    assert alarms.raise_(LOW, 20.0, "1 GB left").get(LOW).since_s == 10.0
-    assert alarms.raise_(LOW, 20.0, "1 GB left").get(LOW).detail == "1 GB left"
+    assert alarms.raise_(LOW, 20.0, verbatim("1 GB left")).get(LOW).since_s == 10.0
+    assert alarms.raise_(LOW, 20.0, verbatim("1 GB left")).get(LOW).detail == verbatim("1 GB left")
     returned = alarms.returned(LOW, 30.0)
     assert returned.get(LOW).state == AlarmState.RETURNED
     assert [alarm.id for alarm in returned.shown()] == [LOW]
@@ -73,7 +74,7 @@ def test_the_common_life():
 
 
 def test_a_latched_alarm_stands_until_a_person_resets_it():
-    stopped = Alarms().raise_(STOP, 1.0, "joint 3")
+    stopped = Alarms().raise_(STOP, 1.0, verbatim("joint 3"))
     assert stopped.reset(STOP) == stopped
     assert stopped.shelve(STOP, 1.0, 60.0, "anna") == stopped
     gone = stopped.acknowledge(STOP).returned(STOP, 2.0)
@@ -81,17 +82,17 @@ def test_a_latched_alarm_stands_until_a_person_resets_it():
     assert gone.word == 0b10
     assert gone.acknowledge_returned().tick(1e6).word == 0b10
     assert gone.reset(STOP).word == 0
-    assert gone.raise_(STOP, 3.0, "again").get(STOP).state == AlarmState.UNACKNOWLEDGED
+    assert gone.raise_(STOP, 3.0, verbatim("again")).get(STOP).state == AlarmState.UNACKNOWLEDGED
 
 
 def test_shelving_hides_for_a_time_and_no_longer():
-    shelved = Alarms().raise_(LOW, 0.0, "").shelve(LOW, 10.0, 600.0, "anna")
+    shelved = Alarms().raise_(LOW, 0.0, None).shelve(LOW, 10.0, 600.0, "anna")
     assert (shelved.get(LOW).state, shelved.get(LOW).shelved_by) == (AlarmState.SHELVED, "anna")
     assert (shelved.shown(), shelved.word, shelved.error_code) == ((), 0, 0)
     assert shelved.tick(609.0).shown() == ()
     back = shelved.tick(611.0).get(LOW)
     assert (back.state, back.shelved_until_s, back.shelved_by) == (AlarmState.UNACKNOWLEDGED, None, "")
-    long = Alarms().raise_(LOW, 0.0, "").shelve(LOW, 0.0, 1e9, "anna").get(LOW)
+    long = Alarms().raise_(LOW, 0.0, None).shelve(LOW, 0.0, 1e9, "anna").get(LOW)
     assert long.shelved_until_s == LONGEST_SHELVED_S
     # A clock set back by days shows it again instead of hiding it for days.
     assert shelved.tick(-1e6).get(LOW).state == AlarmState.UNACKNOWLEDGED
@@ -101,7 +102,7 @@ def test_shelving_hides_for_a_time_and_no_longer():
 def test_a_chattering_alarm_is_told_once_and_counted():
     alarms = Alarms()
     for second in range(10):
-        alarms = alarms.raise_(LOW, second, "").tick(second).acknowledge(LOW).returned(LOW, second + 0.5)
+        alarms = alarms.raise_(LOW, second, None).tick(second).acknowledge(LOW).returned(LOW, second + 0.5)
     chattering = alarms.get(LOW)
     assert (chattering.state, chattering.raised, chattering.since_s) == (AlarmState.ACKNOWLEDGED, 10, 2.0)
     assert alarms.tick(9.5 + CHATTER_S - 1).get(LOW).state == AlarmState.ACKNOWLEDGED
@@ -111,7 +112,7 @@ def test_a_chattering_alarm_is_told_once_and_counted():
 def test_the_most_urgent_comes_first_then_the_oldest():
     alarms = Alarms()
     for second, alarm in enumerate((LOW, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, STOP)):
-        alarms = alarms.raise_(alarm, float(second), "")
+        alarms = alarms.raise_(alarm, float(second), None)
     assert [a.id for a in alarms.shown()] == [STOP, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, LOW]
     assert alarms.error_code == ALARMS[STOP].number
     assert alarms.word == sum(
@@ -148,7 +149,7 @@ def played(steps):
     for event, alarm, later in steps:
         now += later
         if event == AlarmEvent.RAISED:
-            alarms = alarms.raise_(alarm, now, "seen")
+            alarms = alarms.raise_(alarm, now, verbatim("seen"))
             causes.add(alarm)
         elif event == AlarmEvent.RETURNED:
             alarms = alarms.returned(alarm, now)
@@ -190,7 +191,7 @@ def test_a_restart_remembers_them_all(steps):
 
 
 def test_what_was_remembered_by_another_version_is_left_out():
-    good = Alarms().raise_(LOW, 5.0, "x")
+    good = Alarms().raise_(LOW, 5.0, verbatim("x"))
     rows = [
         *good.to_data(),
         {"id": "no_such_alarm", "state": "unacknowledged"},

@@ -11,16 +11,17 @@ import urllib.request
 
 import pytest
 
+from station.messages.message import verbatim
 from station.service.health import Dependency, HealthServer, Liveness, Readiness
 from station.supervision.serving import AddressError
 
 NOT_READY = Readiness(
     ready=False,
-    why="the camera does not answer; plug it in",
+    why=verbatim("the camera does not answer; plug it in"),
     dependencies=(
         Dependency("arm", "ok", 0.1),
-        Dependency("camera", "fault", 4.2, "no frame", "plug it in"),
-        Dependency("plc", "unknown", None, "never heard", "start it"),
+        Dependency("camera", "fault", 4.2, verbatim("no frame"), verbatim("plug it in")),
+        Dependency("plc", "unknown", None, verbatim("never heard"), verbatim("start it")),
     ),
 )
 
@@ -84,16 +85,18 @@ def test_not_ready_is_503_with_each_dependencys_remedy(served, readiness):
     ((status, content_type, body),) = served(("/readyz",))
     assert (status, content_type) == (503, "application/json")
     said = json.loads(body)
-    assert said["why"] == NOT_READY.why
+    assert said["why"] == str(NOT_READY.why)
     assert said["dependencies"][1] == {
         "name": "camera",
         "state": "fault",
         "age_s": 4.2,
         "detail": "no frame",
+        "detail_message": {"id": "text.verbatim", "parameters": {"text": "no frame"}},
         "remedy": "plug it in",
+        "remedy_message": {"id": "text.verbatim", "parameters": {"text": "plug it in"}},
     }
     assert said["dependencies"][2]["age_s"] is None
-    readiness[0] = Readiness(ready=True, why="", dependencies=())
+    readiness[0] = Readiness(ready=True, why=None, dependencies=())
     assert served(("/readyz",))[0][0] == 200
 
 

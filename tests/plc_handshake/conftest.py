@@ -75,7 +75,7 @@ class ScriptedStation:
         self.deadline_s = 60.0
         self.command_gate = asyncio.Event()
         self.command_gate.set()
-        self.command_done = CommandDone(done=True, why="")
+        self.command_done = CommandDone(done=True, why=None)
         self.deaf = False
         self._task: asyncio.Task[None] | None = None
 
@@ -167,7 +167,7 @@ class ScriptedStation:
             boot=f"boot {self.boots}",
             healthy=self.healthy,
             ready=self.running is None,
-            why_not_ready="",
+            why_not_ready=None,
             packml_state=PackmlState.EXECUTE,
             mode=1,
             recipe_number=3,
@@ -397,7 +397,7 @@ class Bench:
             boot="1",
             healthy=True,
             ready=True,
-            why_not_ready="",
+            why_not_ready=None,
             packml_state=None,
             mode=1,
             recipe_number=0,

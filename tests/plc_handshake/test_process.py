@@ -8,6 +8,7 @@ import pytest
 
 from plc_interface.handshake.view import STATION_LOST_CODE, lot_checksum
 from station.channel.line import CommandDone, Reason, Refusal
+from station.messages.message import verbatim
 
 
 @pytest.mark.parametrize("order", ["high_first", "low_first"])
@@ -137,7 +138,8 @@ def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventual
             await plc.set("enable")
             await eventually(lambda: station.lines[-1].faults)
             (fault,) = station.lines[-1].faults
-            assert fault.startswith("CAN: the CAN interface socketcan nocan7 cannot be opened")
+            assert fault.part == "can"
+            assert str(fault.what).startswith("the CAN interface socketcan nocan7 cannot be opened")
             seen = await plc.trigger(1)
             assert (seen["last_refusal"], "trigger_ready" in seen["status"]) == ("not_ready", False)
             assert station.begun == {}
@@ -191,7 +193,9 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually):
             await plc.wait("lot_latched")
             await plc.wait(without="lot_latched")
             await eventually(lambda: len(station.lines[-1].faults) == 4)
-            assert {fault.split(":")[0].split(" did not take its ")[1] for fault in station.lines[-1].faults} == {
+            assert {
+                str(fault.what).split(":")[0].split(" did not take its ")[1] for fault in station.lines[-1].faults
+            } == {
                 "trigger bit back",
                 "acknowledge bit back",
                 "execute bit back",
@@ -357,7 +361,7 @@ def test_commands_are_carried_out_once(cell):
             assert "command_done" in (await order(1, 7, 1))["status"]
             assert "command_done" in (await order(1, 7, 1))["status"]
             assert [(c.command, c.argument) for c in station.commands] == [("change_recipe", 7)]
-            station.command_done = CommandDone(done=False, why="no recipe has this number")
+            station.command_done = CommandDone(done=False, why=verbatim("no recipe has this number"))
             assert (await order(1, 9, 2))["command_result"] == "failed"
             assert (await order(0, 0, 3))["command_result"] == "no_command"
             station.command_gate.clear()

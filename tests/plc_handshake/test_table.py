@@ -11,7 +11,8 @@ from plc_interface.handshake.state import Fault
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.view import line, result_values, view
 from plc_interface.register_map import BY_NAME
-from station.channel.line import BeginReply, Open, Reason, Refusal
+from station.channel.line import BeginReply, LineFault, Open, Reason, Refusal
+from station.messages.message import verbatim
 
 
 def test_every_signal_and_every_mode_has_its_row():
@@ -377,13 +378,16 @@ def test_counters_wrap_round(bench):
     assert made.state.counters["count_missed"] == 0
 
 
+GATE_LOST = LineFault(part="can", what=verbatim("the gate is lost"))
+
+
 def test_the_station_is_told_of_the_line(bench):
     made = bench()
     made.armed()
-    told = line(made.state, {"count_bad_requests": 3}, ("the gate is lost",))
+    told = line(made.state, {"count_bad_requests": 3}, (GATE_LOST,))
     assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
     assert told.counters["count_bad_requests"] == 3
-    assert told.faults == ("the gate is lost",)
+    assert told.faults == (GATE_LOST,)
 
 
 def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):

@@ -77,7 +77,7 @@ class Rig:
             events.Beat(
                 now(),
                 StationState(
-                    boot="one", healthy=True, ready=True, why_not_ready="", packml_state=PackmlState.EXECUTE, mode=1,
+                    boot="one", healthy=True, ready=True, why_not_ready=None, packml_state=PackmlState.EXECUTE, mode=1,
                     recipe_number=3, recipe_checksum=0xCAFE, error_code=0, alarms=0, simulated=True,
                 ),
             )

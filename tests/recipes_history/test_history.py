@@ -66,14 +66,14 @@ def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
     book.refresh()
     assert limit(book) == (112.0, "1")
     (problem,) = book.problems
-    assert f"strawberry.yaml is an unapproved draft ({LIMIT}: 112.0 → 117.0); revision 1 stays in force" in problem
+    assert f"strawberry.yaml is an unapproved draft ({LIMIT}: 112.0 → 117.0); revision 1 stays in force" in str(problem)
     assert [entry.action for entry in book.noticed] == ["recipe.file_noticed"]
     assert "strawberry: revision 1 in force" in station("recipes", "list")[1]
     assert station("recipes", "diff", "strawberry")[1] == f"{LIMIT}: 112.0 → 117.0\n"
     file.write_text("name: [")
     book.refresh()
     assert limit(book) == (112.0, "1")
-    assert "strawberry.yaml:1: file: expected valid YAML" in "".join(book.problems)
+    assert "strawberry.yaml:1: file: expected valid YAML" in "".join(map(str, book.problems))
 
 
 def test_a_bad_edit_leaves_the_file_as_it_was(begun, station, site):
@@ -181,7 +181,7 @@ def test_what_was_in_force_stays_so_without_the_database(begun, does, site, home
     shutil.rmtree(home / "records")
     book = book_of(site, home)
     assert limit(book) == (112.0, "1"), "a lost one: the hand edit does not slip in"
-    assert any("unapproved draft" in problem for problem in book.problems)
+    assert any("unapproved draft" in str(problem) for problem in book.problems)
 
 
 def test_a_full_or_read_only_disk_changes_nothing(begun, station, does, tmp_path, site, home, monkeypatch):

@@ -136,7 +136,7 @@ def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the
             await cell.line.ready()
             cell.twin.boards["gripper"].set("under_voltage")
             await until(lambda: AlarmId.GRIPPER_FAULT in active(cell))
-            assert "supply is too low" in cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail
+            assert "supply is too low" in str(cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail)
             cell.twin.boards["gripper"].clear()
             cell.twin.world.remove()
             done = await cell.line.order(CommandName.RESET)
@@ -157,7 +157,7 @@ def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
             await until(lambda: AlarmId.EMERGENCY_STOP in active(cell))
             refused = await cell.line.order(CommandName.RESET)
             assert not refused.done
-            assert "release the button" in refused.why
+            assert "release the button" in str(refused.why)
             cell.twin.boards["gripper"].clear()
             await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
             assert AlarmId.EMERGENCY_STOP in active(cell)  # latched

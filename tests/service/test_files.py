@@ -42,7 +42,7 @@ def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_
     later.read()
     assert later.numbers == (1, 2)
     assert later.restored() == (blueberry, "LOT 1")
-    assert any("blueberry.yaml" in problem for problem in later.problems)
+    assert any("blueberry.yaml" in str(problem) for problem in later.problems)
 
 
 def test_a_checksum_is_that_of_the_recipe_and_of_nothing_else(settings_file, tmp_path):

@@ -57,13 +57,13 @@ def test_the_life_of_triggers_and_commands(bench):
 
             unknown = await line.order(CommandName.CHANGE_RECIPE, 77)
             assert not unknown.done
-            assert "expected one of 1, 2, 3" in unknown.why
+            assert "expected one of 1, 2, 3" in str(unknown.why)
             assert not (await line.order(CommandName.SET_MODE, 4)).done
             assert (await line.order(CommandName.SET_MODE, 2)).done
             await cell.reach(State.IDLE)
             state = await line.state()
             assert not state.ready
-            assert "mode 1" in state.why_not_ready
+            assert "mode 1" in str(state.why_not_ready)
             assert (await line.begin(12)).refusal is Refusal.NOT_READY
             assert (await line.order(CommandName.SET_MODE, 1)).done
             assert (await line.ready()).mode == 1

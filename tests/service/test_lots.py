@@ -50,7 +50,7 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
             await asyncio.to_thread(cell.station.recipes.refresh)
             await cell.line.ready()
             assert (await begin(cell, 901, "LOT 3")).refusal is Refusal.NOT_READY
-            why = (await cell.line.state()).why_not_ready
+            why = str((await cell.line.state()).why_not_ready)
             assert "Lot LOT 3 cannot begin: recipe blueberry with the PLC's number 2 is no longer in force" in why
             assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
             return records_folder(home)

@@ -40,8 +40,8 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             assert BY_NAME["last_refusal"].codes[shown["last_refusal"]].name == "not_ready"
             assert shown["accepted_trigger_id"] != 7
             state = await cell.line.state()
-            assert "calibrate it with the ball on the page Maintenance" in state.why_not_ready
-            assert "`station calibrate`" in state.why_not_ready
+            assert "calibrate it with the ball on the page Maintenance" in str(state.why_not_ready)
+            assert "`station calibrate`" in str(state.why_not_ready)
             assert sum((await cell.station.service.registry.records.totals()).values()) == 0, (
                 "nothing was begun or lost"
             )

@@ -58,7 +58,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                     await asyncio.sleep(0.05)
             state = await line.state()
             assert (state.ready, state.packml_state) == (False, PackmlState.HELD)
-            assert "take it out" in state.why_not_ready
+            assert "take it out" in str(state.why_not_ready)
             cell.twin.boards["gripper"].clear()
             cell.twin.world.remove()
             await asyncio.sleep(1.0)
@@ -88,7 +88,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                 faults.clear("link_cut")
                 while AlarmId.ARM_NOT_REMOTE not in active(cell):
                     await asyncio.sleep(0.05)
-            assert "claim registers" in cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail
+            assert "claim registers" in str(cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail)
             faults.clear()
             done = await line.client.request(Recover(what="program"), CommandDone, deadline_s=60)
             assert done.done, done.why
@@ -111,7 +111,7 @@ def test_without_automatic_reset_a_station_waits_for_an_order_after_every_fault(
             await asyncio.sleep(1.0)
             state = await line.state()
             assert (state.ready, state.packml_state) == (False, PackmlState.STOPPED)
-            assert "reset it" in state.why_not_ready
+            assert "reset it" in str(state.why_not_ready)
             done = await line.order(CommandName.RESET)
             assert done.done, done.why
             assert (await line.ready()).packml_state is PackmlState.IDLE
@@ -135,7 +135,7 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
                         await asyncio.sleep(0.05)
                 state = await line.state()
                 assert not state.ready
-                assert "records" in state.why_not_ready
+                assert "records" in str(state.why_not_ready)
                 assert not asked.done(), "what is not durable is not told"
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -82,7 +82,7 @@ class Station:
             boot=f"boot {self.boots}",
             healthy=True,
             ready=self.running is None,
-            why_not_ready="",
+            why_not_ready=None,
             packml_state=PackmlState.EXECUTE,
             mode=1,
             recipe_number=RECIPE,
