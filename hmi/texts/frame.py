@@ -1,17 +1,17 @@
 """Texts of the frame around every page."""
 
-from hmi.texts.text import define
+from hmi.texts.text import define, define_plural
 
 define("frame.title", "Fruit station")
 define("frame.skip", "To the content")
 define("frame.navigation", "Pages")
 define("frame.no_alarm", "No alarms")
 define("frame.unknown", "The station has not answered yet")
-define("frame.more_alarms", "and {n} more")
+define_plural("frame.more_alarms", "and {n} more", "and {n} more", "n")
 define("frame.alarms", "Alarms")
 define("frame.unacknowledged", "not acknowledged")
-define("frame.stale", "No data for {age} s. What is shown is old, from {clock}.")
-define("frame.never", "The station does not answer. The page goes on by itself as soon as it does.")
+define("frame.stale", "No data for {age} s. The page shows old data, from {clock}.")
+define("frame.never", "The station does not answer. The page continues automatically when it does.")
 define("frame.simulated", "Simulated")
 define("frame.ready", "Ready")
 define("frame.not_ready", "Not ready")

@@ -5,12 +5,11 @@ from hmi.texts.text import define
 define("people.first", "First start")
 define(
     "people.first_text",
-    "Nobody can log in yet. Choose who is the administrator, and a PIN that only this person knows. There is no "
-    "other way in.",
+    "Nobody can log in yet. Choose the administrator and a PIN that only this person knows. There is no other access.",
 )
 define("people.only_here", "The administrator's PIN can be chosen only at the station's own screen.")
-define("people.begun", "An administrator was chosen already. Log in.")
-define("people.broken", "The people's file cannot be read: {detail}")
+define("people.begun", "An administrator was already chosen. Log in.")
+define("people.broken", "The file of people cannot be read: {detail}")
 define("people.broken_title", "Nobody can log in")
 define("people.log_in", "Log in")
 define("people.who", "Who are you?")
@@ -18,7 +17,7 @@ define("people.name", "Name")
 define("people.role", "Role")
 define("people.pin", "PIN")
 define("people.new_pin", "New PIN, at least {n} digits")
-define("people.old_pin", "PIN so far")
+define("people.old_pin", "Current PIN")
 define("people.their_pin", "Their PIN")
 define("people.pin_again", "The same PIN again")
 define("people.own_pin", "Change my PIN")
@@ -30,20 +29,20 @@ define("people.save", "Save")
 define("people.add", "Add or change a person")
 define(
     "people.add_text",
-    "The name of a person who is there already changes that person. An operator's PIN has at least {few} digits, "
-    "all others' at least {more}.",
+    "If the name exists already, this person is changed. An operator's PIN has at least {few} digits, all others'"
+    " at least {more}.",
 )
 define("people.remove", "Remove")
 define("people.everybody", "People")
 define("people.clean", "Lock for cleaning")
-define("people.cleaning", "Locked for cleaning. The screen takes no touches.")
-define("people.wrong_pin", "That is not the PIN.")
+define("people.cleaning", "Locked for cleaning. The screen does not react to touch.")
+define("people.wrong_pin", "Wrong PIN.")
 define("people.wait", "Too many wrong PINs. Try again in {detail} s.")
-define("people.pin_length", "A PIN has at least {detail} digits, and 12 at most.")
-define("people.pin_simple", "This PIN is too easy to guess. Choose one whose digits neither repeat nor count.")
-define("people.pin_differs", "The two PINs differ. Type them again.")
-define("people.bad_name", "A name has 1 to 40 letters, without blanks around it.")
+define("people.pin_length", "A PIN has {detail} to 12 digits.")
+define("people.pin_simple", "This PIN is too easy to guess. Do not use repeated or consecutive digits.")
+define("people.pin_differs", "The two PINs are different. Type them again.")
+define("people.bad_name", "A name has 1 to 40 characters, without spaces at the ends.")
 define("people.bad_role", "A viewer needs no PIN.")
-define("people.last_admin", "One administrator has to be left.")
+define("people.last_admin", "At least one administrator must remain.")
 define("people.too_many", "There are too many people. Remove some.")
 define("people.not_written", "It could not be saved: {detail}")

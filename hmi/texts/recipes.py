@@ -2,15 +2,12 @@
 
 from hmi.texts.text import define
 
-define(
-    "recipes.shipped",
-    "These recipes come with the software and are not edited in place. How to get recipes of one's own",
-)
+define("recipes.shipped", "These recipes come with the software and cannot be edited here. How to make your own")
 define("recipes.shipped_copy", "On the station's machine, as its user:")
 define("recipes.shipped_name", "In station.yaml:")
 define(
     "recipes.shipped_start",
-    "Start the station again. What is in force stays so; from then on each recipe can be edited here.",
+    "Restart the station. The recipes in force stay in force; afterwards each recipe can be edited here.",
 )
 define("recipes.number", "PLC number {n}")
 define("recipes.in_force", "Revision {n} in force")
@@ -21,18 +18,18 @@ define("recipes.file_broken", "File cannot be read")
 define("recipes.file_missing", "File is missing")
 define(
     "recipes.file_draft_long",
-    "The file was edited and is not what is in force. Submit it for approval, or put it back.",
+    "The file was edited and differs from the recipe in force. Submit it for approval, or restore it.",
 )
 define("recipes.import", "Import a file")
 define("recipes.import_now", "Import as a draft")
 define("recipes.file", "Recipe file (.yaml)")
 define("recipes.reason", "Reason, for the audit trail")
-define("recipes.tab_standing", "Standing")
+define("recipes.tab_standing", "Status")
 define("recipes.tab_edit", "Edit")
 define("recipes.tab_history", "History")
 define("recipes.tab_text", "File")
 define("recipes.changes", "What would change")
-define("recipes.no_changes", "Nothing differs from what is in force.")
+define("recipes.no_changes", "No difference from the recipe in force.")
 define("recipes.value", "Value")
 define("recipes.old", "In force")
 define("recipes.new", "Draft")
@@ -41,9 +38,9 @@ define("recipes.own_draft", "This is your own draft: another person has to appro
 define("recipes.approve", "Approve")
 define("recipes.reject", "Reject")
 define("recipes.submit", "Submit for approval")
-define("recipes.revert", "Put the file back")
-define("recipes.revert_to", "Put revision {n} back into the file")
-define("recipes.whatif", "What would it have done?")
+define("recipes.revert", "Restore the file")
+define("recipes.revert_to", "Restore revision {n} in the file")
+define("recipes.whatif", "What would it have decided?")
 define("recipes.whatif_last", "Last fruit")
 define("recipes.log_in", "To change a recipe, log in as quality.")
 define("recipes.bad_field", "{field}: expected {expected}")
@@ -58,5 +55,5 @@ define("recipes.origin_shipped", "Shipped by")
 define("recipes.origin_adopted", "Adopted by")
 define("recipes.approved_by", "Approved by")
 define("recipes.retired_by", "Retired by")
-define("recipes.no_history", "There is no history yet.")
+define("recipes.no_history", "No history yet.")
 define("recipes.export", "Export")
