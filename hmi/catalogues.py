@@ -106,7 +106,7 @@ def findings(language: Language) -> Iterator[Finding]:
     for file, texts in sources().items():
         path = FOLDER / language / file
         entries = _entries(path, language)
-        for key in texts.keys() | entries.keys():
+        for key in dict.fromkeys((*texts, *entries)):
             if what := _wrong(texts.get(key), entries.get(key)):
                 yield Finding(path, key, what)
     for path in _orphans(language):

@@ -122,7 +122,7 @@ def _chooser(language: Language, known: Mapping[str, tuple[str, ...]]) -> Callab
         forms = known.get(definition.id)
         if not forms:
             return ENGLISH.form(definition, count)
-        return forms[min(rule(int(count)), len(forms) - 1)] if count == int(count) else forms[-1]
+        return forms[min(rule(int(count)), len(forms) - 1)] if float(count).is_integer() else forms[-1]
 
     return form
 
@@ -195,9 +195,9 @@ class Locale:
 
     def _translated(self, english: str) -> str | None:
         for key, pattern in sentence_patterns():
-            if (found := pattern.fullmatch(english)) is not None:
-                values = {name: self._value(value) for name, value in found.groupdict().items()}
-                return catalogue(self.language)[key].format(**values)
+            text = catalogue(self.language).get(key)
+            if text is not None and (found := pattern.fullmatch(english)) is not None:
+                return text.format(**{name: self._value(value) for name, value in found.groupdict().items()})
         return None
 
     def _value(self, text: str) -> str:
@@ -235,7 +235,7 @@ class Locale:
 
     @staticmethod
     def clock(utc_ms: int) -> str:
-        """Format a time of day, in the machine's zone."""
+        """Format a time of day, of 24 hours in every language, in the machine's zone."""
         return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime("%H:%M:%S")
 
     def day(self, utc_ms: int) -> str:
