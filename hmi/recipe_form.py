@@ -61,9 +61,7 @@ def groups(values: Mapping[str, Any]) -> list[Group]:
             gathered.setdefault(_group(path), []).append(_field(root, path, value))
     made = []
     for path, fields in gathered.items():
-        node = find(root, path) or {}
-        title, description = (node.get("title", ""), node.get("description", "")) if path else ("General", "")
-        made.append(Group(dotted(path), _key(path), title, description, tuple(fields)))
+        made.append(Group(dotted(path), _key(path), *_texts(root, path), tuple(fields)))
     return made
 
 
@@ -159,11 +157,11 @@ def dotted(path: Path) -> str:
     return text.removeprefix(".")
 
 
-def field_keys() -> list[str]:
-    """Return the catalogue's keys of all fields and groups of a recipe."""
+def field_texts() -> dict[str, tuple[str, str]]:
+    """Return the English titles and descriptions of all fields and groups of a recipe, by the catalogue's keys."""
     root = schema_of(Recipe)
-    paths = [path for path, _ in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
-    return list(dict.fromkeys([*map(_key, paths), *(_key(_group(path)) for path in paths)]))
+    leaves = [path for path, _ in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
+    return {_key(path): _texts(root, path) for path in (*leaves, *map(_group, leaves))}
 
 
 def _schema_leaves(root: dict[str, Any], node: dict[str, Any], path: Path) -> Iterator[tuple[Path, None]]:
@@ -194,20 +192,29 @@ def _group(path: Path) -> Path:
     return path[:-1]
 
 
+def _texts(root: dict[str, Any], path: Path) -> tuple[str, str]:
+    """Return the title and the description of a field or group; those of the whole list for one of its items."""
+    if not path:
+        return "General", ""
+    node = find(root, path[:-1] if isinstance(path[-1], int) else path) or {}
+    return node.get("title", str(path[-1])), node.get("description", "")
+
+
 def _key(path: Path) -> str:
     return ".".join(["recipe_field", *([part for part in path if isinstance(part, str)] or ["general"])])
 
 
 def _field(root: dict[str, Any], path: Path, value: Any) -> Field:
     node = find(root, path) or {}
+    title, description = _texts(root, path)
     branch = branches(node, root)[0]
     choices = tuple(map(str, branch.get("enum", ())))
     kind = "choice" if choices else _KINDS.get(branch.get("type", ""), "text")
     return Field(
         path=dotted(path),
         key=_key(path),
-        title=node.get("title", str(path[-1])),
-        description=node.get("description", ""),
+        title=title,
+        description=description,
         unit=node.get("unit", ""),
         expected=expectation(node, root),
         kind=kind,

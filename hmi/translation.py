@@ -1,44 +1,47 @@
-"""Translation: message catalogues of the folder `locale`, one file for each page and language."""
+"""Translation: message catalogues of the folder `locale`, one `.po` file for each module of texts and each language.
 
+Of the pages' texts in `hmi/texts` the catalogues are in the folder `pages`, beside those of `station/messages`.
+"""
+
+import gettext
 import io
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from decimal import Decimal
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from string import Formatter
 
 import babel
+from babel.dates import format_date
+from babel.messages.plurals import get_plural
 from babel.messages.pofile import read_po
+from babel.numbers import NumberPattern, get_decimal_symbol, get_group_symbol, parse_pattern
 from markupsafe import Markup
 
-from station.messages.message import ENGLISH, VERBATIM, Definition, Message, Renderer
+from hmi.texts import texts
+from station.messages.message import ENGLISH, VERBATIM, Definition, Message, Renderer, fields
 from station.settings.hmi import Language
 
 FOLDER = Path(__file__).with_name("locale")
 SOURCE: Language = "en"
-_DECIMAL = {"en": ".", "de": ",", "es": ","}
+PAGES = "pages"
+_THIN_SPACE = "\u202f"
 _NUMBER = re.compile(r"(?<![\w.])([0-9]+)\.([0-9]+)(?![\w.])")
-_DAY = {"en": "%Y-%m-%d", "de": "%d.%m.%Y", "es": "%d/%m/%Y"}
 NO_VALUE = "–"  # noqa: RUF001 (for a value that was not measured)
 
 
 @cache
 def catalogue(language: Language) -> Mapping[str, str]:
-    """Return all texts of a language by their keys, `page.what`; a key begins with its file's name.
-
-    Raises:
-        ValueError: a key is in another page's file.
-    """
-    texts: dict[str, str] = {}
+    """Return the sentences of the station that are no messages yet, by their keys."""
+    found: dict[str, str] = {}
     for file in sorted((FOLDER / language).glob("*.json")):
-        for key, text in json.loads(file.read_text(encoding="utf-8")).items():
-            if key.partition(".")[0] != file.stem:
-                raise ValueError(f"{file}: the key {key} belongs into {key.partition('.')[0]}.json")
-            texts[key] = text
-    return texts
+        found |= json.loads(file.read_text(encoding="utf-8"))
+    return found
 
 
 @cache
@@ -67,37 +70,86 @@ def translations(language: Language) -> Mapping[str, tuple[str, ...]]:
     Args:
         language: the folder below `locale` whose `.po` files are read.
     """
+    return _read(FOLDER / language, language)
+
+
+@cache
+def page_translations(language: Language) -> Mapping[str, tuple[str, ...]]:
+    """Return the translations of the pages' texts by their ids."""
+    return _read(FOLDER / language / PAGES, language)
+
+
+def _read(folder: Path, language: Language) -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
-    for file in sorted((FOLDER / language).glob("*.po")):
+    for file in sorted(folder.glob("*.po")):
         for entry in read_po(io.BytesIO(file.read_bytes()), locale=language):
-            forms = tuple(entry.string) if isinstance(entry.string, list | tuple) else (entry.string,)
-            if entry.context and not entry.fuzzy:
-                found[entry.context] = tuple(form for form in forms if form)
+            english, forms = _forms(entry.id), tuple(form for form in _forms(entry.string) if form)
+            # A translation of an earlier English serves until it is reviewed, unless its values are others.
+            if entry.context and forms and (not entry.fuzzy or fields(forms[-1]) == fields(english[-1])):
+                found[entry.context] = forms
     return found
+
+
+def _forms(text: object) -> tuple[str, ...]:
+    return tuple(text) if isinstance(text, list | tuple) else (str(text),)
 
 
 @cache
 def renderer(language: Language) -> Renderer:
-    """Return how messages are written in a language: by its catalogue, and with its decimal sign.
+    """Return how the station's messages are written in a language.
 
     Args:
         language: English is the definitions' own.
     """
     if language == SOURCE:
         return ENGLISH
-    rule = babel.Locale.parse(language).plural_form
-    known = translations(language)
+    return Renderer(_chooser(language, translations(language)), lambda value, digits: _figure(language, value, digits))
+
+
+@cache
+def page_renderer(language: Language) -> Renderer:
+    """Return how the pages' texts are written in a language."""
+    if language == SOURCE:
+        return ENGLISH
+    return Renderer(_chooser(language, page_translations(language)), ENGLISH.number)
+
+
+def _chooser(language: Language, known: Mapping[str, tuple[str, ...]]) -> Callable[[Definition, float], str]:
+    """Make the choice among a text's plural forms, by the language's gettext rule."""
+    rule = gettext.c2py(get_plural(language).plural_expr)
 
     def form(definition: Definition, count: float) -> str:
         forms = known.get(definition.id)
         if not forms:
             return ENGLISH.form(definition, count)
-        return forms[0 if rule(count) == "one" else -1]
+        return forms[min(rule(int(count)), len(forms) - 1)] if float(count).is_integer() else forms[-1]
 
-    def number(value: float, digits: int | None) -> str:
-        return ENGLISH.number(value, digits).replace(".", _DECIMAL[language])
+    return form
 
-    return Renderer(form, number)
+
+def _figure(language: Language, value: float, digits: int | None) -> str:
+    """Format a number in a sentence: rounded as in English, with the language's decimal sign, without thousands."""
+    return ENGLISH.number(value, digits).replace(".", get_decimal_symbol(language))
+
+
+@cache
+def _pattern(language: Language, digits: int, *, percent: bool) -> NumberPattern:
+    formats = babel.Locale.parse(language)
+    pattern = parse_pattern((formats.percent_formats if percent else formats.decimal_formats)[None].pattern)
+    pattern.frac_prec = digits, digits
+    return pattern
+
+
+@cache
+def _day_pattern(language: Language) -> str:
+    """Return the order and signs of the language's short date, with two digits for day and month and four for the year.
+
+    In English it is ISO 8601's: day and month are read in either order.
+    """
+    if language == SOURCE:
+        return "yyyy-MM-dd"
+    short = babel.Locale.parse(language).date_formats["short"].pattern
+    return re.sub("y+", "yyyy", re.sub("M+", "MM", re.sub("d+", "dd", short)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,19 +162,23 @@ class Locale:
         """Return a text; in English if the language has none, which a test refuses.
 
         Args:
-            key: as in the catalogue.
-            values: for the text's braces.
+            key: its id.
+            values: for the text's braces; the one that decides between its forms is a number.
 
         Raises:
-            KeyError: no language has it.
+            KeyError: it is not defined.
         """
-        known = catalogue(self.language).get(key)
-        text = catalogue(SOURCE)[key] if known is None else known
-        return text.format(**values) if values else text
+        known = texts()[key]
+        count = values.get(known.counted, 1)
+        form = page_renderer(self.language).form(known, count if isinstance(count, int | float) else 1)
+        return form.format(**values) if values else form
 
     def own(self, key: str, english: str) -> str:
         """Translate a text that the station sends in English; unchanged if the catalogue has none."""
-        return catalogue(self.language).get(key, english)
+        if key in texts():
+            return self.text(key)
+        known = page_translations(self.language).get(key)
+        return catalogue(self.language).get(key, english) if known is None else known[0]
 
     def sentence(self, english: str | Message | None) -> str:
         """Write a message in this language; in English, and marked as that, where it has no translation.
@@ -143,8 +199,9 @@ class Locale:
 
     def _translated(self, english: str) -> str | None:
         for key, pattern in sentence_patterns():
-            if (found := pattern.fullmatch(english)) is not None:
-                return self.text(key, **{name: self._value(value) for name, value in found.groupdict().items()})
+            text = catalogue(self.language).get(key)
+            if text is not None and (found := pattern.fullmatch(english)) is not None:
+                return text.format(**{name: self._value(value) for name, value in found.groupdict().items()})
         return None
 
     def _value(self, text: str) -> str:
@@ -152,7 +209,7 @@ class Locale:
         lead = text.removesuffix(" ")
         if (found := self._translated(lead)) is not None:
             return found + text[len(lead) :]
-        return _NUMBER.sub(rf"\1{_DECIMAL[self.language]}\2", text)
+        return _NUMBER.sub(rf"\1{get_decimal_symbol(self.language)}\2", text)
 
     def number(self, value: float | None, digits: int = 0) -> str:
         """Format a number with the language's decimal sign and a thin space between thousands.
@@ -161,9 +218,7 @@ class Locale:
             value: None is shown as a dash.
             digits: behind the decimal sign.
         """
-        if value is None:
-            return NO_VALUE
-        return f"{value:,.{digits}f}".replace(".", "\0").replace(",", "\u202f").replace("\0", _DECIMAL[self.language])
+        return self._formatted(value, digits, percent=False)
 
     def percent(self, share: float | None, digits: int = 0) -> str:
         """Format a fraction of one as a percentage.
@@ -172,18 +227,36 @@ class Locale:
             share: None is shown as a dash.
             digits: behind the decimal sign.
         """
-        if share is None:
+        return self._formatted(None if share is None else 100 * share, digits, percent=True)
+
+    def _formatted(self, value: float | None, digits: int, *, percent: bool) -> str:
+        if value is None or not isfinite(value):
             return NO_VALUE
-        return f"{self.number(100 * share, digits)}{'' if self.language == 'en' else chr(0xA0)}%"
+        rounded = Decimal(f"{value:.{digits}f}")  # as `str(message)` rounds: a page and a log show the same digits
+        pattern = _pattern(self.language, digits, percent=percent)
+        written = pattern.apply(rounded / 100 if percent else rounded, self.language)
+        return written.replace(get_group_symbol(self.language), _THIN_SPACE)
 
     @staticmethod
     def clock(utc_ms: int) -> str:
-        """Format a time of day, in the machine's zone."""
+        """Format a time of day, of 24 hours in every language, in the machine's zone."""
         return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime("%H:%M:%S")
 
     def day(self, utc_ms: int) -> str:
         """Format a date, in the machine's zone."""
-        return datetime.fromtimestamp(utc_ms / 1000).astimezone().strftime(_DAY[self.language])
+        there = datetime.fromtimestamp(utc_ms / 1000).astimezone()
+        return format_date(there, _day_pattern(self.language), self.language)
+
+    @property
+    def decimal_sign(self) -> str:
+        """The language's, for a field to type a number in."""
+        return get_decimal_symbol(self.language)
+
+    @staticmethod
+    def name_of(language: Language) -> str:
+        """Return a language's own name for itself."""
+        name = babel.Locale.parse(language).get_display_name() or language
+        return name[:1].upper() + name[1:]
 
 
 def preferred(languages: tuple[Language, ...], cookie: str, accepted: str) -> Language:

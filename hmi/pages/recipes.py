@@ -233,9 +233,8 @@ async def _form(
     wrong: str,
     reason: str = "",
 ) -> Response:
-    decimal = locale.number(0.5, 1)[1]
-    made = groups(reply.values)
-    texts = {field.path: typed.get(field.path, formatted(field, decimal)) for group in made for field in group.fields}
+    made, sign = groups(reply.values), locale.decimal_sign
+    texts = {field.path: typed.get(field.path, formatted(field, sign)) for group in made for field in group.fields}
     caller, known = caller_of(request), await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,

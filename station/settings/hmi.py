@@ -1,7 +1,7 @@
 """HMI settings: addresses, TLS, languages, idle times."""
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 from pydantic import model_validator
 
@@ -12,6 +12,8 @@ from station.settings.paths import File
 from station.settings.plc import LONGEST_SOCKET_PATH
 
 Language = Literal["en", "de", "es"]
+"""All languages of the pages; `./run messages` makes the catalogues of a new one."""
+LANGUAGES: tuple[Language, ...] = get_args(Language)
 
 
 class HmiTlsSettings(Settings):
@@ -56,11 +58,11 @@ class HmiSettings(Settings):
         HmiTlsSettings(), title="HMI over TLS", description="Outside the machine the pages are to be served over TLS."
     )
     languages: tuple[Language, ...] = setting(
-        ("en", "de", "es"),
+        LANGUAGES,
         title="Languages",
         description="Languages to choose from; the first is used if the browser requests none of them.",
         min_length=1,
-        max_length=3,
+        max_length=len(LANGUAGES),
     )
     idle_s: float = setting(
         180.0,

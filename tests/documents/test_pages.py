@@ -1,6 +1,5 @@
 """The pages that are made to be printed come out as said, by a real browser."""
 
-import json
 import re
 import subprocess
 from pathlib import Path
@@ -8,8 +7,16 @@ from pathlib import Path
 import pytest
 from markdown_it import MarkdownIt
 
+from hmi.recipe_form import field_texts
+from hmi.texts import texts
+from hmi.translation import Locale, page_renderer
+from station.settings.hmi import LANGUAGES
+
 STYLE = Path(__file__).with_name("print.css")
 PAGE = re.compile(rb"/Type\s*/Page\b")
+OPERATORS_GUIDES = {
+    language: "operator.md" if language == "en" else f"operator.{language}.md" for language in LANGUAGES
+}
 
 
 @pytest.fixture
@@ -32,7 +39,7 @@ def printed(chromium, pages, tmp_path):
 
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize(
-    ("name", "number"), [("operator.md", 2), ("operator.de.md", 2), ("operator.es.md", 2), ("acceptance-test.md", 3)]
+    ("name", "number"), [*((guide, 2) for guide in OPERATORS_GUIDES.values()), ("acceptance-test.md", 3)]
 )
 def test_a_document_to_print_has_its_pages(printed, name, number):
     assert 1 < printed(f"docs/{name}") <= number
@@ -43,14 +50,13 @@ def test_the_operators_guide_shows_screens(pages):
     assert len(shown) >= 3
 
 
-@pytest.mark.parametrize(
-    ("name", "language"), [("operator.md", "en"), ("operator.de.md", "de"), ("operator.es.md", "es")]
-)
-def test_what_the_operators_guide_calls_a_button_is_written_on_the_panel(pages, root, name, language):
-    files = (root / "hmi" / "locale" / language).glob("*.json")
-    words = {text for file in files for text in json.loads(file.read_text("utf-8")).values()}
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_what_the_operators_guide_calls_a_button_is_written_on_the_panel(pages, language):
+    words = {page_renderer(language).form(each, count) for each in texts().values() for count in (1, 2)}
+    words |= {Locale(language).own(key, title) for key, (title, _) in field_texts().items()}
     beginnings = {text.partition("{")[0] for text in words if "{" in text}
-    named = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", pages[f"docs/{name}"].path.read_text("utf-8")))
+    guide = pages[f"docs/{OPERATORS_GUIDES[language]}"].path.read_text("utf-8")
+    named = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", guide))
     assert len(named) > 25
     unknown = {each for each in named if each.rstrip("…") not in beginnings and not {each, each + "."} & words}
     assert unknown == set()

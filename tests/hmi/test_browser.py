@@ -54,10 +54,10 @@ def test_the_fruit_is_changed_while_a_fruit_is_running(ready, operator):
     sequence = ready.begin()
     operator.page.get_by_role("button", name="Change to Raspberry").click()
     touches += 1
-    operator.until("main", "Under way|Done")
+    operator.until("main", "In progress|Done")
     outcome = ready.end(sequence)
     assert outcome.recipe_number == 2, "the fruit under way is judged by the recipe that it began with"
-    operator.until("main", "The station is armed")
+    operator.until("main", "The station is ready")
     assert touches <= 3
     assert "Raspberry" in operator.text(".progress")
     state = ready.until(lambda state: state.recipe.number == 3)
@@ -73,7 +73,7 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     sequence = ready.begin()
     outcome = ready.end(sequence)
     viewer.until(".run-fruit .facts", f"Nummer\\s*{sequence}\\b")
-    word = {"PASS": "Gut", "FAIL": "Schlecht", "NO_RESULT": "Kein Ergebnis"}[outcome.outcome]
+    word = {"PASS": "i. O.", "FAIL": "n. i. O.", "NO_RESULT": "Kein Ergebnis"}[outcome.outcome]
     assert word in viewer.text(".run-fruit .outcome")
     if outcome.area_mm2 is not None:
         assert f"{outcome.area_mm2:.1f}".replace(".", ",") in viewer.text(".run-fruit .facts")
@@ -113,7 +113,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.until(".alarm-line", "camera")
     finally:
         ready.twin(do="clear", device="camera")
-    operator.until(".alarm", "cause gone, not acknowledged")
+    operator.until(".alarm", "returned to normal, not acknowledged")
     operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge").click()
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
     operator.page.locator("main").get_by_role("link", name="History").click()
@@ -121,9 +121,9 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
     def history():  # which is written behind
         operator.page.reload()
         rows = operator.page.locator(".log tbody tr", has_text="camera lost").all_inner_texts()
-        changes = [re.findall("raised|shown again|shelved|cause gone|acknowledged", row)[0] for row in rows]
+        changes = [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows]
         first = ["raised", "acknowledged", "shelved", "shown again"]
-        return changes[::-1][:4] == first and sorted(changes[::-1][4:]) == ["acknowledged", "cause gone"]
+        return changes[::-1][:4] == first and sorted(changes[::-1][4:]) == ["acknowledged", "returned to normal"]
 
     eventually(history)
 

@@ -76,7 +76,7 @@ class TestRequests:
         for forged in ("", "x", token[:-1] + ("0" if token[-1] != "0" else "1"), "9" + token):
             status, _, body = pages.post("/language", csrf=forged, language="de")
             assert status == 403, forged
-            assert b"does not come from a page of this browser" in body
+            assert b"was not sent from a page of this browser" in body
 
     def test_an_order_that_was_sent_before_is_refused(self, pages):
         token = pages.token()
@@ -140,7 +140,7 @@ class TestRequests:
         log_in(pages)
         status, _, body = pages.post("/order", csrf=pages.token(), order="stop")
         assert status == 503
-        assert b"gave no answer in time" in body
+        assert b"did not answer in time" in body
 
     def test_a_page_says_that_the_station_has_not_answered(self, pages):
         text = pages("GET", "/")[2].decode()

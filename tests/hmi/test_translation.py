@@ -1,7 +1,6 @@
-"""The catalogues: nothing is missing in a language, and numbers are written as it writes them."""
+"""Texts, numbers and dates in the language of the page."""
 
 import ast
-import json
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -13,8 +12,9 @@ from hypothesis import strategies as st
 
 from hmi import charts
 from hmi.navigation import entries, modules, parts
-from hmi.recipe_form import field_keys, groups
-from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, preferred
+from hmi.recipe_form import groups
+from hmi.texts import texts
+from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, page_translations, preferred
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
@@ -22,12 +22,12 @@ from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
+from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
 from station.vision.contact import Flag
 from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
-LANGUAGES = ("en", "de", "es")
 STATION = HMI.parent / "station"
 NOT_FOR_OPERATORS = {
     "alarm {}: expected an id of docs/alarms.md, as {}",
@@ -119,8 +119,6 @@ NO_PAGES = {
 }
 """Parts of pages, pictures, streams and files."""
 IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}"}
-STATIONS_OWN = ("station.", "recipe_what.")
-"""The catalogues of what the station says in English itself."""
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
 IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |UserStoreError\()["']([a-z_]+\.[a-z_]+)["']""")
 
@@ -129,23 +127,17 @@ def fields(text):
     return sorted(name for _, name, _, _ in Formatter().parse(text) if name)
 
 
-def test_every_language_says_everything():
+def test_every_language_has_the_stations_sentences():
     english = catalogue("en")
-    for language in ("de", "es"):
-        other = {key: text for key, text in catalogue(language).items() if not key.startswith(STATIONS_OWN)}
+    for language in LANGUAGES[1:]:
+        other = {key: text for key, text in catalogue(language).items() if not key.startswith("station.")}
         assert sorted(other) == sorted(english), language
         for key, text in other.items():
             assert text.strip(), key
             assert fields(text) == fields(english[key]), key
 
 
-def test_every_file_is_there_in_every_language():
-    names = {path.name for path in (FOLDER / "de").iterdir()}
-    assert names == {path.name for path in (FOLDER / "es").iterdir()}
-    assert names - {f"{name}json" for name in STATIONS_OWN} == {path.name for path in (FOLDER / "en").iterdir()}
-
-
-@pytest.mark.parametrize("language", ["de", "es"])
+@pytest.mark.parametrize("language", LANGUAGES[1:])
 def test_what_the_station_says_in_english_is_said_in_every_language(language):
     own = {key for key in catalogue(language) if key.startswith("station.")}
     wanted = {f"station.{what}.{alarm}" for what in ("cause", "consequence", "action") for alarm in ALARMS}
@@ -241,14 +233,14 @@ def test_a_fault_is_said_whole_with_what_to_do(language, fault, what, remedy):
     assert Locale(language).sentence(str(fault)) == what + remedy
 
 
-@pytest.mark.parametrize("language", ["de", "es"])
+@pytest.mark.parametrize("language", LANGUAGES)
 def test_every_value_of_a_recipe_is_explained_in_every_language(language):
-    assert {key for key in catalogue(language) if key.startswith("recipe_field.")} == set(field_keys())
-    explained = {key for key in catalogue(language) if key.startswith("recipe_what.")}
-    assert explained == {key.replace("recipe_field", "recipe_what") for key in field_keys()} - {"recipe_what.general"}
     made = groups(load_recipes()["strawberry"].model_dump(mode="json"))
     for field in (field for group in made for field in group.fields):
         assert "lang=" not in Locale(language).sentence(field.expected), field.path
+        for key, english in ((field.key, field.title), (field.key.replace("field", "what", 1), field.description)):
+            assert language == "en" or key in page_translations(language)
+            assert Locale(language).own(key, english)
 
 
 def test_no_text_that_a_page_uses_is_missing():
@@ -260,7 +252,7 @@ def test_no_text_that_a_page_uses_is_missing():
     used |= {f"order.{order}" for order in OperatorCommandName} | {f"alarms.state.{state}" for state in AlarmState}
     used |= {f"nav.{entry.name}" for entry in entries()}
     used |= {f"inspection.flag_{flag}" for flag in Flag} | {f"maintenance.fault_{fault}" for fault in FrameFault}
-    assert used <= set(catalogue("en")), used - set(catalogue("en"))
+    assert used <= set(texts()), used - set(texts())
     assert len(used) > 100
 
 
@@ -286,12 +278,6 @@ def test_every_page_is_looked_at_in_both_sizes():
                 assert any(route.path_regex.fullmatch(path) for path in looked_at), route.path
 
 
-def test_catalogues_are_sorted_by_page():
-    for path in FOLDER.glob("*/*.json"):
-        for key in json.loads(path.read_text(encoding="utf-8")):
-            assert key.startswith(f"{path.stem}."), (path, key)
-
-
 @pytest.mark.parametrize(
     ("language", "value", "digits", "text"),
     [
@@ -300,6 +286,8 @@ def test_catalogues_are_sorted_by_page():
         ("es", 0.25, 2, "0,25"),
         ("de", None, 1, NO_VALUE),
         ("de", -3.0, 0, "-3"),
+        ("es", 12345.0, 0, "12\u202f345"),
+        ("en", float("nan"), 1, NO_VALUE),
     ],
 )
 def test_numbers_are_written_as_the_language_does(language, value, digits, text):
@@ -309,7 +297,8 @@ def test_numbers_are_written_as_the_language_does(language, value, digits, text)
 def test_a_percentage_and_a_date():
     assert Locale("de").percent(0.375, 1) == "37,5\u00a0%"
     assert Locale("en").percent(0.375) == "38%"
-    assert re.fullmatch(r"\d\d\.\d\d\.\d{4}", Locale("de").day(1_700_000_000_000))
+    day = [Locale(language).day(1_700_000_000_000) for language in ("en", "de", "es")]
+    assert all(re.fullmatch(r"2023-11-1\d,1\d\.11\.2023,1\d/11/2023", ",".join(day)) for _ in day)
 
 
 @given(st.text(max_size=60), st.text(max_size=60))

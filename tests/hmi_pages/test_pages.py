@@ -8,7 +8,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
+from hmi.translation import Locale
 from station.channel.panel_queries import AuditRows, ReadAudit
+from station.settings.hmi import LANGUAGES, Language
 from station.settings.recipe import load_recipes
 
 pytestmark = pytest.mark.timeout(400)
@@ -73,14 +75,15 @@ def test_every_page_fits_where_nobody_is_logged_in(orchard: Any, panel: Any, siz
         assert page.evaluate(OVERFLOW) == 0, path
 
 
-@pytest.mark.parametrize("locale", ["de", "es"])
-def test_pages_speak_the_browsers_language(orchard: Any, panel: Any, locale: str) -> None:
+@pytest.mark.parametrize("locale", LANGUAGES[1:])
+def test_pages_speak_the_browsers_language(orchard: Any, panel: Any, locale: Language) -> None:
     person = panel("", locale=locale)
     for path in ("/recipes/strawberry/edit", "/history", f"/history/{orchard.soft.sequence}", "/maintenance"):
         page = person.go(path)
         assert page.evaluate("document.documentElement.lang") == locale
         assert page.evaluate(OVERFLOW) == 0
-    assert person.go("/recipes/strawberry/edit").locator('[name="v:steps.closing_limit_mm"]').input_value() == "4,5"
+    limit = person.go("/recipes/strawberry/edit").locator('[name="v:steps.closing_limit_mm"]')
+    assert limit.input_value() == f"4{Locale(locale).decimal_sign}5"
 
 
 def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(orchard: Any, panel: Any) -> None:
@@ -102,7 +105,7 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     page = rosa.go("/recipes/strawberry")
     page.locator("form[action$='/approve'] [name=reason]").fill("too strict")
     page.get_by_role("button", name="Reject").click()
-    expect(page.get_by_role("button", name="Put the file back")).to_be_visible()
+    expect(page.get_by_role("button", name="Restore the file")).to_be_visible()
     page = quin.go("/recipes/strawberry/edit")
     edit(page, "damage.area[0].area_mm2", "105")
     page.locator("[name=reason]").fill("a little softer")
@@ -111,7 +114,7 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     page = rosa.go("/recipes/strawberry")
     page.locator("form[action$='/approve'] [name=reason]").fill("seen on the curves")
     page.get_by_role("button", name="Approve").click()
-    expect(page.get_by_text("Nothing differs from what is in force.")).to_be_visible()
+    expect(page.get_by_text("No difference from the recipe in force.")).to_be_visible()
     assert load_recipes(file.parent)["strawberry"].damage.area[0].area_mm2 == 105
     done = [(row.who, row.role, row.action) for row in audited(orchard, "recipe.")[:6]]
     assert ("Rosa", "quality", "recipe.approved") in done
@@ -170,7 +173,7 @@ def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orcha
     page = panel().go("/history")
     page.locator("[name=number]").fill("fruit 7")
     page.get_by_role("button", name="Search").click()
-    expect(page.get_by_role("alert")).to_contain_text("This search is none")
+    expect(page.get_by_role("alert")).to_contain_text("Invalid search")
 
 
 def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
@@ -211,7 +214,7 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
 
 def test_a_draft_is_tried_on_what_was_inspected(orchard: Any, panel: Any) -> None:
     page = panel("Quin").go("/recipes/strawberry")
-    page.get_by_role("button", name="What would it have done?").click()
+    page.get_by_role("button", name="What would it have decided?").click()
     page.get_by_role("link", name="Open whatif.html").click()
     expect(page.get_by_text("What if: Strawberry").first).to_be_visible()
 
@@ -223,15 +226,15 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     page = person.go("/maintenance/hand")
     expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
     page.get_by_label("Width, mm").fill("40")
-    page.get_by_role("button", name="Go there").click()
+    page.get_by_role("button", name="Move", exact=True).click()
     expect(page.get_by_text("The station is in mode 1")).to_be_visible()
     eventually(lambda: [row for row in audited(orchard, "maintenance.jog") if row.who == "Max"])
     page = person.go("/maintenance/hand")
     page.get_by_role("button", name="Set manual mode").click()
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
     page.get_by_label("Width, mm").fill("40,4")
-    page.get_by_role("button", name="Go there").click()
-    told = page.get_by_text(re.compile(r"The fingers stand at [\d.]+ mm"))
+    page.get_by_role("button", name="Move", exact=True).click()
+    told = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
     expect(told).to_be_visible()
     width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
     assert abs(width_mm - 40.4) < 0.3
@@ -291,4 +294,4 @@ def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, pane
         page = person.go("/maintenance/sensor")
         expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
         assert page.get_by_role("button", name="Verify").count() == 0
-        assert page.get_by_text("There is none yet.").count() == 2
+        assert page.get_by_text("None yet.").count() == 2

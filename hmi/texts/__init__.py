@@ -1,0 +1,47 @@
+"""All texts of the pages in English; one module for each page. Importing the package defines all of them."""
+
+from hmi.texts import (
+    alarms,
+    change,
+    chart,
+    common,
+    frame,
+    history,
+    inspection,
+    job,
+    maintenance,
+    nav,
+    order,
+    outcome,
+    packml,
+    people,
+    problem,
+    reason,
+    recipes,
+    role,
+    run,
+)
+from hmi.texts.text import texts
+
+__all__ = [
+    "alarms",
+    "change",
+    "chart",
+    "common",
+    "frame",
+    "history",
+    "inspection",
+    "job",
+    "maintenance",
+    "nav",
+    "order",
+    "outcome",
+    "packml",
+    "people",
+    "problem",
+    "reason",
+    "recipes",
+    "role",
+    "run",
+    "texts",
+]

@@ -1,0 +1,27 @@
+"""Texts of the frame around every page."""
+
+from hmi.texts.text import define, define_plural
+
+define("frame.title", "Fruit station")
+define("frame.skip", "To the content")
+define("frame.navigation", "Pages")
+define("frame.no_alarm", "No alarms")
+define("frame.unknown", "The station has not answered yet")
+define_plural("frame.more_alarms", "and {n} more", "and {n} more", "n")
+define("frame.alarms", "Alarms")
+define("frame.unacknowledged", "not acknowledged")
+define("frame.stale", "No data for {age} s. The page shows old data, from {clock}.")
+define("frame.never", "The station does not answer. The page continues automatically when it does.")
+define("frame.simulated", "Simulated")
+define("frame.ready", "Ready")
+define("frame.not_ready", "Not ready")
+define("frame.no_recipe", "No fruit chosen")
+define("frame.log_in", "Log in")
+define("frame.log_out", "Log out")
+define("frame.language", "Language")
+define("frame.hold", "hold")
+define("frame.press_again", "Press again to confirm")
+define("frame.cancel", "Cancel")
+define("frame.back", "Back")
+define("frame.first_start", "Nobody can log in yet: choose the administrator's PIN.")
+define("frame.set_up", "Set up")

@@ -1,0 +1,26 @@
+"""Texts of the reasons of an outcome."""
+
+from hmi.texts.text import define
+
+define("reason.area_over_limit", "Contact area over the limit")
+define("reason.growth_over_limit", "Area grows too fast")
+define("reason.early_stop", "Stopped early to spare the fruit")
+define("reason.no_contact", "No contact found")
+define("reason.contact_lost", "Contact lost")
+define("reason.area_not_rising", "Area does not rise")
+define("reason.cut_by_border", "Contact cut by the image's edge")
+define("reason.saturated", "Image too bright or too dark")
+define("reason.low_confidence", "Outline uncertain")
+define("reason.reference_bad", "Reference not usable")
+define("reason.image_stale", "Image too old")
+define("reason.out_of_range", "Width does not fit this fruit")
+define("reason.late", "Too late")
+define("reason.called_off", "Aborted")
+define("reason.arm_fault", "Arm fault")
+define("reason.gripper_fault", "Gripper fault")
+define("reason.camera_fault", "Camera fault")
+define("reason.records_fault", "Not recorded")
+define("reason.station_lost", "Connection to the station lost")
+define("reason.internal_fault", "Internal fault")
+define("reason.near_limit", "Too near the limit")
+define("reason.size_unknown", "Size unknown")

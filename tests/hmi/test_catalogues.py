@@ -1,0 +1,137 @@
+"""The message catalogues of all languages: complete, with the source's braces, and read by ids."""
+
+import pytest
+from babel.messages.catalog import Catalog
+from babel.messages.pofile import read_po
+
+from hmi import catalogues, translation
+from hmi import texts as pages_texts
+from hmi.catalogues import findings, sources, translated, update
+from hmi.texts import texts
+from hmi.texts.text import define, define_plural
+from hmi.translation import PAGES, Locale
+from station import messages
+from station.messages import channel
+from station.messages.message import Definition, definitions
+from station.settings.hmi import LANGUAGES
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder of catalogues for one page with three texts."""
+    monkeypatch.setattr(catalogues, "FOLDER", tmp_path)
+    monkeypatch.setattr(catalogues, "ROOT", tmp_path)
+    english = {"run.state": ("State",), "run.one": ("{n} pear", "{n} pears"), "run.at": ("at {width_mm} mm",)}
+    monkeypatch.setattr(catalogues, "sources", lambda: {catalogues.Path(PAGES, "run.po"): english})
+    return tmp_path, english
+
+
+def translate(path, **texts_by_name):
+    with path.open("rb") as file:
+        catalog = read_po(file, locale="de")
+    for entry in catalog:
+        if entry.context and (string := texts_by_name.get(entry.context.partition(".")[2])):
+            entry.string = string
+    path.write_bytes(catalogues._written(catalog, "de"))
+
+
+def test_every_text_is_translated_with_its_braces():
+    found = [str(each) for language in translated() for each in findings(language)]
+    assert not found, "\n".join(found)
+
+
+def test_what_is_extracted_from_the_source_is_what_is_defined():
+    extracted = {file: set(found) for file, found in sources().items()}
+    pages = {key for file, keys in extracted.items() if file.parent.name == PAGES for key in keys}
+    assert {key for key in pages if not key.startswith(("recipe_field.", "recipe_what."))} == set(
+        filter(lambda key: key != "change.by", texts())
+    )
+    said = {key for file, keys in extracted.items() if file.parent.name != PAGES for key in keys}
+    defined = {each.id: each for each in definitions() if not each.id.startswith("test.")}
+    assert said <= set(defined)
+    assert not [key for key in set(defined) - said if catalogues._is_text(defined[key].english)]
+
+
+def test_every_module_is_imported_by_its_package():
+    assert {path.stem for path in catalogues._ROOMS.glob("[a-z]*.py")} == set(messages.__all__)
+    assert {path.stem for path in catalogues._TEXTS.glob("[a-z]*.py")} - {"text"} == set(pages_texts.__all__) - {
+        "texts"
+    }
+
+
+def test_an_id_begins_with_its_page():
+    for file, found in sources().items():
+        if file.parent.name == PAGES:
+            assert all(key.startswith(f"{file.stem}.") for key in found), file
+
+
+def test_a_text_is_defined_once_and_a_plural_contains_its_number():
+    with pytest.raises(ValueError, match="twice"):
+        define("run.state", "again")
+    with pytest.raises(ValueError, match="lacks"):
+        define_plural("run.new", "{n} pear", "pears", "n")
+    assert "run.new" not in texts()
+
+
+def test_a_new_language_gets_files_to_translate(folder):
+    place, english = folder
+    assert update("de") == [place / "de" / PAGES / "run.po"]
+    assert update("de") == []
+    assert {each.id for each in findings("de")} == set(english)
+    translate(place / "de" / PAGES / "run.po", state="Zustand", one=("{n} Birne", "{n} Birnen"), at="bei {width_mm} mm")
+    assert not list(findings("de"))
+
+
+def test_changed_texts_are_found(folder):
+    place, english = folder
+    update("de")
+    file = place / "de" / PAGES / "run.po"
+    translate(file, state="Zustand", one=("{n} Birne", "{m} Birnen"), at="bei {width} mm")
+    assert {each.id for each in findings("de")} == {"run.one", "run.at"}
+    english["run.state"] = ("Condition",)
+    assert [each.id for each in catalogues.reworded("de")] == ["run.state"]
+    del english["run.at"]
+    update("de")
+    assert {each.id: each.what.partition(" ")[0] for each in findings("de")} == {"run.state": "its", "run.one": "has"}
+
+
+def test_a_file_without_texts_is_removed(folder):
+    place, _ = folder
+    update("de")
+    left_over = place / "de" / "gone.po"
+    left_over.write_bytes(catalogues._written(Catalog(locale="de"), "de"))
+    assert [each.file for each in findings("de") if each.id == "the file"] == [left_over]
+    assert update("de") == [left_over]
+    assert not left_over.exists()
+
+
+def test_a_reworded_text_keeps_its_translation_until_it_is_reviewed(folder, monkeypatch):
+    place, english = folder
+    update("de")
+    file = place / "de" / PAGES / "run.po"
+    translate(file, state="Zustand", at="bei {width_mm} mm")
+    english["run.state"], english["run.at"] = ("Condition",), ("at {width_m} m",)
+    update("de")
+    assert translation._read(file.parent, "de") == {"run.state": ("Zustand",)}
+
+
+@pytest.mark.parametrize(("number", "said"), [(1, "1 Tag"), (2, "2 Tage"), (0, "0 Tage")])
+def test_a_number_chooses_the_form(number, said):
+    assert Locale("de").text("common.days", n=number) == said
+
+
+def test_a_message_is_written_in_every_language():
+    said = channel.NO_ANSWER(peer="arm", limit_s=2.5, purpose="pose")
+    written = {language: Locale(language).sentence(said) for language in LANGUAGES}
+    assert written["en"] == str(said)
+    assert len(set(written.values())) == len(LANGUAGES)
+    assert all("2,5 s" in written[language] for language in ("de", "es"))
+
+
+def test_a_text_without_a_translation_is_english():
+    form = translation._chooser("de", {})
+    assert form(Definition("test.none", "{n} pear", {}, "{n} pears", "n"), 2) == "{n} pears"
+
+
+def test_a_language_has_a_name_of_its_own():
+    assert [Locale.name_of(language) for language in LANGUAGES][:3] == ["English", "Deutsch", "Español"]
