@@ -69,8 +69,11 @@ class Constants:
     # Region
     region_window: float = constant(0.08, "of the radius", "window of the level", "fit")
     cap_quantile: float = constant(0.38, "", "quantile of the region's level at which the gain is capped", "fit")
-    share_random: float = constant(0.33, "of the cap", "the region's end where directions are random", "fit")
+    share_even: float = constant(
+        0.85, "of the cap", "the region's end where directions are random and elements as strong as the body", "fit"
+    )
     share_coherent: float = constant(1.6, "of the cap", "how much higher it is per unit of coherence", "fit")
+    share_prominent: float = constant(0.5, "of the cap", "how much higher it is per e-fold of prominence", "fit")
     share_field: float = constant(-0.2, "of the cap", "how much lower it is per share of the field", "fit")
     share_most: float = constant(0.76, "of the cap", "the region's end is never higher", "fit")
     region_span: float = constant(1.9, "radii", "how far beyond its start the region is looked for", "fit")

@@ -29,7 +29,7 @@ _FLOOR_QUANTILE = 0.03
 _LEAST_BACKGROUND = 0.02
 _LEAST_WINDOW_PX = 1.5
 _LEAST_RADIUS_PX = 3.0
-_STRONG_QUANTILE = 0.9
+_STRONG_QUANTILE, _STRONGEST_QUANTILE = 0.9, 0.97
 _SUBPIXEL_BITS = 4
 
 _Floats = npt.NDArray[np.float64]
@@ -143,9 +143,10 @@ def find_region(
             agreed = _coherence(moved, mask, p.coherence_window * radius)
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
-            # The more the directions agree, the smoother the body, and the stronger its halo outside the edge.
-            share = p.share_random + p.share_coherent * coherence + p.share_field * float(mask.mean())
-            share = min(share, p.share_most)
+            # The more the directions agree, the smoother the body, and the stronger its halo outside the edge. The more
+            # achenes or drupelets outshine the body, the further their part of the windowed level reaches beyond it.
+            share = p.share_even + p.share_coherent * coherence + p.share_field * float(mask.mean())
+            share = min(share + p.share_prominent * _prominence(moved.curvature, level, mask), p.share_most)
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
         # A flat centre has not moved; it lies within what has, and costs nothing.
         np.maximum(gain, 0, out=gain, where=inner > 0)
@@ -243,6 +244,13 @@ def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
     scatter = np.abs(np.sqrt(few) - np.sqrt(floor))
     spread = NORMAL_OF_MEDIAN * (weighted_median(scatter, weight) if seen else quantile(scatter, _FLOOR_QUANTILE))
     return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
+
+
+def _prominence(curvature: FloatImage, level: FloatImage, region: Mask) -> float:
+    """Logarithm of a region's strongest curvature over its median level: how far elements outshine the body, 1/px."""
+    inside = region > 0
+    strongest = quantile(curvature[inside], _STRONGEST_QUANTILE)
+    return float(np.log(max(strongest, _LEAST_LEVEL) / max(quantile(level[inside], 0.5), _LEAST_LEVEL)))
 
 
 def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
