@@ -15,7 +15,9 @@ import tempfile
 import time
 import urllib.request
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -51,10 +53,35 @@ camera: {{oldest_s: 1.0, twin: {{port: 5930}}}}
 Row = tuple[Passage, LaidFruit]
 
 
-async def inspect(site: Configuration, count: int) -> tuple[list[Row], dict[str, float]]:
-    """Run the line; what it decided fruit by fruit, and the metrics' counts by outcome at the end."""
+class Run(NamedTuple):
+    """What a line decided, and how its fruit waited."""
+
+    rows: list[Row]
+    counted: dict[str, float]
+    """The metrics' counts by outcome at the end."""
+    waits_s: list[float]
+    """How long each fruit waited before the nest."""
+    took_s: float
+
+
+async def inspect(
+    site: Configuration,
+    count: int,
+    kinds: Sequence[str] = KINDS,
+    damaged_share: float = DAMAGED_SHARE,
+    every_s: float = 0.0,
+) -> Run:
+    """Run the line with fruit of some kinds, drawn at random.
+
+    Args:
+        site: of the cell.
+        count: fruit.
+        kinds: of fruit.
+        damaged_share: of the fruit, 0 to 1.
+        every_s: time from one arrival to the next; 0 for as fast as the station takes them.
+    """
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
-    nest = TwinNest(CONSOLE_PORT, {kind: numbers[kind] for kind in KINDS}, DAMAGED_SHARE, SEED)
+    nest = TwinNest(CONSOLE_PORT, {kind: numbers[kind] for kind in kinds}, damaged_share, SEED)
     logs = site.home / "logs"
     logs.mkdir()
     supervisor = Supervisor([twin_program(None, CONSOLE_PORT, SEED, logs), *station_programs(None, logs)])
@@ -71,9 +98,11 @@ async def inspect(site: Configuration, count: int) -> tuple[list[Row], dict[str,
             await ready.wait()
         order = WordOrder(site.modbus.word_order)
         async with Scanner(site.modbus.host, site.modbus.port, site.modbus.unit, order) as scanner:
-            simulator = LineSimulator(LineProgram(lot="BENCH"), scanner, nest, Pace())
+            simulator = LineSimulator(LineProgram(lot="BENCH"), scanner, nest, Pace(every_s=every_s))
             simulator.on_passage = passed
+            began_s = time.monotonic()
             await simulator.run(count)
+            took_s = time.monotonic() - began_s
         text = await asyncio.to_thread(scrape, f"http://{site.metrics.host}:{site.metrics.port}/metrics")
     finally:
         ended.set()
@@ -83,7 +112,7 @@ async def inspect(site: Configuration, count: int) -> tuple[list[Row], dict[str,
         for sample in family.samples:
             if sample.name == "station_inspections_total":
                 counted[sample.labels["outcome"]] += int(sample.value)
-    return rows, dict(counted)
+    return Run(rows, dict(counted), simulator.summary.waits_s, took_s)
 
 
 def scrape(url: str) -> str:
@@ -131,10 +160,10 @@ def same(recorded: float | None, read: float | None) -> bool:
     return math.isclose(recorded, read, rel_tol=1e-6)
 
 
-def table(rows: list[Row]) -> str:
+def table(rows: list[Row], kinds: Sequence[str] = KINDS) -> str:
     """Outcomes by kind and truth."""
     lines = ["| fruit | truth | PASS | FAIL | NO_RESULT | refused or no answer |", "|---|---|---|---|---|---|"]
-    for kind in KINDS:
+    for kind in kinds:
         for damaged in (False, True):
             found = Counter(p.decision for p, fruit in rows if fruit.kind == kind and fruit.damaged is damaged)
             rest = found[Decision.REFUSED] + found[Decision.NO_ANSWER]
@@ -189,10 +218,9 @@ def main() -> None:
         os.environ |= {"STATION_HOME": home, "STATION_CONFIG": str(file)}
         site = load_configuration()
         calibrate_simulated_unit(site, "bench")
-        began_s = time.monotonic()
-        rows, counted = asyncio.run(inspect(site, count))
-        wrong = disagreements(site, rows, counted)
-    text = page(rows, wrong, time.monotonic() - began_s)
+        run = asyncio.run(inspect(site, count))
+        wrong = disagreements(site, run.rows, run.counted)
+    text = page(run.rows, wrong, run.took_s)
     print(text)
     if len(sys.argv) == 1:
         DOCUMENT.write_text(text, encoding="utf-8")

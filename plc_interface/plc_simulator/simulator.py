@@ -16,7 +16,7 @@ class Pace:
 
     scan_s: float = 0.01
     every_s: float = 0.0
-    """The least time from one fruit's arrival to the next; the line waits for the station all the same."""
+    """Time from one fruit's arrival to the next. One that the nest is not free for waits, and the next behind it."""
     encoder_counts_per_s: float = 1000.0
 
 
@@ -27,11 +27,21 @@ class Summary:
     decided: dict[Decision, int] = field(default_factory=lambda: dict.fromkeys(Decision, 0))
     damaged_passed: int = 0
     sound_diverted: int = 0
+    waits_s: list[float] = field(default_factory=list)
+    """How long each fruit waited before the nest."""
 
     @property
     def fruits(self) -> int:
         """Number of decided fruit."""
         return sum(self.decided.values())
+
+    def waited(self, seconds: float) -> None:
+        """Note that a fruit has come into the nest.
+
+        Args:
+            seconds: for how long it waited before.
+        """
+        self.waits_s.append(seconds)
 
     def add(self, passage: Passage, fruit: LaidFruit) -> None:
         """Count one fruit.
@@ -73,7 +83,8 @@ class LineSimulator:
             wanted = count is None or self.summary.fruits < count
             if fruit is None and wanted and self._program.free and now_s >= next_arrival_s:
                 fruit = await self._nest.arrive()
-                next_arrival_s = now_s + self._pace.every_s
+                self.summary.waited(now_s - next_arrival_s if self._pace.every_s else 0.0)
+                next_arrival_s = next_arrival_s + self._pace.every_s if self._pace.every_s else now_s
             encoder = int(now_s * self._pace.encoder_counts_per_s) % 2**32
             outputs = self._program.scan(
                 inputs,
