@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Image
 from station.errors import StationError
+from station.messages import grip as messages
 from station.service.grip import Cell, Grip, GripError, GripStep
 from station.settings.recipe import Recipe
 from station.vision.contact import Method
@@ -52,9 +53,9 @@ class BareGrip:
             try:
                 await self._press()
             except (StationError, asyncio.CancelledError) as error:
-                what = str(error).rstrip(".") or "the grip was called off"
-                if left := await self._grip.let_go():
-                    raise GripError(what + f". {left}".removesuffix(f": {error}")) from error
+                failed = error.message if isinstance(error, StationError) else messages.CALLED_OFF()
+                if left := await self._grip.let_go(failed):
+                    raise GripError(left) from error
                 raise
             if left := await self._grip.let_go():
                 raise GripError(left)

@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from station.calibration.rig import Place, Pressed
 from station.devices.camera.interface import Image
 from station.devices.gripper.interface import ObjectState
+from station.messages import grip as messages
 from station.service.grip import FRAME_DEADLINE_S, Cell, Grip, GripError
 from station.settings.recipe import Recipe
 
@@ -38,10 +39,7 @@ class StationRig:
         opened = await gripper.open()
         stopped = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
         if stopped or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
-            raise GripError(
-                f"the jaws stand at {opened.width_mm:.1f} mm and not open, {gripper.max_width_mm:.1f} mm: take out "
-                "what holds them"
-            )
+            raise GripError(messages.JAWS_NOT_OPEN(width_mm=opened.width_mm, open_mm=gripper.max_width_mm))
         await self._grip.go("above_nest", "home")
         frames = [frame.image for frame in await self._grip.sound_frames(number)]
         await self._grip.go("above_nest", "nest")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from station.channel.panel import RecoveryName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
-from station.devices.camera.interface import CameraError
+from station.devices.camera.interface import CameraError, describe
 from station.devices.camera.open import camera_from
 from station.devices.gripper.errors import (
     NEEDS_ACTIVATION,
@@ -19,11 +19,15 @@ from station.devices.gripper.errors import (
 )
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import StationError
+from station.messages import camera as camera_messages
+from station.messages import device as device_messages
+from station.messages import gripper as gripper_messages
 from station.service.device_monitor import DeviceMonitor
 from station.service.grip import FRAME_DEADLINE_S, Cell, FramesError
 from station.settings.configuration import Configuration
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
+TITLES = {CAMERA: device_messages.CAMERA(), GRIPPER: device_messages.GRIPPER(), ARM: device_messages.ARM()}
 SAFETY_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """Stops by the arm's safety controller that a person has to check at the cell."""
 _BAD_FRAMES = 3
@@ -67,6 +71,7 @@ class DeviceManager:
         self.monitors = {
             name: DeviceMonitor(
                 name,
+                TITLES[name],
                 check,
                 _ARM_PAUSE_S if name == ARM else configuration.service.retry_longest_s,
                 lambda fault, name=name: on_change(name, fault),
@@ -226,10 +231,7 @@ class DeviceManager:
         self._not_activated = None
 
     async def _leave_the_nest(self, width_mm: float) -> None:
-        refusal = GripperNotActiveError(
-            "it is not activated, and what is between its jaws is not known",
-            "take out what is between them, then reset the station: the jaws travel their whole way",
-        )
+        refusal = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
         if self._arm is None:
             raise refusal
         state = await self._arm.state()
@@ -248,8 +250,7 @@ class DeviceManager:
         known_ill = isinstance(self.monitors[CAMERA].fault, FramesError)  # which only a good frame ends
         if self._bad_frames >= _BAD_FRAMES or (frame.faults and known_ill):
             raise FramesError(
-                f"camera: {self._bad_frames} bad frames in a row ({', '.join(sorted(frame.faults))}); check its cable "
-                "and its light, then `station devices check`",
+                camera_messages.BAD_FRAMES(number=self._bad_frames, faults=describe(frame.faults)),
                 frame.faults,
             )
 
@@ -259,7 +260,7 @@ class DeviceManager:
             raise self._not_activated or GripperFaultError(reading.fault_code)
         if not reading.active:
             raise self._not_activated or GripperNotActiveError(
-                "it is not activated", "wait: the station activates it where that is safe"
+                gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT()
             )
 
     async def _check_arm(self) -> None:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Awaitable, Callable
 
 from station.errors import StationError
+from station.messages import device as messages
+from station.messages.message import Message
 
 PERIOD_S = 0.25
 FIRST_PAUSE_S = 0.25
@@ -26,7 +28,8 @@ class DeviceMonitor:
     """Monitor task of one device. It runs for ever, with growing pauses while the device is away.
 
     Args:
-        name: of the device, as in messages.
+        name: of the device, as in the log.
+        title: its name as a person reads it.
         check: checks the device.
         longest_pause_s: between two checks.
         on_change: gets the fault from now on, None for no fault.
@@ -36,13 +39,14 @@ class DeviceMonitor:
     def __init__(
         self,
         name: str,
+        title: Message,
         check: Check,
         longest_pause_s: float,
         on_change: Callable[[StationError | None], None],
         on_progress: Callable[[], None],
     ) -> None:
         self.name = name
-        self.fault: StationError | None = NoAnswerYetError(f"{name}: it has not answered yet; wait a moment")
+        self.fault: StationError | None = NoAnswerYetError(messages.NO_ANSWER_YET(device=title))
         self.heard_s: float | None = None
         """Monotonic time of the last check that found the device healthy."""
         self.in_use = False
@@ -108,7 +112,7 @@ class DeviceMonitor:
 
     def _set(self, fault: StationError | None) -> None:
         before, self.fault = self.fault, fault
-        if str(before or "") != str(fault or ""):
-            log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault or "well")
+        if (before and before.message) != (fault and fault.message):
+            log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault.message if fault else "well")
         if (before is None) != (fault is None) or type(before) is not type(fault):
             self._on_change(fault)

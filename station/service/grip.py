@@ -10,10 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from station.devices.arm.arm import Arm
-from station.devices.camera.interface import Camera, Frame, FrameFault, Image
+from station.devices.camera.interface import Camera, Frame, FrameFault, Image, describe
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import Gripper, GripperReading, MoveResult, ObjectState
 from station.errors import StationError
+from station.messages import grip as messages
+from station.messages.message import Definition, Message
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 from station.vision.step import mean_image
@@ -34,8 +36,8 @@ class GripError(StationError):
 class FramesError(GripError):
     """The camera gives frames, and none that can be measured."""
 
-    def __init__(self, text: str, faults: Collection[FrameFault]) -> None:
-        super().__init__(text)
+    def __init__(self, message: Message, faults: Collection[FrameFault]) -> None:
+        super().__init__(message)
         self.faults = frozenset(faults)
         """What was wrong with them."""
 
@@ -340,34 +342,35 @@ class Grip:
     def _nothing_touched(self, move: MoveResult | None = None) -> GripError:
         """The error for fingers that have closed without a contact, held by something or not."""
         if move is not None and move.reading.object_state is ObjectState.CONTACT_CLOSING:
-            return UnseenContactError(
-                f"the gripper holds something at {move.width_mm:.1f} mm which the gel does not show: look "
-                "for what stands between the fingers beside the gel, then `station devices check`"
-            )
+            return UnseenContactError(messages.UNSEEN_CONTACT(width_mm=move.width_mm))
         expected = self._recipe.expected_width
         return NothingTouchedError(
-            f"nothing was touched from {expected.largest_mm:g} down to {expected.smallest_mm:g} mm: is a "
-            f"{self._recipe.name} in the nest, and is the arm there?"
+            messages.NOTHING_TOUCHED(
+                largest_mm=expected.largest_mm, smallest_mm=expected.smallest_mm, recipe=self._recipe.name
+            )
         )
 
     async def _glance(self, width_mm: float, number: int = -1, frames: int = 1) -> GripStep:
         move = await self.close_to(width_mm)
         return GripStep(number, move, await self.sound_frames(frames))
 
-    async def let_go(self) -> str | None:
+    async def let_go(self, after: Message | None = None) -> Message | None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
 
+        Args:
+            after: what failed before; part of what is returned.
+
         Returns:
-            What could not be done, in words.
+            What could not be done; None if all was.
         """
         try:
             await self._cell.gripper.open()
         except StationError as error:
-            return f"The gripper could not be opened, and the arm stays where it is: {error}"
+            return _combined(after, error.message, messages.NOT_OPENED, messages.FAILED_NOT_OPENED)
         try:
             await self.go("above_nest", "home")
         except StationError as error:
-            return f"The gripper is open, and the arm stays where it is: {error}"
+            return _combined(after, error.message, messages.NOT_LEFT, messages.FAILED_NOT_LEFT)
         return None
 
     async def _sound_frame(self, newer_than_s: float) -> Frame:
@@ -380,7 +383,15 @@ class Grip:
             faults |= frame.faults
             newer_than_s = frame.captured_s
         raise FramesError(
-            f"the camera gave {_MOST_FAULTY_FRAMES} bad frames in a row ({', '.join(sorted(faults))}); "
-            "see `station devices check`",
+            messages.BAD_FRAMES(number=_MOST_FAULTY_FRAMES, faults=describe(faults)),
             faults,
         )
+
+
+def _combined(after: Message | None, reason: Message, alone: Definition, with_same_reason: Definition) -> Message:
+    """Return what kept the station from letting go, with what failed before; a reason of both appears once."""
+    if after is None:
+        return alone(reason=reason)
+    if after == reason:
+        return with_same_reason(reason=reason)
+    return messages.FAILED_TWICE(reason=after, release=alone(reason=reason))

@@ -10,6 +10,8 @@ import numpy as np
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
+from station.messages import grip as messages
+from station.messages.message import Message
 from station.service.state_files import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
@@ -29,8 +31,8 @@ ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEA
 class BadReferenceError(StationError):
     """The picture cannot be a reference; the message gives the reason and the remedy."""
 
-    def __init__(self, alarm: AlarmId, text: str) -> None:
-        super().__init__(text)
+    def __init__(self, alarm: AlarmId, message: Message) -> None:
+        super().__init__(message)
         self.alarm = alarm
 
 
@@ -52,7 +54,7 @@ class PreparedReference:
     shape: tuple[int, ...]
     sharpness: float
     method: Method
-    renewal: str
+    renewal: Message
     """Instruction to make another one."""
 
 
@@ -101,12 +103,12 @@ class GoldenReference:
         if self._read()[0] is None:
             self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
 
-    def _read(self) -> tuple[bytes | None, str]:
+    def _read(self) -> tuple[bytes | None, Message]:
         """Return its file's content, and the instruction to make another one."""
         calibrated = self._calibrated()
         if calibrated is not None and (data := self._state_files.read(str(calibrated))) is not None:
-            return data, "calibrate"
-        return self._state_files.read(GOLDEN), f"remove {GOLDEN} from the home folder"
+            return data, messages.RENEW_BY_CALIBRATION()
+        return self._state_files.read(GOLDEN), messages.RENEW_BY_REMOVAL(file=GOLDEN)
 
 
 def check_reference(image: Image, golden: PreparedReference | None, settings: ReferenceSettings) -> ReferenceProperties:
@@ -124,8 +126,7 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
     if saturated > settings.saturated_share:
         raise BadReferenceError(
             AlarmId.CAMERA_SATURATED,
-            f"reference: {saturated:.0%} of it are saturated, at most {settings.saturated_share:.0%} may be: "
-            "keep outside light off the gel, or lower the LEDs",
+            messages.REFERENCE_SATURATED(found=100 * saturated, limit=100 * settings.saturated_share),
         )
     detail = sharpness(image)
     if golden is None or golden.shape != image.shape:
@@ -136,20 +137,17 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
     if share < settings.least_sharpness:
         raise BadReferenceError(
             AlarmId.CAMERA_DIRTY,
-            f"reference: {share:.0%} as sharp as the golden reference, at least {settings.least_sharpness:.0%} are "
-            "needed: clean the sensor's lens and gel",
+            messages.REFERENCE_BLURRED(found=100 * share, limit=100 * settings.least_sharpness),
         )
     if drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
         raise BadReferenceError(
             AlarmId.CAMERA_LED_DEAD,
-            f"reference: its light differs from the golden reference's by {drift:.0f} grey levels: look at the "
-            f"sensor's LEDs; after a change of gel or sensor {golden.renewal}",
+            messages.REFERENCE_LIGHT(levels=drift, renewal=golden.renewal),
         )
     if contact.found if contact.gate is None else contact.gate > settings.most_change:
         raise BadReferenceError(
             AlarmId.REFERENCE_BAD,
-            "reference: something touches the gel that the golden reference does not have: take it out and wipe the "
-            f"gel; if the gel was changed, {golden.renewal}",
+            messages.REFERENCE_TOUCHED(renewal=golden.renewal),
         )
     return ReferenceProperties(detail, saturated, drift)
 

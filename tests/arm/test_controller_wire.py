@@ -15,6 +15,8 @@ import pytest
 
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
+from station.messages import arm as messages
+from station.messages.message import Message
 from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController
@@ -393,21 +395,21 @@ def test_the_dashboard_answers_line_by_line(bench, until):
 
 
 @pytest.mark.parametrize(
-    ("fault", "verdicts", "word"),
+    ("fault", "verdicts", "message"),
     [
-        (None, ["ok", "ok", "ok"], "PolyScope 5.22"),
-        ("local_mode", ["fault", "ok", "ok"], "remote control"),
-        ("emergency_stop", ["fault", "ok", "ok"], "button"),
-        ("protective_stop", ["fault", "ok", "ok"], "confirm"),
-        ("registers_in_use", ["ok", "warning", "ok"], "EtherNet/IP"),
-        ("rtde_silent", ["ok", "fault", "ok"], "answers later than 2.5 s"),
-        ("stuck", ["ok", "fault", "ok"], "frozen"),
-        ("delayed", ["ok", "fault", "ok"], "late"),
-        ("link_cut", ["fault"], "Check arm.host"),
-        ("garbage", ["fault"], "cable"),
+        (None, ["ok", "ok", "ok"], messages.CHECK_REMOTE),
+        ("local_mode", ["fault", "ok", "ok"], messages.REMEDY_LOCAL_CONTROL),
+        ("emergency_stop", ["fault", "ok", "ok"], messages.REMEDY_EMERGENCY_STOP),
+        ("protective_stop", ["fault", "ok", "ok"], messages.REMEDY_PROTECTIVE_STOP),
+        ("registers_in_use", ["ok", "warning", "ok"], messages.REMEDY_REGISTERS_IN_USE),
+        ("rtde_silent", ["ok", "fault", "ok"], messages.CHECK_RTDE_LATE),
+        ("stuck", ["ok", "fault", "ok"], messages.CHECK_RTDE_FROZEN),
+        ("delayed", ["ok", "fault", "ok"], messages.CHECK_RTDE_FROZEN),
+        ("link_cut", ["fault"], messages.DASHBOARD_ABSENT),
+        ("garbage", ["fault"], messages.REMEDY_HOST),
     ],
 )
-def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdicts, word):
+def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdicts, message):
     async def run():
         async with bench() as made:
             if fault is not None:
@@ -415,8 +417,10 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
                 await asyncio.sleep(0.1)
             findings = await probe_arm(made.settings())
             assert [finding.verdict for finding in findings] == verdicts
-            assert word in " ".join(finding.found + finding.remedy for finding in findings)
-            assert all(bool(finding.remedy) == (finding.verdict != "ok") for finding in findings)
+            said = [each for finding in findings for each in (finding.found, finding.remedy) if each is not None]
+            said += [each for one in said for each in one.parameters.values() if isinstance(each, Message)]
+            assert message.id in {each.id for each in said}
+            assert all((finding.remedy is None) == (finding.verdict == "ok") for finding in findings)
 
     asyncio.run(run())
 
@@ -448,9 +452,10 @@ def test_the_device_check_cuts_what_a_peer_says_too_much(bench):
         async with bench() as made:
             made.controller.serial_number = "\x1b[31m" + "9" * 3000
             findings = await probe_arm(made.settings())
-            assert "9" * 100 in findings[0].found
-            assert len(findings[0].found) < 400
-            assert "\x1b" not in findings[0].found
+            found = str(findings[0].found)
+            assert "9" * 100 in found
+            assert len(found) < 400
+            assert "\x1b" not in found
 
     asyncio.run(run())
 

@@ -76,5 +76,12 @@ def test_ur_rtdes_own_words_are_understood(words, cause):
     assert (fault and fault.cause) == cause
 
 
+@pytest.mark.parametrize("output", ["", "ur_rtde: the script ended"])
+@pytest.mark.parametrize("playing", [False, True])
+def test_ur_rtdes_output_is_part_of_the_fault(playing, output):
+    fault = diagnose(snapshot(runtime_state=2 if playing else 1), facts(), output, was_healthy=True)
+    assert fault.detail.parameters.get("output", "") == output
+
+
 def test_every_cause_has_a_remedy():
     assert set(REMEDIES) == set(ArmCause)

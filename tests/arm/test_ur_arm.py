@@ -12,9 +12,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
 from station.devices.arm.messages import Reachable
 from station.devices.arm.ur import UrArm
+from station.messages import arm as messages
 from station.settings.arm import ArmPoses, ArmSettings
 from station.twin.ur.script import RuntimeState
 
@@ -29,7 +30,7 @@ async def moving(bench) -> bool:
 async def cause_of(awaitable) -> ArmCause:
     with pytest.raises(ArmFault) as caught:
         await awaitable
-    assert caught.value.remedy in str(caught.value)
+    assert caught.value.message == messages.FAULT(cause=caught.value.detail, remedy=REMEDIES[caught.value.cause])
     return caught.value.cause
 
 
@@ -437,7 +438,6 @@ def test_an_order_ends_when_the_state_has_grown_too_old(healthy_arm, fault):
                 with pytest.raises(ArmFault) as caught:
                     await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
             assert caught.value.cause is ArmCause.LINK_LOST
-            assert "Reachable" not in str(caught.value)
             bench.faults.clear(fault)
             await arm.ready(15.0)
 
@@ -448,9 +448,10 @@ def test_an_order_does_not_wait_for_ever_for_its_turn(healthy_arm):
     async def run():
         async with healthy_arm(call_deadline_s=0.5) as (_, arm), arm._link._lock:
             async with asyncio.timeout(5.0):
-                with pytest.raises(ArmFault, match="when asked whether the pose is reachable") as caught:
+                with pytest.raises(ArmFault) as caught:
                     await arm._link.order(Reachable(joints_rad=arm._settings.poses.accept))
             assert caught.value.cause is ArmCause.BUSY
+            assert caught.value.detail == messages.LINK_BUSY(limit_s=0.5, request=messages.REQUEST_REACHABLE())
 
     asyncio.run(run())
 
@@ -570,6 +571,7 @@ def test_the_process_goes_when_its_caller_is_killed(bench, until, short_folder, 
     caller = """
 import asyncio, sys
 from station.devices.arm.ur import UrArm
+from station.messages import arm as messages
 from station.settings.arm import ArmSettings
 
 async def main():

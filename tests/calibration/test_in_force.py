@@ -26,6 +26,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.panel_live import GetPanelState, PanelState
+from station.messages import grip as messages
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
 from station.service.active_calibration import ActiveCalibration
@@ -79,7 +80,7 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     assert not (tmp_path / "golden_reference.png").exists()
     prepared = golden.prepared(Segmentation())
     assert prepared is not None
-    assert prepared.renewal == "calibrate"
+    assert prepared.renewal == messages.RENEW_BY_CALIBRATION()
     another = in_use(tmp_path, calibration.made_at, "D11111")
     assert another.in_force[:2] == (0.0266, "none: 0.0266 mm/px, by the configuration")
     assert (another.gate_factor, another.golden()) == (1.0, None)

@@ -5,6 +5,11 @@ import sys
 
 import pytest
 
+from station.messages import arm as arm_messages
+from station.messages import camera as camera_messages
+from station.messages import gripper as gripper_messages
+from station.messages.message import verbatim
+
 DEVICES = ("arm controller", "arm RTDE", "arm programs", "gripper", "camera")
 
 
@@ -17,7 +22,7 @@ def test_a_sound_cell_names_every_device_with_what_it_is(shared_cell):
     done = shared_cell.station("devices", "check")
     assert done.returncode == 0, done.stderr
     assert verdicts(done.stdout) == dict.fromkeys(DEVICES, "ok") | {"gripper": "warning"}
-    assert "not activated" in done.stdout
+    assert str(gripper_messages.CHECK_NOT_ACTIVE()) in done.stdout
     assert "PolyScope 5.22" in done.stdout
     assert "480x640" in done.stdout
 
@@ -60,25 +65,33 @@ def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
 
 
 @pytest.mark.parametrize(
-    ("arm", "gripper", "words"),
+    ("arm", "gripper", "said"),
     [
         (
             "no-such-robot.invalid",
             "{driver: modbus_rtu, modbus_rtu: {serial_port: /dev/no-such-port}}",
-            ("there is no machine of that name", "/dev/no-such-port", "check the serial port"),
+            (
+                arm_messages.DASHBOARD_UNKNOWN_HOST(address="no-such-robot.invalid:29999"),
+                gripper_messages.UNREACHABLE(
+                    place=gripper_messages.PLACE_MODBUS_RTU(unit=9, address="/dev/no-such-port")
+                ),
+                gripper_messages.REMEDY_SERIAL(),
+            ),
         ),
         (
             "{nobody}",
             "{urcap: {host: {nobody}}}",
             (
-                "no controller answers at {nobody}",
-                "URCap at {nobody}:63352 (Connection refused)",
-                "check the robot's address",
+                arm_messages.DASHBOARD_ABSENT(address="{nobody}:29999"),
+                gripper_messages.UNREACHABLE_BECAUSE(
+                    place=gripper_messages.PLACE_URCAP(address="{nobody}:63352"), reason=verbatim("Connection refused")
+                ),
+                gripper_messages.REMEDY_URCAP(),
             ),
         ),
     ],
 )
-def test_a_sites_wrong_addresses_are_named_with_what_to_correct(own_host, tmp_path, arm, gripper, words):
+def test_a_sites_wrong_addresses_are_named_with_what_to_correct(own_host, tmp_path, arm, gripper, said):
     nobody = own_host()
     file = tmp_path / "station.yaml"
     file.write_text(
@@ -89,5 +102,5 @@ def test_a_sites_wrong_addresses_are_named_with_what_to_correct(own_host, tmp_pa
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 1
     assert done.stderr == "station: not usable: arm, camera, gripper\n"
-    for word in (*words, "Check arm.host in station.yaml", "no DIGIT D00001 is plugged in", "check cable and serial"):
-        assert word.replace("{nobody}", nobody) in done.stdout
+    for each in (*said, arm_messages.REMEDY_HOST(), camera_messages.NONE_PLUGGED_IN(serial="D00001")):
+        assert str(each).replace("{nobody}", nobody) in done.stdout

@@ -8,6 +8,7 @@ import pytest
 from station.devices.gripper.errors import GripperTimeoutError
 from station.devices.gripper.link import State, Status
 from station.devices.gripper.robotiq import Robotiq2F85
+from station.messages import gripper as messages
 from station.settings.gripper import GripperSettings
 
 START = Status(state=State.ACTIVE, go_to=True, object_=3, fault=0, echo=50, position=50, current_a=None)
@@ -19,7 +20,7 @@ WIDTH_MM = 34.3
 class ScriptedLink:
     """Gives one status after another, the last one for ever."""
 
-    place = "a script"
+    place = messages.PLACE_URCAP(address="a script")
 
     def __init__(self, *statuses: Status) -> None:
         self._statuses = [START, *statuses]
@@ -73,6 +74,7 @@ def test_contact_ends_the_move_once_the_fingers_stand():
 )
 def test_what_is_no_arrival_ends_in_a_time_out_and_a_halt(never: Status):
     link = ScriptedLink(never)
-    with pytest.raises(GripperTimeoutError, match=f"count {TARGET}"):
+    with pytest.raises(GripperTimeoutError) as caught:
         moved(link)
+    assert caught.value.cause.parameters["step"] == messages.STEP_MOVE(count=TARGET)
     assert link.sent == [f"go_to {TARGET}", "halt"]

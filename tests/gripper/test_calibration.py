@@ -15,6 +15,7 @@ from station.devices.gripper.calibration import (
     width_of_count,
 )
 from station.devices.gripper.errors import GripperRequestError
+from station.messages import gripper as messages
 from station.settings.gripper import GripperCalibration
 
 
@@ -63,8 +64,10 @@ def test_the_digit_leaves_53_mm_of_the_85():
 
 @pytest.mark.parametrize("width_mm", [-0.1, 53.1, nan])
 def test_a_width_out_of_reach_is_refused_with_the_reach(width_mm: float):
-    with pytest.raises(GripperRequestError, match=r"0 to 53\.00 mm"):
+    with pytest.raises(GripperRequestError) as caught:
         count_for_width(width_mm, GripperCalibration())
+    assert caught.value.cause.id == messages.WIDTH_OUT_OF_REACH.id
+    assert caught.value.cause.parameters["widest_mm"] == pytest.approx(53.0)
 
 
 def test_fingers_that_leave_no_room_are_refused():
@@ -86,11 +89,17 @@ def test_a_force_setting_never_means_more_than_was_asked(force_n: float):
 
 @pytest.mark.parametrize("force_n", [0.0, 19.9, 235.1, nan])
 def test_a_force_out_of_range_is_refused(force_n: float):
-    with pytest.raises(GripperRequestError, match="20 to 235 N"):
+    with pytest.raises(GripperRequestError) as caught:
         force_setting(force_n)
+    cause = caught.value.cause
+    assert cause.id == messages.FORCE_OUT_OF_RANGE.id
+    assert (cause.parameters["weakest_n"], cause.parameters["strongest_n"]) == (20.0, 235.0)
 
 
 @pytest.mark.parametrize("speed_mm_s", [0.0, 19.0, 151.0, nan])
 def test_a_speed_out_of_range_is_refused(speed_mm_s: float):
-    with pytest.raises(GripperRequestError, match="20 to 150 mm/s"):
+    with pytest.raises(GripperRequestError) as caught:
         speed_setting(speed_mm_s)
+    cause = caught.value.cause
+    assert cause.id == messages.SPEED_OUT_OF_RANGE.id
+    assert (cause.parameters["slowest_mm_s"], cause.parameters["fastest_mm_s"]) == (20.0, 150.0)

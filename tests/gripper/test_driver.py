@@ -8,9 +8,15 @@ from typing import Any
 
 import pytest
 
-from station.devices.gripper.errors import GripperNotActiveError, GripperRequestError, GripperStoppedError
+from station.devices.gripper.errors import (
+    GripperFaultError,
+    GripperNotActiveError,
+    GripperRequestError,
+    GripperStoppedError,
+)
 from station.devices.gripper.interface import Gripper, ObjectState
 from station.devices.gripper.probe import probe_gripper
+from station.messages import gripper as messages
 from station.twin.robotiq.load import Spring
 from station.twin.robotiq.registers import Command
 
@@ -22,8 +28,9 @@ HALF_COUNT_MM = 85 / 227 / 2
 def test_activation_makes_ready_once_and_then_moves_nothing(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         rig.twin.write(Command())
-        with pytest.raises(GripperNotActiveError, match="activate it"):
+        with pytest.raises(GripperNotActiveError) as caught:
             await rig.driver.open()
+        assert caught.value.cause == messages.NOT_ACTIVE()
         assert not (await rig.driver.read()).active
         began_s = time.monotonic()
         assert (await rig.driver.activate()).active
@@ -194,20 +201,21 @@ def test_the_probe_says_what_is_there_and_moves_nothing(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         before = rig.twin.command
         (finding,) = await probe_gripper(rig.settings)
-        assert (finding.verdict, finding.remedy) == ("ok", "")
-        assert "position 3, width 53.0 mm" in finding.found
+        assert (finding.verdict, finding.remedy) == ("ok", None)
+        assert finding.found.parameters["count"] == 3
+        assert finding.found.parameters["width_mm"] == pytest.approx(53.0)
         assert rig.twin.command == before
         rig.faults.set("overcurrent")
         (finding,) = await probe_gripper(rig.settings)
         assert finding.verdict == "fault"
-        assert "overcurrent" in finding.found
+        assert finding.found.parameters["trouble"] == GripperFaultError(0xE).cause
         rig.faults.clear()
         rig.twin.write(Command())
         rig.twin.write(Command(activate=True))
         rig.twin.write(Command())
         (finding,) = await probe_gripper(rig.settings)
         assert finding.verdict == "warning"
-        assert "activate it" in finding.remedy
+        assert finding.remedy == messages.REMEDY_CLEAR_AND_ACTIVATE()
         await rig.server.stop()
         (finding,) = await probe_gripper(rig.settings)
         assert finding.verdict == "fault"

@@ -10,7 +10,10 @@ import pytest
 import structlog
 
 from station.channel.line import Reason
+from station.devices.gripper.errors import GripperFaultError
 from station.logs import configure_logging, inspecting
+from station.messages import gripper as messages
+from station.messages.message import Message
 from station.service.log_line import fruit_line
 
 
@@ -91,6 +94,37 @@ def test_secrets_are_hidden_in_fields_and_in_tracebacks(logged):
     login, _, failed = lines(stream)
     assert (login["user"], login["spinning"], login["api_key"]) == ("ann", 1, "(hidden)")
     assert "RuntimeError: no access" in failed["exception"]
+
+
+def test_an_error_of_the_grippers_is_logged_with_its_id_and_its_parameters(logged):
+    stream = logged()
+    error = GripperFaultError(0xA)
+    logging.getLogger("station.x").warning("%s: %s", "gripper 100 %", error.message)
+    logging.getLogger("station.x").warning("gripper", extra={"fault": error})
+    structlog.get_logger("x").warning("gripper: %s", error)
+    logging.getLogger("station.x").warning("%s, %s", error.message, messages.NOT_ACTIVE())
+    logging.getLogger("station.x").warning("%(what)s", {"what": error})
+    written, field, structured, both, mapped = lines(stream)
+    for line in (written, field, structured, mapped):
+        assert line["message"] == messages.FAULT.id
+        assert line["parameters"]["cause"]["parameters"]["name"] == "under_voltage"
+        assert line["parameters"]["remedy"] == {"id": messages.REMEDY_UNDER_VOLTAGE.id, "parameters": {}}
+    assert written["event"] == f"gripper 100 %: {error}"
+    assert field["fault"] == str(error)
+    assert structured["event"] == f"gripper: {error}"
+    assert [each["id"] for each in both["parameters"]["sentences"]] == [messages.FAULT.id, messages.NOT_ACTIVE.id]
+    assert Message.model_validate_json(json.dumps({"id": written["message"], "parameters": written["parameters"]})) == (
+        error.message
+    )
+
+
+def test_a_person_reads_the_sentence_alone(logged):
+    stream = logged("human")
+    error = GripperFaultError(0xA)
+    logging.getLogger("station.x").warning("gripper: %s", error.message)
+    (line,) = stream.getvalue().splitlines()
+    assert str(error) in line
+    assert messages.FAULT.id not in line
 
 
 def test_a_second_configuration_replaces_the_first(logged):

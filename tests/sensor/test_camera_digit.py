@@ -8,6 +8,7 @@ import pytest
 from station.devices.camera.digit import DigitCamera, DigitDevice, find_digits, packed_leds, set_mode, to_portrait
 from station.devices.camera.interface import CameraError, Leds, NoCameraError
 from station.devices.camera.probe import probe_camera
+from station.messages import camera as messages
 from station.settings.camera import CameraSettings, DigitSettings
 
 
@@ -96,8 +97,11 @@ def test_the_mode_is_asked_for_in_full_with_no_queue_of_old_frames():
 
 
 def test_a_mode_other_than_asked_for_is_an_error():
-    with pytest.raises(CameraError, match="asked for 640x480 at 30 frames/s, the driver gave 320x480 at 30"):
+    with pytest.raises(CameraError) as caught:
         set_mode(FakeCapture(width=320.0), "D20966")
+    assert caught.value.message.id == messages.WRONG_MODE.id
+    wanted, given = ("width", "height", "rate"), ("given_width", "given_height", "given_rate")
+    assert [caught.value.message.parameters[name] for name in (*wanted, *given)] == [640, 480, 30, 320, 480, 30]
 
 
 def test_frames_are_portrait_and_a_lost_sensor_is_found_again_by_its_serial(tmp_path):
@@ -141,9 +145,9 @@ class DarkCapture(FakeCapture):
 @pytest.mark.parametrize(
     ("revision", "capture", "notice"),
     [
-        ("0200", FakeCapture, ""),
-        ("0110", FakeCapture, "its light cannot be set colour by colour: write firmware 0200 or newer to it"),
-        ("0200", DarkCapture, "it refused its light's setting: unplug it and plug it in again"),
+        ("0200", FakeCapture, None),
+        ("0110", FakeCapture, messages.LIGHT_FIRMWARE(revision="0200")),
+        ("0200", DarkCapture, messages.LIGHT_REFUSED()),
     ],
 )
 def test_a_light_that_cannot_be_set_is_told(tmp_path, monkeypatch, revision, capture, notice):
@@ -155,7 +159,7 @@ def test_a_light_that_cannot_be_set_is_told(tmp_path, monkeypatch, revision, cap
     if notice:
         assert (finding.verdict, finding.remedy) == ("warning", notice)
     else:
-        assert "light" not in finding.remedy
+        assert finding.remedy is None or finding.remedy.id == messages.REMEDY_SLOW.id
 
 
 class ThrowingCapture(FakeCapture):
@@ -191,7 +195,9 @@ def test_no_such_sensor_is_said_with_those_that_are_there(tmp_path):
 
     async def play():
         camera = DigitCamera(CameraSettings(driver="digit", open_deadline_s=0.2), listing)
-        with pytest.raises(NoCameraError, match=r"no DIGIT D20966 is plugged in \(found: D20003\)"):
+        with pytest.raises(NoCameraError) as caught:
             await camera.open()
+        reason = caught.value.message.parameters["reason"]
+        assert reason == messages.NOT_PLUGGED_IN(serial="D20966", found="D20003")
 
     asyncio.run(play())

@@ -7,6 +7,7 @@ import time
 import pytest
 
 from station.channel.line import CommandName
+from station.devices.gripper.errors import GripperFaultError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED
 from station.inspection.states import State
@@ -136,7 +137,7 @@ def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the
             await cell.line.ready()
             cell.twin.boards["gripper"].set("under_voltage")
             await until(lambda: AlarmId.GRIPPER_FAULT in active(cell))
-            assert "supply is too low" in str(cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail)
+            assert cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail == GripperFaultError(0xA).message
             cell.twin.boards["gripper"].clear()
             cell.twin.world.remove()
             done = await cell.line.order(CommandName.RESET)

@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from station.messages.message import verbatim
 from station.service.grip import FramesError, at_once
 
 
@@ -19,7 +20,7 @@ def test_where_one_fails_the_others_are_cancelled_and_its_own_error_is_raised():
 
     async def fails():
         await asyncio.sleep(0)
-        raise FramesError("no good frame", ())
+        raise FramesError(verbatim("no good frame"), ())
 
     with pytest.raises(FramesError, match="no good frame"):
         asyncio.run(at_once(waits(), fails(), waits()))

@@ -10,6 +10,7 @@ from station.devices.gripper.errors import GripperFaultError
 from station.errors import StationError
 from station.inspection.cycle import Action, Event
 from station.inspection.states import State
+from station.messages.message import verbatim
 from station.records.errors import DiskFullError
 from station.service.conductor import Conductor, event_of
 from station.service.grip import FramesError
@@ -18,13 +19,13 @@ from station.service.grip import FramesError
 @pytest.mark.parametrize(
     ("fault", "event"),
     [
-        (ArmFault(ArmCause.PROTECTIVE_STOP, "x"), Event.PROTECTIVE_STOP),
-        (ArmFault(ArmCause.EMERGENCY_STOP, "x"), Event.EMERGENCY_STOP),
-        (ArmFault(ArmCause.SAFETY_FAULT, "x"), Event.SAFETY_FAULT),
-        (ArmFault(ArmCause.LINK_LOST, "x"), Event.ARM_FAULT),
+        (ArmFault(ArmCause.PROTECTIVE_STOP, verbatim("x")), Event.PROTECTIVE_STOP),
+        (ArmFault(ArmCause.EMERGENCY_STOP, verbatim("x")), Event.EMERGENCY_STOP),
+        (ArmFault(ArmCause.SAFETY_FAULT, verbatim("x")), Event.SAFETY_FAULT),
+        (ArmFault(ArmCause.LINK_LOST, verbatim("x")), Event.ARM_FAULT),
         (GripperFaultError(0xC), Event.GRIPPER_FAULT),
         (NoFrameError("x"), Event.CAMERA_FAULT),
-        (FramesError("x", ()), Event.CAMERA_FAULT),
+        (FramesError(verbatim("x"), ()), Event.CAMERA_FAULT),
         (DiskFullError("x", "y"), Event.RECORDS_FAULT),
         (StationError("x"), Event.INTERNAL_FAULT),
         (ValueError("x"), Event.INTERNAL_FAULT),

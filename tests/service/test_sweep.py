@@ -10,6 +10,7 @@ import pytest
 from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.messages import gripper as gripper_messages
 from station.service import grip as grip_module
 from station.service.grip import MOST_UNSEEN_MM, Cell, Grip, NothingTouchedError, UnseenContactError
 from station.settings.recipe import find_recipe
@@ -50,7 +51,7 @@ class Fingers:
             self._ticked.clear()
             await self._ticked.wait()
             if self._stopped.is_set():
-                raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+                raise GripperStoppedError(gripper_messages.STOPPED(), gripper_messages.REMEDY_STOPPED())
         return MoveResult(width_mm, 0, await self.read())
 
     async def open(self, width_mm: float | None = None) -> MoveResult:

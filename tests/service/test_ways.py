@@ -7,9 +7,12 @@ import pytest
 
 from station.channel.line import CommandDone, CommandName, PackmlState
 from station.channel.panel import Recover
+from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.gripper.errors import GripperSilentError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
+from station.messages import arm as arm_messages
+from station.messages.message import verbatim
 from station.twin.ur.controller import UrController
 from station.vocabulary import Reason
 
@@ -88,7 +91,8 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                 faults.clear("link_cut")
                 while AlarmId.ARM_NOT_REMOTE not in active(cell):
                     await asyncio.sleep(0.05)
-            assert "claim registers" in str(cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail)
+            fault = ArmFault(ArmCause.REGISTERS_IN_USE, arm_messages.REGISTERS_IN_USE())
+            assert cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail == fault.message
             faults.clear()
             done = await line.client.request(Recover(what="program"), CommandDone, deadline_s=60)
             assert done.done, done.why
@@ -166,7 +170,7 @@ def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench)
             async def lose_one():
                 if not lost:
                     lost.append(await status())
-                    raise GripperSilentError("the answer was lost", "look at the network")
+                    raise GripperSilentError(verbatim("the answer was lost"), verbatim("look at the network"))
                 return await status()
 
             cell.at(State.PLACING_ACCEPT, lambda: setattr(gripper.link, "status", lose_one))

@@ -10,10 +10,12 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.messages import arm as messages
 
 PORT = 29999
 LINE_DEADLINE_S = 2.5
 LONGEST_LINE = 4096
+LONGEST_SHOWN = 160
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +46,9 @@ class DashboardConversation:
             async with asyncio.timeout(LINE_DEADLINE_S):
                 line = await self._reader.readline()
         except (TimeoutError, OSError, ValueError) as error:
-            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} says nothing") from error
+            raise ArmFault(ArmCause.LINK_LOST, messages.DASHBOARD_SILENT(host=self._host)) from error
         if not line.endswith(b"\n") or not line.isascii():
-            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} does not speak its protocol")
+            raise ArmFault(ArmCause.LINK_LOST, messages.DASHBOARD_PROTOCOL(host=self._host))
         return line.decode("ascii").strip()
 
     async def request(self, command: str) -> str:
@@ -59,7 +61,7 @@ class DashboardConversation:
             self._writer.write(command.encode("ascii") + b"\n")
             await self._writer.drain()
         except OSError as error:
-            raise ArmFault(ArmCause.LINK_LOST, f"the dashboard server at {self._host} hung up") from error
+            raise ArmFault(ArmCause.LINK_LOST, messages.DASHBOARD_CLOSED(host=self._host)) from error
         return await self.read_line()
 
     async def facts(self) -> DashboardFacts:
@@ -89,15 +91,15 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         async with asyncio.timeout(LINE_DEADLINE_S):
             reader, writer = await asyncio.open_connection(host, PORT, limit=LONGEST_LINE)
     except (TimeoutError, OSError) as error:
-        detail = f"no controller answers at {host}:{PORT}"
-        if isinstance(error, socket.gaierror):
-            detail = f"no controller answers at {host}:{PORT}: there is no machine of that name"
-        raise ArmFault(ArmCause.LINK_LOST, detail) from error
+        unknown = isinstance(error, socket.gaierror)
+        detail = messages.DASHBOARD_UNKNOWN_HOST if unknown else messages.DASHBOARD_ABSENT
+        raise ArmFault(ArmCause.LINK_LOST, detail(address=f"{host}:{PORT}")) from error
     try:
         conversation = DashboardConversation(host, reader, writer)
         greeting = await conversation.read_line()
         if "Dashboard Server" not in greeting:
-            raise ArmFault(ArmCause.LINK_LOST, f"what answers at {host}:{PORT} is no dashboard server: {greeting!r}")
+            other = messages.DASHBOARD_OTHER(address=f"{host}:{PORT}", greeting=repr(greeting[:LONGEST_SHOWN]))
+            raise ArmFault(ArmCause.LINK_LOST, other)
         yield conversation
     finally:
         writer.transport.abort()

@@ -3,17 +3,19 @@
 from station.devices.arm.dashboard import DashboardFacts
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Snapshot
+from station.messages import arm as messages
+from station.messages.message import Message
 
 RUNNING = 7
 """RTDE `robot_mode`: powered, brakes released."""
 PLAYING = 2
 """RTDE `runtime_state`."""
 
-SAFETY_CAUSES: tuple[tuple[int, ArmCause, str], ...] = (
-    (1 << 5 | 1 << 6 | 1 << 7, ArmCause.EMERGENCY_STOP, "an emergency stop is active"),
-    (1 << 8 | 1 << 9, ArmCause.SAFETY_FAULT, "the safety system reports a violation or a fault"),
-    (1 << 2, ArmCause.PROTECTIVE_STOP, "the arm is in a protective stop"),
-    (1 << 4, ArmCause.SAFEGUARD_STOP, "a safeguard stop is active"),
+SAFETY_CAUSES: tuple[tuple[int, ArmCause, Message], ...] = (
+    (1 << 5 | 1 << 6 | 1 << 7, ArmCause.EMERGENCY_STOP, messages.EMERGENCY_STOP()),
+    (1 << 8 | 1 << 9, ArmCause.SAFETY_FAULT, messages.SAFETY_FAULT()),
+    (1 << 2, ArmCause.PROTECTIVE_STOP, messages.PROTECTIVE_STOP()),
+    (1 << 4, ArmCause.SAFEGUARD_STOP, messages.SAFEGUARD_STOP()),
 )
 """Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first."""
 
@@ -23,11 +25,11 @@ STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
 
 def from_state(snapshot: Snapshot) -> ArmFault | None:
     """Return the cause that the state alone shows; None if power and safety let the arm move."""
-    for bits, cause, words in SAFETY_CAUSES:
+    for bits, cause, detail in SAFETY_CAUSES:
         if snapshot.safety_bits & bits:
-            return ArmFault(cause, words)
+            return ArmFault(cause, detail)
     if snapshot.robot_mode != RUNNING:
-        return ArmFault(ArmCause.NOT_POWERED, "the arm is not powered, or its brakes are on")
+        return ArmFault(ArmCause.NOT_POWERED, messages.NOT_POWERED())
     return None
 
 
@@ -44,23 +46,23 @@ def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: str, *, was_heal
     if fault is not None:
         return fault
     if not facts.remote:
-        return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
+        return ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
     if snapshot.runtime_state == PLAYING:
-        return ArmFault(ArmCause.DEADLINE, f"the control program plays and did not take the command {output}".rstrip())
+        not_taken = messages.COMMAND_NOT_TAKEN_BECAUSE(output=output) if output else messages.COMMAND_NOT_TAKEN()
+        return ArmFault(ArmCause.DEADLINE, not_taken)
     if not was_healthy:
-        return ArmFault(ArmCause.WATCHDOG, "the controller's watchdog stopped the program: the station was not healthy")
-    return ArmFault(ArmCause.PROGRAM_STOPPED, f"the control program was stopped on the controller {output}".rstrip())
+        return ArmFault(ArmCause.WATCHDOG, messages.WATCHDOG())
+    stopped = messages.PROGRAM_STOPPED_BECAUSE(output=output) if output else messages.PROGRAM_STOPPED()
+    return ArmFault(ArmCause.PROGRAM_STOPPED, stopped)
 
 
 def from_output(words: str) -> ArmFault | None:
     """Return the cause in ur-rtde's own exceptions; None if they leave it open."""
     lowered = words.lower()
     if "remote control" in lowered:
-        return ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no program")
+        return ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
     if "already in use" in lowered:
-        return ArmFault(
-            ArmCause.REGISTERS_IN_USE, "another client or a fieldbus holds the controller's input registers"
-        )
+        return ArmFault(ArmCause.REGISTERS_IN_USE, messages.REGISTERS_IN_USE())
     if "could not connect" in lowered or "timeout connecting" in lowered:
-        return ArmFault(ArmCause.LINK_LOST, f"ur-rtde could not connect: {words}")
+        return ArmFault(ArmCause.LINK_LOST, messages.CONNECTION_FAILED(output=words))
     return None

@@ -3,6 +3,8 @@
 from enum import StrEnum
 
 from station.errors import StationError
+from station.messages import arm as messages
+from station.messages.message import Message
 
 
 class ArmCause(StrEnum):
@@ -29,39 +31,38 @@ class ArmCause(StrEnum):
     CLOSED = "closed"
 
 
-REMEDIES: dict[ArmCause, str] = {
-    ArmCause.LINK_LOST: "Check that the controller is on and its network cable is in; the driver keeps trying.",
-    ArmCause.STALE: "Wait a moment; if it stays, check the network between the station and the controller.",
-    ArmCause.DEADLINE: "Look at the arm and the pendant; the driver has let go and connects anew.",
-    ArmCause.PROTECTIVE_STOP: "Find out why the arm stopped, clear its way, then confirm the protective stop.",
-    ArmCause.EMERGENCY_STOP: "Make the cell safe, release the emergency stop button, then power on and release brakes.",
-    ArmCause.SAFEGUARD_STOP: "Close the guard or clear the light curtain, then upload the program again.",
-    ArmCause.SAFETY_FAULT: "Read the pendant's log and mend the cause, then power on and release brakes.",
-    ArmCause.NOT_POWERED: "Make sure that nobody is at the arm, then power on and release brakes.",
-    ArmCause.LOCAL_CONTROL: "Switch the pendant to remote control, then upload the program again.",
-    ArmCause.PROGRAM_STOPPED: "Find out who stopped the program on the pendant and why, then upload it again.",
-    ArmCause.WATCHDOG: "Mend what made the station unhealthy or slow, then upload the program again.",
-    ArmCause.REGISTERS_IN_USE: "Close the other RTDE client, or disable EtherNet/IP, PROFINET and MODBUS on the "
-    "controller: they claim registers 0 to 23; then upload the program again.",
-    ArmCause.UNREACHABLE: "Teach the pose anew, or widen the controller's safety limits.",
-    ArmCause.NOT_REACHED: "Look at the arm: something held it, or its encoders or its payload setting are wrong.",
-    ArmCause.STOPPED: "Nothing: the station stopped the motion itself.",
-    ArmCause.BUSY: "Wait for the motion that is under way, or stop it.",
-    ArmCause.UNHEALTHY: "Mend what keeps the station from being healthy.",
-    ArmCause.RESTARTS: "Look at the station's log for why the driver's process keeps ending, then upload again.",
-    ArmCause.CLOSED: "Open the arm again.",
+REMEDIES: dict[ArmCause, Message] = {
+    ArmCause.LINK_LOST: messages.REMEDY_LINK_LOST(),
+    ArmCause.STALE: messages.REMEDY_STALE(),
+    ArmCause.DEADLINE: messages.REMEDY_DEADLINE(),
+    ArmCause.PROTECTIVE_STOP: messages.REMEDY_PROTECTIVE_STOP(),
+    ArmCause.EMERGENCY_STOP: messages.REMEDY_EMERGENCY_STOP(),
+    ArmCause.SAFEGUARD_STOP: messages.REMEDY_SAFEGUARD_STOP(),
+    ArmCause.SAFETY_FAULT: messages.REMEDY_SAFETY_FAULT(),
+    ArmCause.NOT_POWERED: messages.REMEDY_NOT_POWERED(),
+    ArmCause.LOCAL_CONTROL: messages.REMEDY_LOCAL_CONTROL(),
+    ArmCause.PROGRAM_STOPPED: messages.REMEDY_PROGRAM_STOPPED(),
+    ArmCause.WATCHDOG: messages.REMEDY_WATCHDOG(),
+    ArmCause.REGISTERS_IN_USE: messages.REMEDY_REGISTERS_IN_USE(),
+    ArmCause.UNREACHABLE: messages.REMEDY_UNREACHABLE(),
+    ArmCause.NOT_REACHED: messages.REMEDY_NOT_REACHED(),
+    ArmCause.STOPPED: messages.REMEDY_STOPPED(),
+    ArmCause.BUSY: messages.REMEDY_BUSY(),
+    ArmCause.UNHEALTHY: messages.REMEDY_UNHEALTHY(),
+    ArmCause.RESTARTS: messages.REMEDY_RESTARTS(),
+    ArmCause.CLOSED: messages.REMEDY_CLOSED(),
 }
 
 
 class ArmFault(StationError):  # noqa: N818 (a fault in the field's sense)
-    """Fault of the arm: its cause and its details; the text ends with the remedy."""
+    """Fault of the arm: its cause and its details; the message ends with the remedy."""
 
-    def __init__(self, cause: ArmCause, detail: str) -> None:
+    def __init__(self, cause: ArmCause, detail: Message) -> None:
         self.cause = cause
         self.detail = detail
-        super().__init__(f"arm: {detail}. {self.remedy}")
+        super().__init__(messages.FAULT(cause=detail, remedy=self.remedy))
 
     @property
-    def remedy(self) -> str:
+    def remedy(self) -> Message:
         """Return the remedy."""
         return REMEDIES[self.cause]

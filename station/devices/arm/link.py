@@ -16,6 +16,7 @@ from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.devices.arm.process_handle import ArmProcess
+from station.messages import arm as messages
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1
@@ -37,7 +38,7 @@ class ArmLink:
         self._settings = settings
         self._process: ArmProcess | None = None
         self._lost: ArmFault | None = None
-        self._latched: ArmFault | None = ArmFault(ArmCause.CLOSED, "the arm was not opened")
+        self._latched: ArmFault | None = ArmFault(ArmCause.CLOSED, messages.NOT_OPENED())
         self._starts_s: deque[float] = deque()
         self._failures = 0
         self._healthy_until_s = 0.0
@@ -78,7 +79,7 @@ class ArmLink:
         """Start to maintain the link."""
         if self._maintaining is None:
             self.renew_health(FIRST_LEASE_S)
-            self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, "the arm is not connected yet"), None
+            self._lost, self._latched = ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED_YET()), None
             self._maintaining = asyncio.create_task(self._keep(), name="the arm's link")
 
     async def close(self) -> None:
@@ -89,7 +90,7 @@ class ArmLink:
             self._maintaining = None
         async with self._lock:
             await self._drop()
-        self._set(ArmFault(ArmCause.CLOSED, "the arm was closed"))
+        self._set(ArmFault(ArmCause.CLOSED, messages.CLOSED()))
 
     async def settled(self, deadline_s: float) -> None:
         """Wait until the arm is ready or waits for a person.
@@ -113,13 +114,13 @@ class ArmLink:
         """
         process = self._process
         if process is None:
-            raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+            raise self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())
         limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
             snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=limit_s)
         except ArmFault as fault:
             if fault.cause is ArmCause.DEADLINE:
-                raise ArmFault(ArmCause.STALE, f"the arm's process told no state within {limit_s:g} s") from fault
+                raise ArmFault(ArmCause.STALE, messages.STATE_LATE(limit_s=limit_s)) from fault
             if self.fault is None and process is self._process:
                 self._set(fault)
             raise
@@ -136,12 +137,12 @@ class ArmLink:
             async with asyncio.timeout(limit_s):
                 await self._lock.acquire()
         except TimeoutError as error:
-            busy = ArmFault(ArmCause.BUSY, f"the arm's link was busy for {limit_s:g} s when asked {request.purpose}")
+            busy = ArmFault(ArmCause.BUSY, messages.LINK_BUSY(limit_s=limit_s, request=request.meaning))
             raise self.fault or busy from error
         try:
             process = self._process
             if process is None:
-                raise self.fault or ArmFault(ArmCause.LINK_LOST, "the arm is not connected")
+                raise self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())
             try:
                 return await self._ask_watched(process, request)
             except ArmFault as fault:
@@ -169,7 +170,7 @@ class ArmLink:
     async def _heard(self, process: ArmProcess) -> Snapshot:
         snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
         if snapshot.age_s > self._settings.link_lost_after_s:
-            raise ArmFault(ArmCause.LINK_LOST, f"the controller's state is {snapshot.age_s:.2f} s old")
+            raise ArmFault(ArmCause.LINK_LOST, messages.STATE_OLD(age_s=snapshot.age_s))
         return snapshot
 
     async def upload(self) -> None:
@@ -204,7 +205,7 @@ class ArmLink:
         elif snapshot.runtime_state != PLAYING:
             done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:
-                raise await self._explain(done.words)
+                raise await self._explain(done.output)
             self._up()
         else:
             self._set(None)
@@ -230,7 +231,7 @@ class ArmLink:
                     await self._lose(fault)
                 except Exception as error:  # the link outlives any other failure
                     log.exception("the arm's link")
-                    await self._lose(ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be used: {error}"))
+                    await self._lose(ArmFault(ArmCause.LINK_LOST, messages.PROCESS_UNUSABLE(reason=str(error))))
             await asyncio.sleep(self._pause_s())
 
     def _pause_s(self) -> float:
@@ -276,14 +277,14 @@ class ArmLink:
         if len(self._starts_s) >= self._settings.restart_budget:
             raise ArmFault(
                 ArmCause.RESTARTS,
-                f"the driver's process ended {len(self._starts_s)} times in {self._settings.restart_window_s:g} s",
+                messages.PROCESS_RESTARTS(times=len(self._starts_s), window_s=self._settings.restart_window_s),
             )
         self._starts_s.append(now_s)
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
         outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
-            raise from_output(outcome.words) or ArmFault(
-                ArmCause.LINK_LOST, f"ur-rtde receives nothing: {outcome.words}"
+            raise from_output(outcome.output) or ArmFault(
+                ArmCause.LINK_LOST, messages.NOTHING_RECEIVED(output=outcome.output)
             )
         return self._process
 
@@ -297,7 +298,7 @@ class ArmLink:
         )
         outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
         if not outcome.done:
-            self._store_or_raise(await self._explain(outcome.words))
+            self._store_or_raise(await self._explain(outcome.output))
         else:
             # The lease that the process knew may have run out while the connection was made: renew it before the
             # watchdog that has just been set up expects a kick. The next beat checks whether it answers.
@@ -305,14 +306,14 @@ class ArmLink:
                 await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
 
-    async def _explain(self, words: str) -> ArmFault:
-        fault = from_output(words)
+    async def _explain(self, output: str) -> ArmFault:
+        fault = from_output(output)
         if fault is not None or self._process is None:
-            return fault or ArmFault(ArmCause.LINK_LOST, f"the arm is not connected: {words}")
+            return fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED_BECAUSE(output=output))
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
         snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        return diagnose(snapshot, facts, words, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, output: str) -> ArmFault:
         """Return the cause why a command was not done; it becomes the link's fault.
@@ -355,12 +356,13 @@ class ArmLink:
             self._process = None
 
     def _set(self, fault: ArmFault | None) -> None:
-        before = str(self.fault)
+        before = self.fault.message if self.fault is not None else None
         self.fault_since_s = time.monotonic()
         if fault is not None and fault.cause in SELF_HEALING:
             self._lost = fault
         else:
             self._lost, self._latched = None, fault
-        if str(self.fault) != before:
-            log.info("arm link: %s", self.fault or "ready")
+        now = self.fault.message if self.fault is not None else None
+        if now != before:
+            log.info("arm link: %s", now or "ready")
         self._changed.set()

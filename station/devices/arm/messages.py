@@ -3,53 +3,62 @@
 from typing import ClassVar
 
 from station.channel.messages import ChannelMessage
+from station.messages import arm as messages
+from station.messages.message import Message
 
 Six = tuple[float, float, float, float, float, float]
 Position = tuple[float, float, float]
 
 
-class Watch(ChannelMessage):
+class ArmRequest(ChannelMessage):
+    """A request to the ur-rtde process."""
+
+    meaning: ClassVar[Message]
+    """The request as a person reads it in a fault."""
+
+
+class Watch(ArmRequest):
     """Connect to receive the controller's state."""
 
-    purpose: ClassVar[str] = "to receive the controller's state"
+    meaning: ClassVar[Message] = messages.REQUEST_WATCH()
 
 
-class Command(ChannelMessage):
+class Command(ArmRequest):
     """Connect to command the arm, which uploads the control program."""
 
-    purpose: ClassVar[str] = "to start the control program"
+    meaning: ClassVar[Message] = messages.REQUEST_COMMAND()
     tool_centre_mm: Position
     payload_kg: float
     payload_centre_mm: Position
     watchdog_hz: float
 
 
-class Upload(ChannelMessage):
+class Upload(ArmRequest):
     """Send the control program again over the present connection and check that it plays."""
 
-    purpose: ClassVar[str] = "to upload the control program again"
+    meaning: ClassVar[Message] = messages.REQUEST_UPLOAD()
 
 
-class Beat(ChannelMessage):
+class Beat(ArmRequest):
     """Read the state; the station is healthy for so long from now."""
 
-    purpose: ClassVar[str] = "for the arm's state"
+    meaning: ClassVar[Message] = messages.REQUEST_BEAT()
     healthy_for_s: float
 
 
-class Beside(ChannelMessage):
+class Beside(ArmRequest):
     """Compute the joint positions of a tool pose with an offset and the same orientation."""
 
-    purpose: ClassVar[str] = "for the way to a place beside"
+    meaning: ClassVar[Message] = messages.REQUEST_BESIDE()
     joints_rad: Six
     offset_mm: Position
     """Along the tool's own x, y and z."""
 
 
-class Move(ChannelMessage):
+class Move(ArmRequest):
     """Start a motion to joint positions, straight for the tool or straight for the joints."""
 
-    purpose: ClassVar[str] = "to begin a motion"
+    meaning: ClassVar[Message] = messages.REQUEST_MOVE()
     joints_rad: Six
     straight: bool
     speed: float
@@ -58,17 +67,17 @@ class Move(ChannelMessage):
     """rad/s², or mm/s² if straight."""
 
 
-class Reachable(ChannelMessage):
+class Reachable(ArmRequest):
     """Check that joint positions are within the safety limits and have a solution."""
 
-    purpose: ClassVar[str] = "whether the pose is reachable"
+    meaning: ClassVar[Message] = messages.REQUEST_REACHABLE()
     joints_rad: Six
 
 
-class Halt(ChannelMessage):
+class Halt(ArmRequest):
     """Brake to rest."""
 
-    purpose: ClassVar[str] = "to brake"
+    meaning: ClassVar[Message] = messages.REQUEST_HALT()
     deceleration_rad_s2: float
 
 
@@ -76,7 +85,7 @@ class Outcome(ChannelMessage):
     """Success, or ur-rtde's output after a failure."""
 
     done: bool
-    words: str = ""
+    output: str = ""
     joints_rad: Six | None = None
     """Result of `Beside`."""
 

@@ -6,6 +6,7 @@ import struct
 from station.devices.arm.dashboard import DashboardFacts, dashboard
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
 from station.devices.check_result import CheckResult
+from station.messages import arm as messages
 from station.settings.arm import ArmSettings
 
 RTDE_PORT = 30004
@@ -19,11 +20,6 @@ CLAIM = b"input_int_register_23,input_double_register_23"
 """A fieldbus may own registers 0 to 23. ur-rtde uses integers 0 to 7 and doubles 0 to 17: claiming one of those, even
 shortly, would refuse a station that connects at that moment."""
 LONGEST_WORD = 120
-NOBODY_THERE = "Check arm.host in station.yaml, and that the controller is on and its network cable is in."
-FROZEN = (
-    "Check the network between the station and the controller; if the pendant does not react either, "
-    "restart the controller."
-)
 
 
 async def probe_arm(settings: ArmSettings) -> list[CheckResult]:
@@ -32,19 +28,23 @@ async def probe_arm(settings: ArmSettings) -> list[CheckResult]:
         async with dashboard(settings.host) as conversation:
             facts = await conversation.facts()
     except ArmFault as fault:
-        return [CheckResult("arm", fault.detail[: 2 * LONGEST_WORD], "fault", NOBODY_THERE)]
+        return [CheckResult("arm", fault.detail, "fault", messages.REMEDY_HOST())]
     return [_controller(settings.host, facts), await _rtde(settings.host), await _script(settings.host)]
 
 
 def _controller(host: str, facts: DashboardFacts) -> CheckResult:
-    found = (
-        f"{_short(facts.model)} at {host}, serial number {_short(facts.serial_number)}, "
-        f"PolyScope {_short(facts.version)}: {_short(facts.robot_mode)}, "
-        f"safety {_short(facts.safety_status)}, {'remote' if facts.remote else 'local'} control"
+    found = messages.CHECK_CONTROLLER(
+        model=_short(facts.model),
+        host=host,
+        serial=_short(facts.serial_number),
+        version=_short(facts.version),
+        mode=_short(facts.robot_mode),
+        safety=_short(facts.safety_status),
+        control=messages.CHECK_REMOTE() if facts.remote else messages.CHECK_LOCAL(),
     )
     cause = _cause(facts)
     if cause is None:
-        return CheckResult("arm controller", found, "ok", "")
+        return CheckResult("arm controller", found, "ok")
     return CheckResult("arm controller", found, "fault", REMEDIES[cause])
 
 
@@ -86,20 +86,24 @@ async def _rtde(host: str) -> CheckResult:
                 writer.transport.abort()
     except (TimeoutError, OSError, asyncio.IncompleteReadError, struct.error) as error:
         if not connected:
-            return CheckResult("arm RTDE", f"nobody answers at {place}", "fault", NOBODY_THERE)
-        how = f"answers later than {PORT_DEADLINE_S:g} s" if isinstance(error, TimeoutError) else "hangs up"
-        return CheckResult("arm RTDE", f"what is at {place} {how} when asked in RTDE", "fault", FROZEN)
-    found = f"RTDE at {place}, controller {'.'.join(map(str, version))}"
-    if accepted[:1] != b"\x01":
-        return CheckResult("arm RTDE", f"{found}, refuses protocol 2", "fault", "Update the controller's software.")
-    if not fresh:
-        return CheckResult(
-            "arm RTDE", f"{found}, whose state is frozen or more than {FRESH_S:g} s late", "fault", FROZEN
+            return CheckResult("arm RTDE", messages.CHECK_NO_ANSWER(address=place), "fault", messages.REMEDY_HOST())
+        late = isinstance(error, TimeoutError)
+        found = (
+            messages.CHECK_RTDE_LATE(address=place, limit_s=PORT_DEADLINE_S)
+            if late
+            else messages.CHECK_RTDE_CLOSES(address=place)
         )
+        return CheckResult("arm RTDE", found, "fault", messages.REMEDY_FROZEN())
+    named = {"address": place, "version": ".".join(map(str, version))}
+    if accepted[:1] != b"\x01":
+        return CheckResult("arm RTDE", messages.CHECK_RTDE_REFUSES(**named), "fault", messages.REMEDY_UPDATE())
+    if not fresh:
+        frozen = messages.CHECK_RTDE_FROZEN(**named, limit_s=FRESH_S)
+        return CheckResult("arm RTDE", frozen, "fault", messages.REMEDY_FROZEN())
     if b"IN_USE" in kinds:
         remedy = REMEDIES[ArmCause.REGISTERS_IN_USE]
-        return CheckResult("arm RTDE", f"{found}, its input registers are in use", "warning", remedy)
-    return CheckResult("arm RTDE", found, "ok", "")
+        return CheckResult("arm RTDE", messages.CHECK_RTDE_REGISTERS(**named), "warning", remedy)
+    return CheckResult("arm RTDE", messages.CHECK_RTDE(**named), "ok")
 
 
 async def _advances(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
@@ -131,11 +135,12 @@ async def _package(reader: asyncio.StreamReader, kind: bytes) -> bytes:
 
 
 async def _script(host: str) -> CheckResult:
+    address = f"{host}:{SCRIPT_PORT}"
     try:
         async with asyncio.timeout(PORT_DEADLINE_S):
             _, writer = await asyncio.open_connection(host, SCRIPT_PORT)
     except (TimeoutError, OSError):
-        found = f"nobody takes programs at {host}:{SCRIPT_PORT}"
-        return CheckResult("arm programs", found, "fault", NOBODY_THERE)
+        found = messages.CHECK_NO_PROGRAMS(address=address)
+        return CheckResult("arm programs", found, "fault", messages.REMEDY_HOST())
     writer.transport.abort()
-    return CheckResult("arm programs", f"programs are taken at {host}:{SCRIPT_PORT}", "ok", "")
+    return CheckResult("arm programs", messages.CHECK_PROGRAMS(address=address), "ok")

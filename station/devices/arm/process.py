@@ -23,6 +23,7 @@ from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.devices.arm.offset import offset_pose
 from station.errors import StationError
+from station.messages import arm as messages
 
 VARIABLES = [
     "timestamp",
@@ -61,7 +62,7 @@ class UrRtdeProcess:
         try:
             self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, words=str(error))
+            return Outcome(done=False, output=str(error))
         return Outcome(done=True)
 
     async def command(self, request: Command) -> Outcome:
@@ -69,7 +70,7 @@ class UrRtdeProcess:
         try:
             control = RTDEControlInterface(self._host, self._frequency_hz)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, words=str(error))
+            return Outcome(done=False, output=str(error))
         self._control = control
         self._set_up = request
         if self._kicking is None:
@@ -84,7 +85,7 @@ class UrRtdeProcess:
         """Return the state."""
         receive = self._receive
         if receive is None:
-            raise StationError("the state is not received yet")
+            raise StationError(messages.STATE_NOT_RECEIVED())
         self._healthy_until_s = time.monotonic() + request.healthy_for_s
         age_s = self._age.age_s(receive.getTimestamp(), time.monotonic())
         progress = self._control.getAsyncOperationProgressEx() if self._control is not None else None
@@ -185,7 +186,7 @@ class UrRtdeProcess:
 
     def _commanding(self) -> RTDEControlInterface:
         if self._control is None:
-            raise StationError("the arm is not commanded yet")
+            raise StationError(messages.NOT_COMMANDED())
         return self._control
 
     def _playing(self) -> bool:
@@ -203,7 +204,7 @@ class UrRtdeProcess:
         try:
             done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, words=str(error))
+            return Outcome(done=False, output=str(error))
         return Outcome(done=bool(done))
 
 

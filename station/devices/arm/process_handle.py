@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
-from station.channel.messages import ChannelError, ChannelMessage
+from station.channel.messages import ChannelError, ChannelMessage, DeadlineError
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.messages import ArmRequest
+from station.messages import arm as messages
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 LAST_WORDS = 5
@@ -69,7 +71,7 @@ class ArmProcess:
         except BaseException as error:
             folder.cleanup()
             if isinstance(error, OSError):
-                raise ArmFault(ArmCause.LINK_LOST, f"the arm's process cannot be started: {error}") from error
+                raise ArmFault(ArmCause.LINK_LOST, messages.PROCESS_NOT_STARTED(reason=str(error))) from error
             raise
         return cls(process, ChannelClient(endpoint, "the arm's process"), folder)
 
@@ -100,7 +102,7 @@ class ArmProcess:
         """Whether the process is gone."""
         return self._process.returncode is not None
 
-    async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
+    async def request(self, request: ArmRequest, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
         """Send a request to the process; the wait ends also when the process dies.
 
         Raises:
@@ -112,18 +114,18 @@ class ArmProcess:
             await asyncio.wait({asking, dying}, return_when=asyncio.FIRST_COMPLETED)
             if asking.done():
                 return asking.result()
+        except DeadlineError as error:
+            silent = messages.PROCESS_SILENT(limit_s=deadline_s, request=request.meaning)
+            raise ArmFault(ArmCause.DEADLINE, silent) from error
         except ChannelError as error:
-            raise ArmFault(ArmCause.DEADLINE, str(error)) from error
+            raise ArmFault(ArmCause.DEADLINE, error.message) from error
         finally:
             for task in (asking, dying):
                 task.cancel()
             await asyncio.gather(asking, dying, return_exceptions=True)
-        raise ArmFault(ArmCause.LINK_LOST, f"the arm's process ended with {self._process.returncode}{self.last_output}")
-
-    @property
-    def last_output(self) -> str:
-        """Return ur-rtde's last output, for the end of a message."""
-        return f" ({' / '.join(self._words)})" if self._words else ""
+        code, output = dying.result(), " / ".join(self._words)
+        ended = messages.PROCESS_ENDED_AFTER(code=code, output=output) if output else messages.PROCESS_ENDED(code=code)
+        raise ArmFault(ArmCause.LINK_LOST, ended)
 
     async def end(self) -> None:
         """Kill the process and remove its folder. Idempotent."""

@@ -13,6 +13,8 @@ from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.link import ArmLink
 from station.devices.arm.messages import Beside, Halt, Move, Position, Reachable, Six, Snapshot
+from station.messages import arm as messages
+from station.messages.message import Message
 from station.settings.arm import ArmSettings, PoseName
 
 POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
@@ -82,7 +84,7 @@ class UrArm:
         except ArmFault as fault:
             return ArmState(None, None, None, None, None, self._link.fault or fault)
         if snapshot.age_s > self._settings.stale_after_s:
-            stale = ArmFault(ArmCause.STALE, f"the controller's state is {snapshot.age_s:.2f} s old")
+            stale = ArmFault(ArmCause.STALE, messages.STATE_OLD(age_s=snapshot.age_s))
             return ArmState(snapshot.age_s, None, None, None, None, self._link.fault or stale)
         moving = _moves(snapshot)
         x, y, z = (1000 * value for value in snapshot.tool_pose[:3])
@@ -95,15 +97,16 @@ class UrArm:
         Raises:
             ArmFault: the arm is not ready, cannot move there, was stopped, or did not arrive.
         """
-        async with self._one_way(pose) as snapshot:
+        where = messages.POSE(name=pose)
+        async with self._one_way(where) as snapshot:
             known = (self._link.attachment, pose)
             target = self._settings.poses.joints_rad(pose)
             if known not in self._reachable:
-                await self._require_reachable(target, pose)
+                await self._require_reachable(target, where)
                 self._reachable.add(known)
             straight = "nest" in {pose, self._last_target or self._place(snapshot.joints_rad)}
             self._last_target = pose
-            await self._go(target, pose, self._settings.reached_tolerance_rad, straight=straight)
+            await self._go(target, where, self._settings.reached_tolerance_rad, straight=straight)
 
     async def move_beside_nest(self, offset_mm: Position) -> None:
         """Move straight to the nest plus an offset, and return when it is reached.
@@ -114,20 +117,19 @@ class UrArm:
         Raises:
             ArmFault: the arm is not ready, may not move there, was stopped, or did not arrive.
         """
-        most_mm, where = self._settings.centring.most_mm, "beside the nest"
+        most_mm, where = self._settings.centring.most_mm, messages.POSE_BESIDE_NEST()
+        x_mm, y_mm, z_mm = offset_mm
         if math.hypot(*offset_mm) > most_mm:
-            raise ArmFault(
-                ArmCause.UNREACHABLE,
-                f"{offset_mm} mm from the nest are more than the {most_mm:g} allowed by arm.centring.most_mm; raise it "
-                "where the fingers have more room all around",
-            )
+            too_long = messages.OFFSET_TOO_LONG(x_mm=x_mm, y_mm=y_mm, z_mm=z_mm, limit_mm=most_mm)
+            raise ArmFault(ArmCause.UNREACHABLE, too_long)
         async with self._one_way(where):
             nest = self._settings.poses.joints_rad("nest")
             found = await self._link.order(Beside(joints_rad=nest, offset_mm=offset_mm))
-            if found.words:
-                raise await self._link.explain(found.words)
+            if found.output:
+                raise await self._link.explain(found.output)
             if found.joints_rad is None:
-                raise ArmFault(ArmCause.UNREACHABLE, f"the controller has no way to {offset_mm} mm from the nest")
+                no_way = messages.NO_WAY_BESIDE_NEST(x_mm=x_mm, y_mm=y_mm, z_mm=z_mm)
+                raise ArmFault(ArmCause.UNREACHABLE, no_way)
             await self._require_reachable(found.joints_rad, where)
             self._last_target, self._beside_rad = "nest", found.joints_rad
             await self._go(found.joints_rad, where, BESIDE_WITHIN_RAD, straight=True)
@@ -149,11 +151,14 @@ class UrArm:
             if snapshot is not None and not _moves(snapshot):
                 return
             await asyncio.sleep(POLL_S)
-        raise ArmFault(ArmCause.DEADLINE, "the arm did not come to rest in time")
+        raise ArmFault(ArmCause.DEADLINE, messages.NO_REST())
 
     async def confirm_protective_stop(self) -> None:
         """Leave the protective stop, which the controller refuses in its first 5 s, and make the arm ready again."""
-        async with self._recovering("the protective stop"), dashboard(self._settings.host) as conversation:
+        async with (
+            self._recovering(messages.RECOVERY_PROTECTIVE_STOP()),
+            dashboard(self._settings.host) as conversation,
+        ):
             await _require_remote(conversation)
             while "PROTECTIVE_STOP" in await conversation.request("safetystatus"):
                 await asyncio.sleep(max(RECOVERY_POLL_S, self._link.fault_since_s + UNLOCK_AFTER_S - time.monotonic()))
@@ -163,11 +168,11 @@ class UrArm:
 
     async def power_on_and_release_brakes(self) -> None:
         """Power on, release the brakes and start the program; after a safety fault, restart the safety system first."""
-        async with self._recovering("powering on"), dashboard(self._settings.host) as conversation:
+        async with self._recovering(messages.RECOVERY_POWER()), dashboard(self._settings.host) as conversation:
             await _require_remote(conversation)
             status = await conversation.request("safetystatus")
             if "EMERGENCY_STOP" in status:
-                raise ArmFault(ArmCause.EMERGENCY_STOP, "an emergency stop button is still pressed")
+                raise ArmFault(ArmCause.EMERGENCY_STOP, messages.BUTTON_PRESSED())
             if "FAULT" in status or "VIOLATION" in status:
                 await conversation.request("restart safety")
             while "RUNNING" not in (mode := await conversation.request("robotmode")):
@@ -181,47 +186,46 @@ class UrArm:
 
     async def upload_again(self) -> None:
         """Restart the program after it was stopped; a playing program does not change."""
-        async with self._recovering("the upload"):
+        async with self._recovering(messages.RECOVERY_UPLOAD()):
             await self._link.upload()
 
     @contextlib.asynccontextmanager
-    async def _recovering(self, what: str) -> AsyncIterator[None]:
+    async def _recovering(self, what: Message) -> AsyncIterator[None]:
         limit_s = self._settings.recovery_deadline_s
         try:
             async with asyncio.timeout(limit_s):
                 yield
         except TimeoutError as error:
-            raise ArmFault(ArmCause.DEADLINE, f"{what} did not come to its end within {limit_s:g} s") from error
+            late = messages.RECOVERY_TOO_LONG(recovery=what, limit_s=limit_s)
+            raise ArmFault(ArmCause.DEADLINE, late) from error
 
     async def _require_ready(self) -> Snapshot:
         if self._link.fault is not None:
             raise self._link.fault
         if not self._link.healthy:
-            raise ArmFault(ArmCause.UNHEALTHY, "the station has not said that it is healthy")
+            raise ArmFault(ArmCause.UNHEALTHY, messages.UNHEALTHY())
         snapshot = await self._link.snapshot()
         if snapshot.age_s > self._settings.stale_after_s:
-            raise ArmFault(ArmCause.STALE, f"the controller's state is {snapshot.age_s:.2f} s old")
+            raise ArmFault(ArmCause.STALE, messages.STATE_OLD(age_s=snapshot.age_s))
         return snapshot
 
     @contextlib.asynccontextmanager
-    async def _one_way(self, where: str) -> AsyncIterator[Snapshot]:
+    async def _one_way(self, where: Message) -> AsyncIterator[Snapshot]:
         """Allow one motion at a time, of an arm that is ready."""
         if self._moving.locked():
-            raise ArmFault(ArmCause.BUSY, f"the arm cannot go to {where}: it is still on its way elsewhere")
+            raise ArmFault(ArmCause.BUSY, messages.BUSY(pose=where))
         async with self._moving:
             self._stopped.clear()
             yield await self._require_ready()
 
-    async def _require_reachable(self, target: Six, where: str) -> None:
+    async def _require_reachable(self, target: Six, where: Message) -> None:
         outcome = await self._link.order(Reachable(joints_rad=target))
-        if outcome.words or (await self._link.snapshot()).runtime_state != PLAYING:
-            raise await self._link.explain(outcome.words)
+        if outcome.output or (await self._link.snapshot()).runtime_state != PLAYING:
+            raise await self._link.explain(outcome.output)
         if not outcome.done:
-            raise ArmFault(
-                ArmCause.UNREACHABLE, f"the controller says that {where} is out of reach or its safety limits"
-            )
+            raise ArmFault(ArmCause.UNREACHABLE, messages.UNREACHABLE(pose=where))
 
-    async def _go(self, target: Six, where: str, tolerance_rad: float, *, straight: bool) -> None:
+    async def _go(self, target: Six, where: Message, tolerance_rad: float, *, straight: bool) -> None:
         try:
             await self._begin(target, straight=straight)
             await self._arrive(target, where, tolerance_rad)
@@ -240,15 +244,15 @@ class UrArm:
         )
         outcome = await self._link.order(request)
         if not outcome.done:
-            raise await self._link.explain(outcome.words)
+            raise await self._link.explain(outcome.output)
 
-    async def _arrive(self, target: Six, where: str, tolerance_rad: float) -> None:
+    async def _arrive(self, target: Six, where: Message, tolerance_rad: float) -> None:
         deadline_s = time.monotonic() + self._settings.move_deadline_s
         resting_since_s: float | None = None
         while time.monotonic() < deadline_s:
             if self._stopped.is_set():
                 await self._brake()  # once more: the stop may have come just before the motion began
-                raise ArmFault(ArmCause.STOPPED, f"the way to {where} was stopped by the station")
+                raise ArmFault(ArmCause.STOPPED, messages.MOTION_STOPPED(pose=where))
             if self._link.fault is not None:
                 raise self._link.fault
             snapshot = await self._fresh_enough()
@@ -259,10 +263,11 @@ class UrArm:
             elif resting_since_s is None:
                 resting_since_s = time.monotonic()
             elif time.monotonic() - resting_since_s > SHORT_AFTER_S:
-                raise ArmFault(ArmCause.NOT_REACHED, f"the arm came to rest elsewhere than at {where}")
+                raise ArmFault(ArmCause.NOT_REACHED, messages.NOT_REACHED(pose=where))
             await asyncio.sleep(POLL_S)
         await self._brake()
-        raise ArmFault(ArmCause.DEADLINE, f"the arm did not reach {where} within {self._settings.move_deadline_s:g} s")
+        late = messages.TOO_LATE(pose=where, limit_s=self._settings.move_deadline_s)
+        raise ArmFault(ArmCause.DEADLINE, late)
 
     async def _fresh_enough(self) -> Snapshot | None:
         try:
@@ -274,7 +279,7 @@ class UrArm:
     async def _brake(self) -> None:
         outcome = await self._link.order(Halt(deceleration_rad_s2=self._settings.stop_deceleration_rad_s2))
         if not outcome.done:
-            raise await self._link.explain(outcome.words)
+            raise await self._link.explain(outcome.output)
 
     def _place(self, joints_rad: Six) -> PoseName | None:
         poses, tolerance = self._settings.poses, self._settings.reached_tolerance_rad
@@ -285,7 +290,7 @@ class UrArm:
 
 async def _require_remote(conversation: DashboardConversation) -> None:
     if not (await conversation.facts()).remote:
-        raise ArmFault(ArmCause.LOCAL_CONTROL, "the controller is in local control and takes no orders")
+        raise ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
 
 
 def _moves(snapshot: Snapshot) -> bool:

@@ -27,6 +27,8 @@ from station.devices.camera.interface import (
     NoCameraError,
     NoFrameError,
 )
+from station.messages import camera as messages
+from station.messages.message import Message
 from station.settings.camera import CameraSettings
 
 SYSFS = Path("/sys/class/video4linux")
@@ -125,8 +127,15 @@ def set_mode(capture: Capture, serial: str) -> None:
     given = tuple(capture.get(one) for one in properties)
     if given != _MODE:
         raise CameraError(
-            f"DIGIT {serial}: asked for {width}x{height} at {frames_per_s:g} frames/s, the driver gave "
-            f"{given[0]:g}x{given[1]:g} at {given[2]:g}; plug it into a USB port of its own and try again"
+            messages.WRONG_MODE(
+                serial=serial,
+                width=width,
+                height=height,
+                rate=frames_per_s,
+                given_width=given[0],
+                given_height=given[1],
+                given_rate=given[2],
+            )
         )
 
 
@@ -150,9 +159,11 @@ class DigitCamera:
     ) -> None:
         self._settings, self._sysfs, self._opener = settings, sysfs, opener
         self._serial = settings.digit.serial
-        self._revision = self._notice = ""
+        self._revision = ""
+        self._notice: Message | None = None
+        self._name = messages.DIGIT(serial=self._serial)
         width, height = _MODE[1], _MODE[0]
-        self._feed = FrameFeed(f"DIGIT {self._serial}", FrameHealth(settings.oldest_s, (height, width)))
+        self._feed = FrameFeed(self._name, FrameHealth(settings.oldest_s, (height, width)))
         self._leds = Leds(settings.digit.red, settings.digit.green, settings.digit.blue)
         self._leds_wanted = threading.Event()
         self._stopping = threading.Event()
@@ -161,7 +172,7 @@ class DigitCamera:
     @property
     def description(self) -> CameraDescription:
         """Return the camera's description; portrait."""
-        scale, name = self._settings.mm_per_px, f"DIGIT {self._serial}"
+        scale, name = self._settings.mm_per_px, str(self._name)
         return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision, self._notice)
 
     async def open(self) -> None:
@@ -180,9 +191,8 @@ class DigitCamera:
             await self._feed.newer(-math.inf, self._settings.open_deadline_s)
         except NoFrameError as error:
             await self.close()
-            raise NoCameraError(
-                f"DIGIT {self._serial}: no frame within {self._settings.open_deadline_s} s; {self._feed.trouble}"
-            ) from error
+            limit_s, reason = self._settings.open_deadline_s, self._feed.trouble or messages.NOTHING_SENT()
+            raise NoCameraError(messages.NO_FIRST_FRAME(camera=self._name, limit_s=limit_s, reason=reason)) from error
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
         """See `Camera.frame`.
@@ -218,37 +228,37 @@ class DigitCamera:
 
     def _set_light(self, capture: Capture) -> None:
         taken = capture.set(cv2.CAP_PROP_ZOOM, packed_leds(self._leds))
-        self._notice = ""
+        self._notice = None
         if self._revision and self._revision < _LIGHT_SINCE:
-            self._notice = f"its light cannot be set colour by colour: write firmware {_LIGHT_SINCE} or newer to it"
+            self._notice = messages.LIGHT_FIRMWARE(revision=_LIGHT_SINCE)
         elif not taken:
-            self._notice = "it refused its light's setting: unplug it and plug it in again"
+            self._notice = messages.LIGHT_REFUSED()
 
     def _capture_for_ever(self, loop: asyncio.AbstractEventLoop) -> None:
         while not self._stopping.is_set():
             try:
                 self._capture(loop)
             except CameraError as error:
-                self._feed.trouble = str(error)
+                self._feed.trouble = error.message
             except Exception as error:  # noqa: BLE001 (after any error of OpenCV the sensor is searched again)
-                self._feed.trouble = f"reading it failed: {error}"
+                self._feed.trouble = messages.READING_FAILED(reason=str(error))
             self._stopping.wait(_RETRY_S)
 
     def _capture(self, loop: asyncio.AbstractEventLoop) -> None:
         devices = find_digits(self._sysfs)
         device = next((device for device in devices if device.serial == self._serial), None)
         if device is None:
-            others = ", ".join(device.serial for device in devices) or "none"
+            others = ", ".join(device.serial for device in devices)
             raise NoCameraError(
-                f"no DIGIT {self._serial} is plugged in (found: {others}); check cable and serial number"
+                messages.NOT_PLUGGED_IN(serial=self._serial, found=others)
+                if others
+                else messages.NONE_PLUGGED_IN(serial=self._serial)
             )
         node, self._revision = device.node, device.revision
         capture = self._opener(node)
         try:
             if not capture.isOpened():
-                raise NoCameraError(
-                    f"{node} cannot be opened; is another program using it, is the user in group video?"
-                )
+                raise NoCameraError(messages.NOT_OPENED(node=node))
             set_mode(capture, self._serial)
             self._leds_wanted.set()
             while not self._stopping.is_set():
@@ -258,7 +268,7 @@ class DigitCamera:
                 read, image = capture.read()
                 captured_s = time.monotonic()
                 if not read or image is None:
-                    raise NoCameraError(f"{node} stopped giving frames; it is looked for again")
+                    raise NoCameraError(messages.NO_MORE_FRAMES(node=node))
                 with contextlib.suppress(RuntimeError):  # the loop may have closed meanwhile
                     loop.call_soon_threadsafe(self._feed.publish, to_portrait(image), captured_s)
         finally:

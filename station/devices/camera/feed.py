@@ -5,6 +5,8 @@ import time
 
 from station.devices.camera.health import FrameHealth
 from station.devices.camera.interface import Frame, FrameFault, Image, NoFrameError
+from station.messages import camera as messages
+from station.messages.message import Message
 
 
 class FrameFeed:
@@ -13,11 +15,11 @@ class FrameFeed:
     Args:
         name: the camera's, for messages.
         health: checks the frames.
-        remedy: for the message if no frame comes.
+        remedy: for the message if no frame comes; None for cable and light.
     """
 
-    def __init__(self, name: str, health: FrameHealth, remedy: str = "Check its cable and its light") -> None:
-        self._name, self._health, self._remedy = name, health, remedy
+    def __init__(self, name: Message, health: FrameHealth, remedy: Message | None = None) -> None:
+        self._name, self._health, self._remedy = name, health, remedy or messages.REMEDY_CABLE()
         self._changed = asyncio.Event()
         self._image: Image | None = None
         self._before: Image | None = None
@@ -25,7 +27,7 @@ class FrameFeed:
         self._width_mm: float | None = None
         self._sequence = 0
         self._given: Frame | None = None
-        self.trouble = "it has sent nothing yet"
+        self.trouble: Message | None = messages.NOTHING_SENT()
         """The driver's faults since the last frame; part of the message if no frame comes."""
 
     def publish(
@@ -42,7 +44,7 @@ class FrameFeed:
         self._before, self._image = self._image, image
         self._captured_s, self._width_mm = captured_s, width_mm
         self._sequence = self._sequence + 1 if sequence is None else sequence
-        self.trouble = ""
+        self.trouble = None
         self._changed.set()
 
     async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:
@@ -62,16 +64,16 @@ class FrameFeed:
                     await self._changed.wait()
         except TimeoutError:
             raise NoFrameError(
-                f"camera {self._name}: no frame newer than asked for within {deadline_s:g} s; {self._why()}. "
-                f"{self._remedy}, then `station devices check`"
+                messages.NO_FRAME(camera=self._name, limit_s=deadline_s, reasons=self._reasons(), remedy=self._remedy)
             ) from None
         if self._given is None or self._given.sequence != self._sequence:
             self._given = self._judged(image)
         return self._given
 
-    def _why(self) -> str:
-        newest = f"the newest is {time.monotonic() - self._captured_s:.1f} s old" if self._image is not None else ""
-        return "; ".join(words for words in (newest, self.trouble) if words)
+    def _reasons(self) -> list[Message]:
+        seen = self._image is not None
+        newest = messages.NEWEST(age_s=time.monotonic() - self._captured_s) if seen else None
+        return [reason for reason in (newest, self.trouble) if reason is not None]
 
     def _judged(self, image: Image) -> Frame:
         faults: frozenset[FrameFault] = self._health.judge(image, self._before, time.monotonic() - self._captured_s)

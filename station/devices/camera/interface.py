@@ -1,6 +1,7 @@
 """Tactile camera interface of the station."""
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -9,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from station.errors import StationError
+from station.messages import camera as messages
+from station.messages.message import Message
 
 Image = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.uint8]
@@ -47,6 +50,22 @@ class FrameFault(StrEnum):
     """Not the requested mode."""
 
 
+FRAME_FAULTS: dict[FrameFault, Message] = {
+    FrameFault.STALE: messages.FRAME_STALE(),
+    FrameFault.REPEATED: messages.FRAME_REPEATED(),
+    FrameFault.TORN: messages.FRAME_TORN(),
+    FrameFault.SHIFTED: messages.FRAME_SHIFTED(),
+    FrameFault.BLACK: messages.FRAME_BLACK(),
+    FrameFault.SATURATED: messages.FRAME_SATURATED(),
+    FrameFault.WRONG_SIZE: messages.FRAME_WRONG_SIZE(),
+}
+
+
+def describe(faults: Iterable[FrameFault]) -> list[Message]:
+    """Return the faults as messages, in the order of their names."""
+    return [FRAME_FAULTS[fault] for fault in sorted(faults)]
+
+
 @dataclass(frozen=True, slots=True)
 class CameraDescription:
     """Identity of the camera, and its frames' properties."""
@@ -61,8 +80,8 @@ class CameraDescription:
     """Of the sensor, by which its calibration is found; empty for a recording."""
     revision: str = ""
     """Of the sensor and its firmware, in its maker's digits; empty if unknown."""
-    notice: str = ""
-    """A condition that needs a person though frames come; empty for none."""
+    notice: Message | None = None
+    """A condition that needs a person though frames come."""
 
 
 @dataclass(frozen=True, slots=True)

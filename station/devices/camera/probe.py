@@ -3,9 +3,11 @@
 import math
 import time
 
-from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError
+from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError, describe
 from station.devices.camera.open import camera_from
 from station.devices.check_result import CheckResult
+from station.messages import camera as messages
+from station.messages.message import Message
 from station.settings.camera import CameraSettings
 
 _FRAMES = 15
@@ -14,14 +16,14 @@ _SLOW_SHARE = 0.8
 _SHORTEST_S = 1e-3
 """Rate of a recording that is played as fast as requested."""
 
-REMEDIES = {
-    FrameFault.STALE: "the computer or the link is too slow: close other programs, use a USB port of its own",
-    FrameFault.REPEATED: "the sensor is frozen: unplug it and plug it in again",
-    FrameFault.TORN: "the USB link drops data: change cable or port",
-    FrameFault.SHIFTED: "the USB link drops data: change cable or port",
-    FrameFault.BLACK: "no light: check the LED settings and the sensor's cable",
-    FrameFault.SATURATED: "too much light: lower the LED settings, shade the gel",
-    FrameFault.WRONG_SIZE: "another mode than asked for: close other programs that use the sensor",
+REMEDIES: dict[FrameFault, Message] = {
+    FrameFault.STALE: messages.REMEDY_STALE(),
+    FrameFault.REPEATED: messages.REMEDY_REPEATED(),
+    FrameFault.TORN: messages.REMEDY_BROKEN(),
+    FrameFault.SHIFTED: messages.REMEDY_BROKEN(),
+    FrameFault.BLACK: messages.REMEDY_BLACK(),
+    FrameFault.SATURATED: messages.REMEDY_SATURATED(),
+    FrameFault.WRONG_SIZE: messages.REMEDY_WRONG_SIZE(),
 }
 
 
@@ -32,7 +34,7 @@ async def probe_camera(settings: CameraSettings) -> list[CheckResult]:
         await camera.open()
         return [_judged(camera, await _some_frames(camera, recorded=settings.driver == "replay"))]
     except CameraError as error:
-        return [CheckResult("camera", f"driver {settings.driver}: no usable camera", "fault", str(error))]
+        return [CheckResult("camera", messages.CHECK_NONE(driver=settings.driver), "fault", error.message)]
     finally:
         await camera.close()
 
@@ -55,15 +57,20 @@ def _judged(camera: Camera, frames: list[Frame]) -> CheckResult:
     description = camera.description
     rate = (len(frames) - 1) / max(_SHORTEST_S, frames[-1].captured_s - frames[0].captured_s)
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
-    name = f"{description.name}, revision {description.revision}" if description.revision else description.name
-    found = f"{name}, {description.width_px}x{description.height_px}, {rate:.1f} frames/s"
+    seen = {"camera": description.name, "width_px": description.width_px, "height_px": description.height_px}
+    found = (
+        messages.CHECK_REVISION(**seen, rate=rate, revision=description.revision)
+        if description.revision
+        else messages.CHECK_FOUND(**seen, rate=rate)
+    )
     if faults:
-        sick = sum(1 for frame in frames if frame.faults)
-        remedy = "; ".join(REMEDIES[fault] for fault in faults)
-        return CheckResult("camera", f"{found}, {sick} of {len(frames)} frames {', '.join(faults)}", "fault", remedy)
+        bad = sum(1 for frame in frames if frame.faults)
+        sick = messages.CHECK_BAD(found=found, number=len(frames), bad=bad, faults=describe(faults))
+        remedies = list(dict.fromkeys(REMEDIES[fault] for fault in faults))
+        return CheckResult("camera", sick, "fault", messages.REMEDIES(remedies=remedies))
     if description.notice:
         return CheckResult("camera", found, "warning", description.notice)
     if description.frames_per_s and len(frames) > 1 and rate < _SLOW_SHARE * description.frames_per_s:
-        remedy = f"{description.frames_per_s:g} frames/s were expected: close other programs, use a USB port of its own"
+        remedy = messages.REMEDY_SLOW(rate=description.frames_per_s)
         return CheckResult("camera", found, "warning", remedy)
-    return CheckResult("camera", found, "ok", "")
+    return CheckResult("camera", found, "ok")

@@ -14,11 +14,11 @@ from natsort import natsorted
 from station.devices.camera.feed import FrameFeed
 from station.devices.camera.health import FrameHealth
 from station.devices.camera.interface import CameraDescription, CameraError, Frame, Image, Leds, NoCameraError
+from station.messages import camera as messages
 from station.settings.camera import CameraSettings
 
 _IMAGES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
-_ENDED = "the recording has ended"
-_REMEDY = "Start again to play it from its beginning, or name a longer one in camera.replay.source"
+_ENDED = messages.REPLAY_ENDED()
 
 
 class ReplayCamera:
@@ -38,9 +38,8 @@ class ReplayCamera:
         """Return the recording's description; its size is known once it is open."""
         height, width = self._size
         replay = self._settings.replay
-        return CameraDescription(
-            f"replay of {self._source}", width, height, self._settings.mm_per_px, replay.frames_per_s
-        )
+        name = str(messages.REPLAY(source=str(self._source)))
+        return CameraDescription(name, width, height, self._settings.mm_per_px, replay.frames_per_s)
 
     async def open(self) -> None:
         """Read the first frame, and start the clock of a replay in real time. Idempotent.
@@ -56,10 +55,10 @@ class ReplayCamera:
         self._frames = read_frames(self._source)
         first = await asyncio.to_thread(next, self._frames, None)
         if first is None:
-            raise NoCameraError(f"replay: {self._source} holds no image; expected a folder of images or a video")
+            raise NoCameraError(messages.REPLAY_EMPTY(source=str(self._source)))
         self._size = (first[1].shape[0], first[1].shape[1])
         health = FrameHealth(self._settings.oldest_s, self._size)
-        self._feed = FrameFeed(f"replay of {self._source}", health, _REMEDY)
+        self._feed = FrameFeed(messages.REPLAY(source=str(self._source)), health, messages.REMEDY_REPLAY())
         self._publish(*first)
         if self._settings.replay.frames_per_s:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
@@ -76,7 +75,7 @@ class ReplayCamera:
             CameraError: the camera is not open.
         """
         if self._feed is None:
-            raise CameraError("replay: asked for a frame before it was opened")
+            raise CameraError(messages.REPLAY_NOT_OPEN())
         if self._settings.replay.frames_per_s:
             return await self._feed.newer(newer_than_s, deadline_s)
         if self._feed.trouble == _ENDED:
@@ -131,11 +130,11 @@ def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
         for path in natsorted(path for path in source.iterdir() if path.suffix.lower() in _IMAGES):
             image = cv2.imread(str(path), cv2.IMREAD_COLOR)
             if image is None:
-                raise NoCameraError(f"replay: {path} is no image that can be read; remove it or record it again")
+                raise NoCameraError(messages.REPLAY_UNREADABLE(file=str(path)))
             yield path.name, np.asarray(image, np.uint8)
         return
     if not source.is_file():
-        raise NoCameraError(f"replay: there is no folder or video {source}; correct camera.replay.source")
+        raise NoCameraError(messages.REPLAY_MISSING(source=str(source)))
     video = cv2.VideoCapture(str(source))
     try:
         number = 0
@@ -162,7 +161,7 @@ def read_widths(path: Path) -> dict[str, float]:
         with path.open(encoding="utf-8", newline="") as file:
             widths = {row["image"]: float(row["width_mm"]) for row in csv.DictReader(file)}
     except (OSError, KeyError, TypeError, ValueError) as error:
-        raise CameraError(f"replay: {path}: expected CSV with the columns image, width_mm: {error!r}") from error
+        raise CameraError(messages.REPLAY_WIDTHS(file=str(path), reason=repr(error))) from error
     if not all(math.isfinite(width) for width in widths.values()):
-        raise CameraError(f"replay: {path}: a width is not a finite number of millimetres")
+        raise CameraError(messages.REPLAY_WIDTH(file=str(path)))
     return widths

@@ -28,6 +28,8 @@ from station.devices.camera.interface import (
     NoCameraError,
     NoFrameError,
 )
+from station.messages import camera as messages
+from station.messages.message import Message
 from station.settings.camera import CameraSettings
 
 _LENGTH = struct.Struct(">I")
@@ -48,7 +50,7 @@ class TwinCamera:
     def __init__(self, settings: CameraSettings) -> None:
         self._settings = settings
         self._where = f"{settings.twin.host}:{settings.twin.port}"
-        self._feed = FrameFeed(f"twin at {self._where}", FrameHealth(settings.oldest_s, _SIZE))
+        self._feed = FrameFeed(messages.TWIN(address=self._where), FrameHealth(settings.oldest_s, _SIZE))
         self._listening: asyncio.Task[None] | None = None
 
     @property
@@ -70,9 +72,9 @@ class TwinCamera:
             await self._feed.newer(-math.inf, self._settings.open_deadline_s)
         except NoFrameError as error:
             await self.close()
+            limit_s, reason = self._settings.open_deadline_s, self._feed.trouble or messages.NOTHING_SENT()
             raise NoCameraError(
-                f"camera twin at {self._where}: no frame within {self._settings.open_deadline_s} s; "
-                f"{self._feed.trouble}. Start it with `station twin`, or correct camera.twin in station.yaml"
+                messages.TWIN_NO_FIRST_FRAME(address=self._where, limit_s=limit_s, reason=reason)
             ) from error
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
@@ -106,11 +108,10 @@ class TwinCamera:
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(
-                f"camera twin at {self._where}: the light could not be set; {_describe(error)}"
-            ) from error
+            raise CameraError(messages.TWIN_LIGHT_NOT_SET(address=self._where, reason=_describe(error))) from error
         if answer.get("kind") != "leds":
-            raise CameraError(f"camera twin at {self._where}: the light was refused: {answer.get('message')}")
+            reason = str(answer.get("message"))
+            raise CameraError(messages.TWIN_LIGHT_REFUSED(address=self._where, reason=reason))
 
     async def true_mask(self, frame: Frame) -> Mask:
         """Return the true contact mask of a frame, which only a twin has; never used for a measurement.
@@ -133,14 +134,13 @@ class TwinCamera:
                         answer.get("kind") != "truth"
                         or answer.get("bytes") != frame.image.shape[0] * frame.image.shape[1]
                     ):
-                        raise CameraError(f"camera twin at {self._where}: no truth: {answer.get('message')}")
+                        reason = str(answer.get("message"))
+                        raise CameraError(messages.TWIN_NO_TRUTH(address=self._where, reason=reason))
                     pixels = await reader.readexactly(answer["bytes"])
                 finally:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(
-                f"camera twin at {self._where}: the truth could not be read; {_describe(error)}"
-            ) from error
+            raise CameraError(messages.TWIN_TRUTH_NOT_READ(address=self._where, reason=_describe(error))) from error
         return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
 
     async def close(self) -> None:
@@ -155,7 +155,7 @@ class TwinCamera:
             try:
                 await self._listen()
             except CameraProtocolError as error:
-                self._feed.trouble = str(error)
+                self._feed.trouble = error.message
             except (OSError, EOFError, TimeoutError) as error:
                 self._feed.trouble = _describe(error)
             await asyncio.sleep(_RETRY_S)
@@ -170,7 +170,7 @@ class TwinCamera:
                     header = await _read_header(reader)
                     image, sequence, age_s = await _read_frame(reader, header)
                 if sequence <= last:
-                    raise CameraProtocolError(f"frame {sequence} came after frame {last}; numbers must rise")
+                    raise CameraProtocolError(messages.WRONG_ORDER(found=str(sequence), before=str(last)))
                 last = sequence
                 self._feed.publish(image, time.monotonic() - age_s, sequence=sequence)
         finally:
@@ -184,14 +184,14 @@ class TwinCamera:
         return reader, writer
 
 
-def _describe(error: OSError | EOFError) -> str:
+def _describe(error: OSError | EOFError) -> Message:
     """Describe the connection's failure."""
     if isinstance(error, EOFError):
-        return "the connection was closed"
+        return messages.LINK_CLOSED()
     if isinstance(error, TimeoutError):
-        return f"nothing came for {_SILENCE_S:g} s"
+        return messages.LINK_SILENT(limit_s=_SILENCE_S)
     number = error.errno or 0
-    return f"the connection failed: {os.strerror(number) if number > 0 else error.strerror or error}"
+    return messages.LINK_FAILED(reason=os.strerror(number) if number > 0 else error.strerror or str(error))
 
 
 async def _close(writer: asyncio.StreamWriter) -> None:
@@ -203,28 +203,31 @@ async def _close(writer: asyncio.StreamWriter) -> None:
 async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
     (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
     if length > _LONGEST_HEADER:
-        raise CameraProtocolError(f"a header of {length} bytes was announced; at most {_LONGEST_HEADER} are expected")
+        raise CameraProtocolError(messages.LONG_HEADER(found=length, limit=_LONGEST_HEADER))
     text = await reader.readexactly(length)
     try:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise CameraProtocolError(f"a header is no JSON that can be read: {error}") from error
+        raise CameraProtocolError(messages.UNREADABLE_HEADER(reason=str(error))) from error
     if not isinstance(header, dict):
-        raise CameraProtocolError("a header must be a JSON object")
+        raise CameraProtocolError(messages.WRONG_HEADER())
     return header
 
 
 async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> tuple[Image, int, float]:
     if header.get("kind") != "frame":
-        raise CameraProtocolError(f"a frame was expected, {header.get('kind')!r} came: {header.get('message')}")
+        kind, reason = repr(header.get("kind")), str(header.get("message"))
+        raise CameraProtocolError(messages.NO_FRAME_HEADER(kind=kind, reason=reason))
     height, width, sequence = (_whole(header, key) for key in ("height", "width", "sequence"))
     age_s = header.get("age_s")
     if isinstance(age_s, bool) or not isinstance(age_s, int | float) or not 0 <= age_s < _OLDEST_S:
-        raise CameraProtocolError(f"age_s is {age_s!s:.40}; expected seconds, from 0 to less than {_OLDEST_S:g}")
+        raise CameraProtocolError(messages.WRONG_AGE(found=f"{age_s!s:.40}", limit=_OLDEST_S))
     if not (0 < height <= _LONGEST_SIDE and 0 < width <= _LONGEST_SIDE):
-        raise CameraProtocolError(f"a frame of {width}x{height} pixels; at most {_LONGEST_SIDE} a side are expected")
+        size = {"width": str(width), "height": str(height)}
+        raise CameraProtocolError(messages.WRONG_SIZE(**size, limit=_LONGEST_SIDE))
     if header.get("bytes") != height * width * 3:
-        raise CameraProtocolError(f"{header.get('bytes')!r} bytes for {width}x{height} pixels of 3 bytes")
+        found = repr(header.get("bytes"))
+        raise CameraProtocolError(messages.WRONG_LENGTH(found=found, width=width, height=height))
     pixels = await reader.readexactly(height * width * 3)
     return np.frombuffer(pixels, np.uint8).reshape(height, width, 3), sequence, float(age_s)
 
@@ -232,5 +235,5 @@ async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> t
 def _whole(header: dict[str, Any], key: str) -> int:
     value = header.get(key)
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise CameraProtocolError(f"{key} is {value!r}; expected a whole number, 0 or more")
+        raise CameraProtocolError(messages.NOT_WHOLE(key=key, found=repr(value)))
     return value

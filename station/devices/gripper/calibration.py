@@ -7,6 +7,7 @@ Scales: Robotiq 2F-85 & 2F-140 instruction manual, speed and force registers; li
 from math import ceil, floor
 
 from station.devices.gripper.errors import GripperRequestError
+from station.messages import gripper as messages
 from station.settings.gripper import GripperCalibration
 
 SLOWEST_MM_S, FASTEST_MM_S = 20.0, 150.0
@@ -45,8 +46,7 @@ def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
     widest_mm = max_width_mm(calibration)
     if not -_ROUNDING <= width_mm <= widest_mm + _ROUNDING:
         raise GripperRequestError(
-            f"a width of {width_mm} mm was asked for, its fingers reach 0 to {widest_mm:.2f} mm",
-            "correct the recipe's widths or the gripper's calibration",
+            messages.WIDTH_OUT_OF_REACH(width_mm=width_mm, widest_mm=widest_mm), messages.REMEDY_WIDTH()
         )
     exact = calibration.closed_count - (width_mm + calibration.finger_offset_mm) / calibration.mm_per_count
     return ceil(exact - 0.5 - _ROUNDING)
@@ -60,8 +60,8 @@ def speed_setting(speed_mm_s: float) -> int:
     """
     if not SLOWEST_MM_S <= speed_mm_s <= FASTEST_MM_S:
         raise GripperRequestError(
-            f"a speed of {speed_mm_s} mm/s was asked for, it moves at {SLOWEST_MM_S:g} to {FASTEST_MM_S:g} mm/s",
-            "correct the recipe's speed",
+            messages.SPEED_OUT_OF_RANGE(speed_mm_s=speed_mm_s, slowest_mm_s=SLOWEST_MM_S, fastest_mm_s=FASTEST_MM_S),
+            messages.REMEDY_SPEED(),
         )
     return round((speed_mm_s - SLOWEST_MM_S) / (FASTEST_MM_S - SLOWEST_MM_S) * _FULL_SCALE)
 
@@ -74,7 +74,7 @@ def force_setting(force_N: float) -> int:
     """
     if not WEAKEST_N <= force_N <= STRONGEST_N:
         raise GripperRequestError(
-            f"a force of {force_N} N was asked for, it grips with {WEAKEST_N:g} to {STRONGEST_N:g} N",
-            "correct the recipe's force; a soft fruit is protected by small width steps, not by the force",
+            messages.FORCE_OUT_OF_RANGE(force_n=force_N, weakest_n=WEAKEST_N, strongest_n=STRONGEST_N),
+            messages.REMEDY_FORCE(),
         )
     return floor((force_N - WEAKEST_N) / (STRONGEST_N - WEAKEST_N) * _FULL_SCALE + _ROUNDING)

@@ -3,6 +3,8 @@
 from typing import NamedTuple
 
 from station.errors import StationError
+from station.messages import gripper as messages
+from station.messages.message import Message
 
 
 class GripperError(StationError):
@@ -10,8 +12,8 @@ class GripperError(StationError):
 
     code = "gripper"
 
-    def __init__(self, cause: str, remedy: str) -> None:
-        super().__init__(f"gripper: {cause}; {remedy}")
+    def __init__(self, cause: Message, remedy: Message) -> None:
+        super().__init__(messages.FAULT(cause=cause, remedy=remedy))
         self.cause = cause
         self.remedy = remedy
 
@@ -70,35 +72,28 @@ class GripperEmergencyStopError(GripperError):
     code = "emergency_stop"
 
     def __init__(self) -> None:
-        super().__init__(
-            "the robot is emergency stopped",
-            "make the cell safe, release the button, bring the robot back to running, then activate the gripper",
-        )
+        super().__init__(messages.EMERGENCY_STOP(), messages.REMEDY_EMERGENCY_STOP())
 
 
 class FaultText(NamedTuple):
-    """Cause and remedy of a gripper fault, as text."""
+    """Name, cause and remedy of a gripper fault."""
 
     name: str
-    cause: str
-    remedy: str
+    cause: Message
+    remedy: Message
 
-
-_REACTIVATE = "clear the fingers and activate the gripper again"
 
 FAULTS: dict[int, FaultText] = {
-    0x5: FaultText("activate_first", "it was asked to move before its activation was complete", "activate it first"),
-    0x7: FaultText("activation_bit", "it was asked to move without being activated", "activate it first"),
-    0x8: FaultText("over_temperature", "it is too hot", "let it cool down, look for a finger that is held or stiff"),
-    0x9: FaultText("no_communication", "it heard nothing for a second", "check the RS-485 wiring and its terminator"),
-    0xA: FaultText("under_voltage", "its supply is too low", f"check the 24 V supply and its cable, {_REACTIVATE}"),
-    0xB: FaultText("releasing", "it is releasing on its own", f"wait until the fingers stand, {_REACTIVATE}"),
-    0xC: FaultText("internal_fault", "its electronics report a fault", f"switch it off and on, {_REACTIVATE}"),
-    0xD: FaultText("activation_fault", "its activation failed", f"look for what blocks the fingers, {_REACTIVATE}"),
-    0xE: FaultText(
-        "overcurrent", "its motor drew too much current", f"look for what blocks the fingers, {_REACTIVATE}"
-    ),
-    0xF: FaultText("released", "it has released on its own", _REACTIVATE),
+    0x5: FaultText("activate_first", messages.ACTIVATE_FIRST(), messages.REMEDY_ACTIVATE()),
+    0x7: FaultText("activation_bit", messages.ACTIVATION_BIT(), messages.REMEDY_ACTIVATE()),
+    0x8: FaultText("over_temperature", messages.OVER_TEMPERATURE(), messages.REMEDY_OVER_TEMPERATURE()),
+    0x9: FaultText("no_communication", messages.NO_COMMUNICATION(), messages.REMEDY_NO_COMMUNICATION()),
+    0xA: FaultText("under_voltage", messages.UNDER_VOLTAGE(), messages.REMEDY_UNDER_VOLTAGE()),
+    0xB: FaultText("releasing", messages.RELEASING(), messages.REMEDY_RELEASING()),
+    0xC: FaultText("internal_fault", messages.INTERNAL_FAULT(), messages.REMEDY_INTERNAL_FAULT()),
+    0xD: FaultText("activation_fault", messages.ACTIVATION_FAULT(), messages.REMEDY_BLOCKED()),
+    0xE: FaultText("overcurrent", messages.OVERCURRENT(), messages.REMEDY_BLOCKED()),
+    0xF: FaultText("released", messages.RELEASED(), messages.REMEDY_RELEASED()),
 }
 """gFLT. Source: Robotiq 2F-85 & 2F-140 instruction manual, fault status register."""
 
@@ -110,10 +105,8 @@ class GripperFaultError(GripperError):
     """The gripper reports a fault."""
 
     def __init__(self, fault_code: int) -> None:
-        text = FAULTS.get(
-            fault_code,
-            FaultText("unknown", "it reports a fault that its manual does not list", "look at its LED and its manual"),
-        )
-        super().__init__(f"{text.cause} (fault 0x{fault_code:02X}, {text.name})", text.remedy)
+        text = FAULTS.get(fault_code, FaultText("unknown", messages.UNKNOWN(), messages.REMEDY_UNKNOWN()))
+        cause = messages.REPORTED(cause=text.cause, number=f"0x{fault_code:02X}", name=text.name)
+        super().__init__(cause, text.remedy)
         self.fault_code = fault_code
         self.code = text.name

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
+from station.messages.message import Message
+
 
 class State(IntEnum):
     """gSTA."""
@@ -42,7 +44,7 @@ class Link(Protocol):
     """
 
     @property
-    def place(self) -> str:
+    def place(self) -> Message:
         """Describe the device at the other end and its address."""
         ...
 

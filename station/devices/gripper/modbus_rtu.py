@@ -20,6 +20,8 @@ from station.devices.gripper.errors import (
     GripperUnreachableError,
 )
 from station.devices.gripper.link import Status
+from station.messages import gripper as messages
+from station.messages.message import Message
 from station.settings.gripper import ModbusRtuSettings
 
 _READ, _WRITE = 0x04, 0x10
@@ -47,11 +49,11 @@ class ModbusRtuLink:
         self._wait_for_quiet = False
 
     @property
-    def place(self) -> str:
+    def place(self) -> Message:
         """Describe the device at the other end and its address."""
         settings = self._settings
-        where = settings.serial_port if settings.line == "serial" else f"{settings.host}:{settings.port}"
-        return f"Modbus RTU unit {settings.unit} at {where}"
+        address = settings.serial_port if settings.line == "serial" else f"{settings.host}:{settings.port}"
+        return messages.PLACE_MODBUS_RTU(unit=settings.unit, address=address)
 
     async def status(self) -> Status:
         """Read the three status registers in one exchange."""
@@ -100,7 +102,8 @@ class ModbusRtuLink:
             lambda client: client.read_input_registers(_STATUS, count=_COUNT, device_id=self._settings.unit),
         )
         if len(answer.registers) != _COUNT:
-            self._refuse(f"{len(answer.registers)} registers where {_COUNT} were asked for")
+            found = len(answer.registers)
+            self._refuse(messages.WRONG_NUMBER(place=self.place, found=found, expected=_COUNT))
         return list(answer.registers)
 
     async def _write(self, values: list[int]) -> None:
@@ -132,30 +135,23 @@ class ModbusRtuLink:
     def _checked(self, asked: asyncio.Future[ModbusPDU], function: int) -> ModbusPDU:
         """Return the answer, or raise the error for an invalid one."""
         if asked.cancelled() or isinstance(asked.exception(), ConnectionException):
-            raise GripperLinkLostError(
-                f"the connection to {self.place} broke",
-                "check the cable and the adapter; the fingers may still be moving",
-            )
+            raise GripperLinkLostError(messages.LINK_LOST(place=self.place), messages.REMEDY_CABLE())
         if isinstance(asked.exception(), ModbusException) and self._received:
-            self._refuse(f"with what is no Modbus RTU answer: {self._received[:16].hex(' ')}")
+            self._refuse(messages.NOT_MODBUS_RTU(place=self.place, octets=self._received[:16].hex(" ")))
         if isinstance(asked.exception(), ModbusException):
-            raise GripperSilentError(
-                f"{self.place} did not answer within {self._answer_timeout_s:g} s",
-                "check the 24 V supply, the wiring and the unit",
-            )
+            silent = messages.SILENT(place=self.place, limit_s=self._answer_timeout_s)
+            raise GripperSilentError(silent, messages.REMEDY_SILENT_LINE())
         answer = asked.result()
         if answer.isError():
-            self._refuse(f"exception {answer.exception_code}")
+            self._refuse(messages.MODBUS_EXCEPTION(place=self.place, number=answer.exception_code))
         if answer.function_code != function:
-            self._refuse(f"function {answer.function_code} where {function} was asked for")
+            found = answer.function_code
+            self._refuse(messages.WRONG_FUNCTION(place=self.place, found=found, expected=function))
         return answer
 
-    def _refuse(self, what: str) -> NoReturn:
+    def _refuse(self, cause: Message) -> NoReturn:
         self._drop()
-        raise GripperProtocolError(
-            f"{self.place} answered {what}",
-            "check baud rate, unit, wiring and terminator, and that no second master is on the line",
-        )
+        raise GripperProtocolError(cause, messages.REMEDY_LINE())
 
     def _drop(self) -> None:
         """Close after a failure: an answer may still be on its way."""
@@ -175,10 +171,7 @@ class ModbusRtuLink:
         client = self._make()
         if not await client.connect():
             client.close()
-            raise GripperUnreachableError(
-                f"no connection to {self.place}",
-                "check the serial port or the gateway's address, and that no other program has it open",
-            )
+            raise GripperUnreachableError(messages.UNREACHABLE(place=self.place), messages.REMEDY_SERIAL())
         self._client = client
         return client
 

@@ -4,6 +4,8 @@ from station.devices.check_result import CheckResult
 from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.devices.gripper.interface import GripperReading
 from station.devices.gripper.robotiq import make_gripper
+from station.messages import gripper as messages
+from station.messages.message import Message
 from station.settings.gripper import GripperCalibration, GripperSettings
 
 _CALIBRATION_COUNTS = 3
@@ -17,31 +19,35 @@ async def probe_gripper(settings: GripperSettings) -> list[CheckResult]:
     try:
         reading = await gripper.read()
     except GripperError as error:
-        found = error.cause if place in error.cause else f"{place}: {error.cause}"
+        named = error.cause.parameters.get("place") == place
+        found = error.cause if named else messages.CHECK_AT(place=place, trouble=error.cause)
         return [CheckResult("gripper", found, "fault", error.remedy)]
     finally:
         await gripper.close()
     return [_judged(reading, place, settings.calibration)]
 
 
-def _judged(reading: GripperReading, place: str, calibration: GripperCalibration) -> CheckResult:
-    found = f"{place}: position {reading.position_count}, width {reading.width_mm:.1f} mm, {reading.object_state}"
+def _judged(reading: GripperReading, place: Message, calibration: GripperCalibration) -> CheckResult:
+    found = messages.CHECK_FOUND(
+        place=place, count=reading.position_count, width_mm=reading.width_mm, state=reading.object_state.value
+    )
     if reading.fault_code:
         fault = GripperFaultError(reading.fault_code)
-        return CheckResult("gripper", f"{found}; {fault.cause}", "fault", fault.remedy)
+        return CheckResult("gripper", messages.CHECK_TROUBLE(found=found, trouble=fault.cause), "fault", fault.remedy)
     if not reading.active:
         return CheckResult(
             "gripper",
-            f"{found}; not activated",
+            messages.CHECK_TROUBLE(found=found, trouble=messages.CHECK_NOT_ACTIVE()),
             "warning",
-            "clear the fingers and activate it: they will travel their whole way",
+            messages.REMEDY_CLEAR_AND_ACTIVATE(),
         )
     low, high = calibration.open_count - _CALIBRATION_COUNTS, calibration.closed_count + _CALIBRATION_COUNTS
     if not low <= reading.position_count <= high:
+        outside = messages.CHECK_UNCALIBRATED(open=calibration.open_count, closed=calibration.closed_count)
         return CheckResult(
             "gripper",
-            f"{found}; outside the calibrated counts {calibration.open_count} to {calibration.closed_count}",
+            messages.CHECK_TROUBLE(found=found, trouble=outside),
             "warning",
-            "read the counts with the gripper open and closed and correct gripper.calibration",
+            messages.REMEDY_CALIBRATE(),
         )
-    return CheckResult("gripper", found, "ok", "")
+    return CheckResult("gripper", found, "ok")

@@ -24,6 +24,8 @@ from station.devices.gripper.interface import GripperReading, MoveResult, Object
 from station.devices.gripper.link import Link, State, Status
 from station.devices.gripper.modbus_rtu import ModbusRtuLink
 from station.devices.gripper.urcap import UrcapLink
+from station.messages import gripper as messages
+from station.messages.message import Message
 from station.settings.gripper import GripperSettings
 
 _POLL_S = 0.005
@@ -44,12 +46,12 @@ _OBJECT_STATES = {
     2: ObjectState.CONTACT_CLOSING,
     3: ObjectState.AT_POSITION,
 }
-_STATE_WORDS = {
-    ObjectState.IDLE: "with no motion asked for",
-    ObjectState.MOVING: "and still says that it moves",
-    ObjectState.CONTACT_OPENING: "stopped by something outside the fingers",
-    ObjectState.CONTACT_CLOSING: "stopped by something between the fingers",
-    ObjectState.AT_POSITION: "and says that this is where it was sent",
+_STATE_MESSAGES = {
+    ObjectState.IDLE: messages.STATE_IDLE(),
+    ObjectState.MOVING: messages.STATE_MOVING(),
+    ObjectState.CONTACT_OPENING: messages.STATE_CONTACT_OPENING(),
+    ObjectState.CONTACT_CLOSING: messages.STATE_CONTACT_CLOSING(),
+    ObjectState.AT_POSITION: messages.STATE_AT_POSITION(),
 }
 
 
@@ -93,7 +95,7 @@ class Robotiq2F85:
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
             await self.link.reset()
             while (await self._poll())[0].state != State.RESET:
-                await self._wait_until(deadline_s, "its reset", None)
+                await self._wait_until(deadline_s, messages.STEP_RESET(), None)
                 await self.link.reset()
             await asyncio.sleep(_RESET_HOLD_S)
             await self.link.begin_activation()
@@ -104,7 +106,7 @@ class Robotiq2F85:
                     return self._reading(status, at_s)
                 if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
                     raise GripperFaultError(status.fault)
-                await self._wait_until(deadline_s, "its activation", status)
+                await self._wait_until(deadline_s, messages.STEP_ACTIVATION(), status)
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
         """Open fast: fully, or to a width. Idempotent. Raises as `move_to_width`.
@@ -187,10 +189,7 @@ class Robotiq2F85:
         if fault:
             raise GripperFaultError(fault)
         if status.state != State.ACTIVE:
-            raise GripperNotActiveError(
-                "it is not activated",
-                "clear the fingers and activate it: they will travel their whole way",
-            )
+            raise GripperNotActiveError(messages.NOT_ACTIVE(), messages.REMEDY_CLEAR_AND_ACTIVATE())
         return status, at_s
 
     async def _arrival(self, count: int, deadline_s: float, stops: int) -> tuple[Status, float]:
@@ -202,11 +201,11 @@ class Robotiq2F85:
             if status.echo == count and self._at_rest(status, count) and status.position == position:
                 return status, at_s
             position = status.position
-            await self._wait_until(deadline_s, f"the move to count {count}", status)
+            await self._wait_until(deadline_s, messages.STEP_MOVE(count=count), status)
 
     def _go_on_unless_stopped(self, stops: int) -> None:
         if self._stops != stops:
-            raise GripperStoppedError("the move was stopped on request", "start the next move when it is wanted")
+            raise GripperStoppedError(messages.STOPPED(), messages.REMEDY_STOPPED())
 
     async def _halt_if_possible(self) -> None:
         """Try once to stop, which delays the error by a few answers at most."""
@@ -226,13 +225,10 @@ class Robotiq2F85:
         return state != ObjectState.MOVING
 
     @staticmethod
-    async def _wait_until(deadline_s: float, what: str, status: Status | None) -> None:
+    async def _wait_until(deadline_s: float, step: Message, status: Status | None) -> None:
         if time.monotonic() > deadline_s:
-            seen = f": {_describe(status)}" if status else ""
-            raise GripperTimeoutError(
-                f"{what} did not end in time{seen}",
-                "look for what holds the fingers, and for a second master that commands the gripper",
-            )
+            late = _late_at(step, status) if status else messages.LATE(step=step)
+            raise GripperTimeoutError(late, messages.REMEDY_LATE())
         await asyncio.sleep(_POLL_S)
 
     def _active_fault(self, status: Status, now_s: float) -> int:
@@ -259,9 +255,9 @@ class Robotiq2F85:
         )
 
 
-def _describe(status: Status) -> str:
+def _late_at(step: Message, status: Status) -> Message:
     state = _OBJECT_STATES[status.object_] if status.go_to else ObjectState.IDLE
-    return f"it stands at count {status.position}, {_STATE_WORDS[state]}"
+    return messages.LATE_AT(step=step, count=status.position, state=_STATE_MESSAGES[state])
 
 
 def make_gripper(settings: GripperSettings) -> Robotiq2F85:

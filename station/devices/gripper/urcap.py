@@ -16,6 +16,8 @@ from station.devices.gripper.errors import (
     GripperUnreachableError,
 )
 from station.devices.gripper.link import Status
+from station.messages import gripper as messages
+from station.messages.message import Message, verbatim
 from station.settings.gripper import UrcapSettings
 
 _ACKNOWLEDGED = b"ack"
@@ -35,9 +37,9 @@ class UrcapLink:
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
 
     @property
-    def place(self) -> str:
+    def place(self) -> Message:
         """Describe the device at the other end and its address."""
-        return f"URCap at {self._settings.host}:{self._settings.port}"
+        return messages.PLACE_URCAP(address=f"{self._settings.host}:{self._settings.port}")
 
     async def status(self) -> Status:
         """Read the registers, the position after the object state: at rest the two belong together."""
@@ -95,10 +97,8 @@ class UrcapLink:
 
     async def _refuse(self, request: str, answer: bytes) -> NoReturn:
         await self.close()
-        raise GripperProtocolError(
-            f"{self.place} answered {answer!r} to {request!r}",
-            "check that the address is the robot's and that nothing else uses the URCap's port",
-        )
+        wrong = messages.WRONG_ANSWER(place=self.place, answer=repr(answer), request=repr(request))
+        raise GripperProtocolError(wrong, messages.REMEDY_PORT())
 
     async def _ask(self, request: bytes) -> bytes:
         reader, writer = await self._connected()
@@ -113,16 +113,13 @@ class UrcapLink:
             if answer:
                 await self._refuse(request.decode().strip(), answer)
             await self.close()
-            raise GripperSilentError(
-                f"{self.place} did not answer within {self._answer_timeout_s:g} s",
-                "check that the robot is powered and the gripper shows a steady LED",
-            ) from None
+            silent = messages.SILENT(place=self.place, limit_s=self._answer_timeout_s)
+            raise GripperSilentError(silent, messages.REMEDY_SILENT_ROBOT()) from None
         except OSError as error:
             await self.close()
-            raise GripperLinkLostError(
-                f"the connection to {self.place} broke ({error})",
-                "check the network and the robot; the fingers may still be moving",
-            ) from error
+            reason = messages.CLOSED_BY_PEER() if isinstance(error, _ClosedByPeerError) else verbatim(str(error))
+            lost = messages.LINK_LOST_BECAUSE(place=self.place, reason=reason)
+            raise GripperLinkLostError(lost, messages.REMEDY_NETWORK()) from error
         except BaseException:
             await self.close()
             raise
@@ -134,21 +131,24 @@ class UrcapLink:
                 async with asyncio.timeout(_CONNECT_TIMEOUT_S):
                     self._streams = await asyncio.open_connection(self._settings.host, self._settings.port)
             except OSError as error:
-                raise GripperUnreachableError(
-                    f"no connection to the {self.place} ({_describe(error)})",
-                    "check the robot's address and network, and that the Robotiq URCap is installed and running",
-                ) from error
+                away = messages.UNREACHABLE_BECAUSE(place=self.place, reason=_describe(error))
+                raise GripperUnreachableError(away, messages.REMEDY_URCAP()) from error
         return self._streams
 
 
-def _describe(error: OSError) -> str:
+class _ClosedByPeerError(ConnectionError):
+    """The other end closed the connection."""
+
+
+def _describe(error: OSError) -> Message:
     """Describe the failure of the connection, without asyncio's own text around it."""
     number = error.errno or 0
-    return os.strerror(number) if number > 0 else error.strerror or "no answer"
+    text = os.strerror(number) if number > 0 else error.strerror
+    return verbatim(text) if text else messages.NO_ANSWER()
 
 
 async def _piece(reader: asyncio.StreamReader) -> bytes:
     piece = await reader.read(_LONGEST_ANSWER)
     if not piece:
-        raise ConnectionResetError("closed by the other end")
+        raise _ClosedByPeerError
     return piece
