@@ -74,22 +74,23 @@ REGISTERS_IN_USE = define("arm.registers_in_use", "another client or a fieldbus 
 WATCHDOG = define("arm.watchdog", "the controller's watchdog stopped the program, because the station was not healthy")
 PROGRAM_STOPPED = define("arm.program_stopped", "the control program was stopped on the controller")
 PROGRAM_STOPPED_BECAUSE = define(
-    "arm.program_stopped_because", "the control program was stopped on the controller ({output})", output=Name()
+    "arm.program_stopped_because", "the control program was stopped on the controller ({reason})", reason=Nested()
 )
 COMMAND_NOT_TAKEN = define("arm.command_not_taken", "the control program plays and did not take the command")
 COMMAND_NOT_TAKEN_BECAUSE = define(
     "arm.command_not_taken_because",
-    "the control program plays and did not take the command ({output})",
-    output=Name(),
+    "the control program plays and did not take the command ({reason})",
+    reason=Nested(),
 )
 
 NOT_OPENED = define("arm.not_opened", "the arm was not opened")
 CLOSED = define("arm.closed", "the arm was closed")
 NOT_CONNECTED_YET = define("arm.not_connected_yet", "the arm is not connected yet")
 NOT_CONNECTED = define("arm.not_connected", "the arm is not connected")
-NOT_CONNECTED_BECAUSE = define("arm.not_connected_because", "the arm is not connected: {output}", output=Name())
-CONNECTION_FAILED = define("arm.connection_failed", "ur-rtde could not connect: {output}", output=Name())
-NOTHING_RECEIVED = define("arm.nothing_received", "ur-rtde receives nothing: {output}", output=Name())
+NOT_CONNECTED_BECAUSE = define("arm.not_connected_because", "the arm is not connected: {reason}", reason=Nested())
+CONNECTION_FAILED = define("arm.connection_failed", "ur-rtde could not connect: {reason}", reason=Nested())
+NOTHING_RECEIVED = define("arm.nothing_received", "ur-rtde receives nothing: {reason}", reason=Nested())
+NO_REASON = define("arm.no_reason", "no reason given")
 STATE_OLD = define("arm.state_old", "the controller's state is {age_s} s old", age_s=Number(2))
 STATE_LATE = define("arm.state_late", "the arm's process reported no state within {limit_s} s", limit_s=Number())
 STATE_NOT_RECEIVED = define("arm.state_not_received", "the controller's state is not received yet")

@@ -102,8 +102,8 @@ LINK_FAILED = define("camera.link_failed", "the connection failed: {reason}", re
 LONG_HEADER = define(
     "camera.long_header",
     "it announced a header of {found} bytes; at most {limit} are allowed",
-    found=Number(),
-    limit=Number(),
+    found=Number(0),
+    limit=Number(0),
 )
 UNREADABLE_HEADER = define("camera.unreadable_header", "it sent a header that is no JSON: {reason}", reason=Name())
 WRONG_HEADER = define("camera.wrong_header", "it sent a header that is no JSON object")

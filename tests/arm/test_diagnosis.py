@@ -6,6 +6,8 @@ from station.devices.arm.dashboard import DashboardFacts
 from station.devices.arm.diagnosis import diagnose, from_output, from_state
 from station.devices.arm.faults import REMEDIES, ArmCause
 from station.devices.arm.messages import Snapshot
+from station.messages import arm as messages
+from station.messages.message import verbatim
 
 SIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -58,7 +60,7 @@ def test_the_gravest_cause_that_the_state_shows_is_named(bits, mode, cause):
     ],
 )
 def test_what_was_not_done_has_one_cause(state, remote, healthy, cause):
-    assert diagnose(state, facts(remote=remote), "", was_healthy=healthy).cause is cause
+    assert diagnose(state, facts(remote=remote), None, was_healthy=healthy).cause is cause
 
 
 @pytest.mark.parametrize(
@@ -72,15 +74,20 @@ def test_what_was_not_done_has_one_cause(state, remote, healthy, cause):
     ],
 )
 def test_ur_rtdes_own_words_are_understood(words, cause):
-    fault = from_output(words)
+    fault = from_output(verbatim(words))
     assert (fault and fault.cause) == cause
 
 
-@pytest.mark.parametrize("output", ["", "ur_rtde: the script ended"])
+@pytest.mark.parametrize("output", [None, verbatim("ur_rtde: the script ended"), messages.NOT_COMMANDED()])
 @pytest.mark.parametrize("playing", [False, True])
 def test_ur_rtdes_output_is_part_of_the_fault(playing, output):
     fault = diagnose(snapshot(runtime_state=2 if playing else 1), facts(), output, was_healthy=True)
-    assert fault.detail.parameters.get("output", "") == output
+    assert fault.detail.parameters.get("reason") == output
+
+
+def test_the_stations_own_words_are_not_searched_for_a_cause():
+    assert from_output(None) is None
+    assert from_output(messages.LOCAL_CONTROL()) is None
 
 
 def test_every_cause_has_a_remedy():

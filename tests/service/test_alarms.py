@@ -137,7 +137,9 @@ def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the
             await cell.line.ready()
             cell.twin.boards["gripper"].set("under_voltage")
             await until(lambda: AlarmId.GRIPPER_FAULT in active(cell))
-            assert cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail == GripperFaultError(0xA).message
+            assert (
+                cell.station.service.alarms.alarms.get(AlarmId.GRIPPER_FAULT).detail == GripperFaultError(0xA).message
+            )
             cell.twin.boards["gripper"].clear()
             cell.twin.world.remove()
             done = await cell.line.order(CommandName.RESET)

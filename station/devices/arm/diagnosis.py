@@ -4,7 +4,7 @@ from station.devices.arm.dashboard import DashboardFacts
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Snapshot
 from station.messages import arm as messages
-from station.messages.message import Message
+from station.messages.message import VERBATIM, Message
 
 RUNNING = 7
 """RTDE `robot_mode`: powered, brakes released."""
@@ -33,13 +33,13 @@ def from_state(snapshot: Snapshot) -> ArmFault | None:
     return None
 
 
-def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: str, *, was_healthy: bool) -> ArmFault:
+def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: Message | None, *, was_healthy: bool) -> ArmFault:
     """Return the cause why a command was not done or no program plays.
 
     Args:
         snapshot: the controller's state.
         facts: of its dashboard server.
-        output: ur-rtde's output, if any.
+        output: of the failed command; None if it gave none.
         was_healthy: the station's health lease was renewed without a gap.
     """
     fault = from_state(snapshot)
@@ -48,21 +48,23 @@ def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: str, *, was_heal
     if not facts.remote:
         return ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
     if snapshot.runtime_state == PLAYING:
-        not_taken = messages.COMMAND_NOT_TAKEN_BECAUSE(output=output) if output else messages.COMMAND_NOT_TAKEN()
+        not_taken = messages.COMMAND_NOT_TAKEN_BECAUSE(reason=output) if output else messages.COMMAND_NOT_TAKEN()
         return ArmFault(ArmCause.DEADLINE, not_taken)
     if not was_healthy:
         return ArmFault(ArmCause.WATCHDOG, messages.WATCHDOG())
-    stopped = messages.PROGRAM_STOPPED_BECAUSE(output=output) if output else messages.PROGRAM_STOPPED()
+    stopped = messages.PROGRAM_STOPPED_BECAUSE(reason=output) if output else messages.PROGRAM_STOPPED()
     return ArmFault(ArmCause.PROGRAM_STOPPED, stopped)
 
 
-def from_output(words: str) -> ArmFault | None:
+def from_output(output: Message | None) -> ArmFault | None:
     """Return the cause in ur-rtde's own exceptions; None if they leave it open."""
-    lowered = words.lower()
+    if output is None or output.id != VERBATIM.id:
+        return None
+    lowered = str(output).lower()
     if "remote control" in lowered:
         return ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
     if "already in use" in lowered:
         return ArmFault(ArmCause.REGISTERS_IN_USE, messages.REGISTERS_IN_USE())
     if "could not connect" in lowered or "timeout connecting" in lowered:
-        return ArmFault(ArmCause.LINK_LOST, messages.CONNECTION_FAILED(output=words))
+        return ArmFault(ArmCause.LINK_LOST, messages.CONNECTION_FAILED(reason=output))
     return None

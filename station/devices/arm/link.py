@@ -17,6 +17,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
 from station.devices.arm.process_handle import ArmProcess
 from station.messages import arm as messages
+from station.messages.message import Message
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1
@@ -264,7 +265,7 @@ class ArmLink:
         elif latched is not None and latched not in STATE_CAUSES:
             return
         elif snapshot.runtime_state != PLAYING:
-            self._store_or_raise(await self._explain(""))
+            self._store_or_raise(await self._explain(None))
         elif self._lost is not None:
             self._set(None)
 
@@ -284,7 +285,7 @@ class ArmLink:
         outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
             raise from_output(outcome.output) or ArmFault(
-                ArmCause.LINK_LOST, messages.NOTHING_RECEIVED(output=outcome.output)
+                ArmCause.LINK_LOST, messages.NOTHING_RECEIVED(reason=outcome.output or messages.NO_REASON())
             )
         return self._process
 
@@ -306,20 +307,21 @@ class ArmLink:
                 await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             self._up()
 
-    async def _explain(self, output: str) -> ArmFault:
+    async def _explain(self, output: Message | None) -> ArmFault:
         fault = from_output(output)
         if fault is not None or self._process is None:
-            return fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED_BECAUSE(output=output))
+            away = messages.NOT_CONNECTED_BECAUSE(reason=output) if output else messages.NOT_CONNECTED()
+            return fault or ArmFault(ArmCause.LINK_LOST, away)
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
         snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
         return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
-    async def explain(self, output: str) -> ArmFault:
+    async def explain(self, output: Message | None) -> ArmFault:
         """Return the cause why a command was not done; it becomes the link's fault.
 
         Args:
-            output: ur-rtde's output.
+            output: of the command; None if it gave none.
         """
         async with self._lock:
             try:

@@ -82,10 +82,11 @@ class Halt(ArmRequest):
 
 
 class Outcome(ChannelMessage):
-    """Success, or ur-rtde's output after a failure."""
+    """Success, or the output after a failure."""
 
     done: bool
-    output: str = ""
+    output: Message | None = None
+    """Of ur-rtde, or why the process did not call it; None if there is none."""
     joints_rad: Six | None = None
     """Result of `Beside`."""
 

@@ -24,6 +24,7 @@ from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outc
 from station.devices.arm.offset import offset_pose
 from station.errors import StationError
 from station.messages import arm as messages
+from station.messages.message import message_of
 
 VARIABLES = [
     "timestamp",
@@ -62,7 +63,7 @@ class UrRtdeProcess:
         try:
             self._receive = RTDEReceiveInterface(self._host, self._frequency_hz, VARIABLES)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, output=str(error))
+            return Outcome(done=False, output=message_of(error))
         return Outcome(done=True)
 
     async def command(self, request: Command) -> Outcome:
@@ -70,7 +71,7 @@ class UrRtdeProcess:
         try:
             control = RTDEControlInterface(self._host, self._frequency_hz)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, output=str(error))
+            return Outcome(done=False, output=message_of(error))
         self._control = control
         self._set_up = request
         if self._kicking is None:
@@ -204,7 +205,7 @@ class UrRtdeProcess:
         try:
             done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
-            return Outcome(done=False, output=str(error))
+            return Outcome(done=False, output=message_of(error))
         return Outcome(done=bool(done))
 
 
