@@ -24,6 +24,7 @@ from station.records.model import (
     Trigger,
 )
 from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored
 
 
 class Summary(NamedTuple):
@@ -180,10 +181,15 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
     points = connection.execute(
         select(curve_points).where(curve_points.c.sequence == row.sequence).order_by(curve_points.c.step)
     )
+    measures = dict(row.measures)
+    judgement, first_press = (
+        None if (stored := measures.pop(name, None)) is None else from_stored(stored)
+        for name in (JUDGEMENT, FIRST_PRESS)
+    )
     return InspectionRecord(
         outcome=row.judged,
         reasons=tuple(row.reasons),
-        explanation=tuple(row.explanation),
+        explanation=tuple(map(from_stored, row.explanation)),
         late=row.late,
         partial=row.partial,
         area_mm2=row.area_mm2,
@@ -208,7 +214,9 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
             for point in points
         ),
         phases_s=row.phases_s,
-        measures=row.measures,
+        measures=measures,
+        judgement=judgement,
+        first_press_findings=first_press,
         devices=row.devices,
         versions=row.versions,
     )

@@ -24,6 +24,7 @@ from station.records.schema import (
     recipe_snapshots,
 )
 from station.records.search_index import index_hour, index_reasons
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, to_stored
 
 OutboxKind = Literal["inspection", "lot", "audit"]
 PENDING = "pending"
@@ -102,7 +103,7 @@ def conclude(
         .values(
             judged=record.outcome,
             reasons=[str(reason) for reason in record.reasons],
-            explanation=list(record.explanation),
+            explanation=[to_stored(message) for message in record.explanation],
             late=record.late,
             partial=record.partial,
             area_mm2=judged.area_mm2,
@@ -112,7 +113,7 @@ def conclude(
             ended_utc_ms=record.ended_utc_ms,
             duration_ms=record.duration_ms,
             phases_s=dict(record.phases_s),
-            measures=dict(record.measures),
+            measures={**record.measures, **_messages(record)},
             devices=dict(record.devices),
             versions=dict(record.versions),
             images_state=images_state,
@@ -128,6 +129,12 @@ def conclude(
     if row.published_utc_ms is not None:
         queue_event(connection, "inspection", sequence)
     return standing, images_state
+
+
+def _messages(record: InspectionRecord) -> dict[str, Any]:
+    """Return the messages that are stored among the measures."""
+    messages = ((JUDGEMENT, record.judgement), (FIRST_PRESS, record.first_press_findings))
+    return {name: to_stored(message) for name, message in messages if message is not None}
 
 
 def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:

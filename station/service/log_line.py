@@ -3,22 +3,22 @@
 from collections.abc import Sequence
 
 from station.channel.line import Outcome
+from station.messages.message import Message
 from station.records.texts import sparkline
 
 
-def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_mm2: Sequence[float | None]) -> str:
+def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[Message], areas_mm2: Sequence[float | None]) -> str:
     """Describe one fruit in one line: sequence, fruit, curve as a sparkline, outcome, explanation, time.
 
     Args:
         outcome: as published to the PLC.
         fruit: the recipe's name.
-        explanation: in sentences.
         areas_mm2: the curve, step by step.
     """
     area = "no area" if outcome.area_mm2 is None else f"{outcome.area_mm2:.1f} mm²"
     if outcome.closing_mm is not None:
         area = f"{area} at {outcome.closing_mm:.1f} mm"
-    why = "; ".join(explanation) or ", ".join(outcome.reasons)
+    why = "; ".join(map(str, explanation)) or ", ".join(outcome.reasons)
     parts = [
         f"fruit {outcome.sequence}",
         f"trigger {outcome.trigger_id}",

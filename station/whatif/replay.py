@@ -195,7 +195,7 @@ def _fits(onset_mm: float | None, draft: Recipe) -> bool:
 
 
 def _decided(stored: StoredPress, verdict: Verdict, *, faithful: bool) -> Replayed:
-    why = " ".join(finding.sentence for finding in verdict.findings)
+    why = " ".join(str(finding.message) for finding in verdict.findings)
     return Replayed(stored.sequence, stored.lot, stored.before, verdict.outcome, why, faithful)
 
 

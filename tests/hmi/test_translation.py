@@ -84,19 +84,10 @@ COMPOSED = {
         "recipe {}: it was changed since {} was looked at, to {}",
         "; look at it as it is now and",
     ),
-    "sentence.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
-    "sentence.stopped_growth": (
-        "No further step was made at {} mm of closing",
-        ": the area grows by {} mm² a millimetre,",
-    ),
     "sentence.verification_old": (
         " h old, at most {} h are allowed",
         "The last verification is {}: verify with the ball",
     ),
-    "sentence.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
-    "sentence.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
-    "sentence.growth_near": ("closing the area grows by {} ± {} mm² a millimetre, ", "which may be "),
-    "sentence.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
 }
 """What the station puts together of several."""
 NO_PAGES = {
@@ -198,12 +189,6 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
         ("es", "Lot B-7 cannot begin: an inspection is under way. No recipe is active: choose one by its number (1).",
          "El lote B-7 no puede empezar: hay una inspección en curso. No hay receta activa: elija una (1)."),
         ("es", "No recipe is active: choose one by its number (1, 2).", "No hay receta activa: elija una (1, 2)."),
-        ("es", "The area at 3.0 mm of closing is at least 61.2 mm²; the limit is 45 mm²: it is over the limit.",
-         "El área a 3,0 mm de cierre es de al menos 61,2 mm²; el límite es 45 mm²: está por encima del límite."),
-        ("de", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for a strawberry of 48 mm is 117.4 mm².",
-         "Die Fläche bei 3 mm Schließweg ist 131,0 ± 7,2 mm²; die Grenze für strawberry von 48 mm ist 117,4 mm²."),
-        ("es", "The PLC gave a length of 26.0 mm, and the fruit is 35.0 mm wide: that is another fruit's size.",
-         "El PLC indicó una longitud de 26,0 mm, y la fruta mide 35,0 mm de ancho: ese es el tamaño de otra fruta."),
         ("de", "the <arm> is away", '<span lang="en">the &lt;arm&gt; is away</span>'),
         ("de", "", ""),
     ],

@@ -11,6 +11,7 @@ import structlog
 
 from station.channel.line import Reason
 from station.logs import configure_logging, inspecting
+from station.messages.message import verbatim
 from station.service.log_line import fruit_line
 
 
@@ -117,6 +118,6 @@ def test_one_line_a_fruit(outcome):
         "fruit 4711  trigger 12  strawberry  ▁▃·█  PASS  31.5 mm² at 4.0 mm  3.21 s"
     )
     late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "closing_mm": None}
-    assert fruit_line(outcome.model_copy(update=late), "", ("the deadline of 8 s was over",), []) == (
+    assert fruit_line(outcome.model_copy(update=late), "", (verbatim("the deadline of 8 s was over"),), []) == (
         "fruit 4711  trigger 12  no recipe  -  NO_RESULT  no area  3.21 s  late  the deadline of 8 s was over"
     )

@@ -17,6 +17,7 @@ from click.testing import CliRunner
 from sqlalchemy import event
 
 from station.cli import cli
+from station.messages.message import verbatim
 from station.records.database import FILE_NAME, open_engine
 from station.records.errors import (
     DamagedError,
@@ -59,7 +60,7 @@ def test_a_full_disk_refuses_and_takes_again_when_there_is_space(opened, scenari
             fill(filler)
             with pytest.raises(DiskFullError, match="less than the reserve"):
                 await records.begin(trigger)
-            large = replace(passed, explanation=("x" * 8_000_000,))
+            large = replace(passed, explanation=(verbatim("x" * 8_000_000),))
             with pytest.raises(DiskFullError, match="the disk is full"):
                 await records.conclude(sequence, large)
             assert records.status().failures["disk_full"] == 2
