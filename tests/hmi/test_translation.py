@@ -22,6 +22,8 @@ from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
+from station.messages import judge
+from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
 from station.vision.contact import Flag
@@ -195,6 +197,27 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
 )  # fmt: skip
 def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
     assert Locale(language).sentence(english) == said
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for Strawberry of 48.0 mm is 117.4 mm²."),
+        ("de",
+         "Die Fläche bei 3 mm Schließweg ist 131,0 ± 7,2 mm²; die Grenze für Strawberry von 48,0 mm ist 117,4 mm²."),
+        ("es", "El área a 3 mm de cierre es de 131,0 ± 7,2 mm²; el límite para Strawberry de 48,0 mm es 117,4 mm²."),
+    ],
+)  # fmt: skip
+def test_what_the_judge_found_is_said_in_the_language_of_the_page(language, said):
+    limit = judge.LIMIT_OF_LENGTH(fruit="Strawberry", length_mm=48.0, limit_mm2=117.4)
+    found = judge.AREA_AND_LIMIT(closing_mm=3.0, area_mm2=131.0, uncertainty_mm2=7.2, limit=limit)
+    assert Locale(language).sentence(found) == said
+
+
+def test_words_that_are_not_the_stations_are_marked_as_english_on_other_pages():
+    said = verbatim("The <area> of a record of before.")
+    assert Locale("en").sentence(said) == "The <area> of a record of before."
+    assert Locale("de").sentence(said) == '<span lang="en">The &lt;area&gt; of a record of before.</span>'
 
 
 @pytest.mark.parametrize(

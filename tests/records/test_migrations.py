@@ -13,10 +13,14 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from station.inspection.fruit_size import FruitSize
+from station.messages.judge import AREA_UNKNOWN, CLOSING, CONTACT_LOST, NO_ONSET
+from station.messages.message import Message, joined, verbatim
+from station.outbox.feed import read_batch
 from station.records import database
 from station.records.database import FILE_NAME, MIGRATIONS, migrate, open_engine
 from station.records.errors import SchemaError
 from station.records.schema import metadata
+from station.records.stored_message import from_stored
 
 NEXT = """
 from alembic import op
@@ -153,6 +157,59 @@ def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, f
         rows = list(csv.DictReader(file))
     assert list(rows[0])[-2:] == ["fruit_length_mm", "size_class"], "columns are added at the end"
     assert [(row["fruit_length_mm"], row["size_class"]) for row in rows] == [("", ""), ("48.3", "3")]
+
+
+def test_records_from_before_messages_read_with_their_sentences(opened, scenario, folder, trigger, failed, ask):
+    area = (
+        "The area at 4 mm of closing is at least 170.0 mm²; the limit for a strawberry of 40 mm is 165 mm²: it is over."
+    )
+    judgement, first = "The area at 4 mm of closing is 170.0 ± 7.2 mm².", "At 4.0 mm of closing the contact was lost."
+    now = replace(
+        failed,
+        judgement=AREA_UNKNOWN(closing_mm=4.0),
+        first_press_findings=joined([CONTACT_LOST(closings=[CLOSING(closing_mm=3.0)]), NO_ONSET()]),
+    )
+
+    async def steps():
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), failed))
+        connection = sqlite3.connect(folder / FILE_NAME)
+        connection.execute(
+            "UPDATE inspections SET explanation = ?, measures = json_set(measures, '$.judgement', ?, "
+            "'$.first_press_findings', ?)",
+            (json.dumps([area]), judgement, first),
+        )
+        connection.execute("UPDATE alembic_version SET version_num = '0007'")
+        connection.commit()
+        connection.close()
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), now))
+            return [(await records.inspection(sequence)).judged for sequence in (1, 2)]
+
+    old, new = scenario(steps)
+    assert (old.explanation, old.judgement) == ((verbatim(area),), verbatim(judgement))
+    assert (old.first_press_findings, old.measures) == (verbatim(first), failed.measures)
+    assert (new.explanation, new.judgement, new.first_press_findings, new.measures) == (
+        now.explanation, now.judgement, now.first_press_findings, now.measures
+    )  # fmt: skip
+    for sequence, each in ((1, old), (2, new)):
+        said = ask("show", sequence).output
+        for message in (*each.explanation, each.judgement, each.first_press_findings):
+            assert str(message) in said
+        assert "judge." not in said
+    events = {event.data["sequence"]: event.data for event in read_batch(folder, "one", 0).events}
+    assert events[1]["explanation"] == [area]
+    assert events[1]["messages"] == [{"id": "text.verbatim", "parameters": {"text": area}}]
+    assert events[1]["measures"]["judgement"] == judgement
+    assert events[2]["explanation"] == [str(message) for message in now.explanation]
+    assert [Message.model_validate_json(json.dumps(each)) for each in events[2]["messages"]] == list(now.explanation)
+    assert events[2]["measures"]["first_press_findings"] == str(now.first_press_findings)
+
+
+def test_what_is_stored_and_is_no_message_is_shown_as_it_is():
+    assert from_stored({"id": "judge.late", "parameters": {"late": True}}) == verbatim(
+        '{"id": "judge.late", "parameters": {"late": true}}'
+    )
 
 
 def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form, head):
