@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, Row, func, select
 
+from station.messages import records as messages
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.schema import (
@@ -117,7 +118,7 @@ def json_text(data: dict[str, Any]) -> str:
 def _lineage(connection: Connection) -> tuple[Origin, ...]:
     rows = connection.execute(select(origins).order_by(origins.c.first_entry.desc())).all()
     if not rows:
-        raise RecordsError("the outbox's origin is missing from the database", "put back a backup")
+        raise RecordsError(messages.ORIGIN_MISSING(), messages.PUT_BACK_BACKUP())
     ends = [None, *(row.first_entry - 1 for row in rows)]
     return tuple(Origin(row.id, end) for row, end in zip(rows, ends, strict=False))
 

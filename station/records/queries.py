@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, func, select, true
 
 from station.channel.line import Outcome
+from station.messages import records as messages
 from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
@@ -89,10 +90,8 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
         first, last = connection.execute(
             select(func.min(inspections.c.sequence), func.max(inspections.c.sequence))
         ).one()
-        there = f"the records hold {first} to {last}" if last else "the records are empty"
-        raise UnknownInspectionError(
-            f"there is no inspection {sequence}", f"{there}; `station records list` shows them"
-        )
+        there = messages.LIST_SHOWS_RANGE(first=first, last=last) if last else messages.RECORDS_EMPTY()
+        raise UnknownInspectionError(messages.NO_INSPECTION(number=sequence), there)
     kept = connection.execute(select(images).where(images.c.sequence == sequence).order_by(images.c.id))
     standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
     return FullRecord(

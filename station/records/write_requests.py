@@ -10,6 +10,7 @@ from sqlalchemy import Connection, delete, insert, select, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
+from station.messages import records as messages
 from station.records.errors import BadRecordError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
@@ -147,7 +148,7 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
         return False
     if found is None:
         if outcome.sequence > given_up_to:
-            raise UnknownInspectionError(f"inspection {outcome.sequence} was never begun", "ask what is open")
+            raise UnknownInspectionError(messages.NEVER_BEGUN(number=outcome.sequence), messages.ASK_OPEN())
         _insert_published(connection, outcome, boot)
     connection.execute(
         update(inspections)
@@ -242,7 +243,7 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
 def _row(connection: Connection, sequence: int) -> Any:
     row = connection.execute(select(inspections).where(inspections.c.sequence == sequence)).one_or_none()
     if row is None:
-        raise UnknownInspectionError(f"inspection {sequence} is not in this database", "begin it first")
+        raise UnknownInspectionError(messages.NO_INSPECTION(number=sequence), messages.BEGIN_FIRST())
     return row
 
 
@@ -266,7 +267,12 @@ def _lost(begun: Mapping[str, Any]) -> Outcome:
 def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
     """Return the outcome for the PLC of a record."""
     if bool(record.reasons) == (record.outcome == "PASS"):
-        raise BadRecordError(f"inspection {begun['sequence']}: {record.outcome} with {record.reasons}", "see the log")
+        raise BadRecordError(
+            messages.WRONG_REASONS(
+                number=begun["sequence"], outcome=record.outcome, reasons=", ".join(record.reasons) or "-"
+            ),
+            messages.SEE_LOG(),
+        )
     return _outcome(
         begun,
         outcome=record.outcome,
@@ -298,7 +304,9 @@ def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
     try:
         return Outcome(**{name: begun[name] for name in columns}, **ended)
     except ValidationError as error:
-        raise BadRecordError(f"inspection {begun['sequence']} is malformed: {error}", "see the log") from error
+        raise BadRecordError(
+            messages.BAD_INSPECTION(number=begun["sequence"], words=str(error)), messages.SEE_LOG()
+        ) from error
 
 
 def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> None:

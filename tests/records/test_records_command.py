@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from station.channel.line import Reason
+from station.messages import records as messages
 from station.messages.message import definition
 from station.messages.reasons import reason_message
 from station.records.texts import sparkline
@@ -78,14 +79,14 @@ def test_the_last_ones_are_listed_newest_first(history, ask):
 def test_what_is_not_there_is_said_in_words(ask, history, folder):
     missing = ask("show", 99)
     assert missing.exit_code == 1
-    assert "the records hold 1 to 4" in str(missing.exception)
+    assert missing.exception.remedy == messages.LIST_SHOWS_RANGE(first=1, last=4)
     assert ask("show", 0).exit_code == 2
     lower = ask("continue-after", 2)
-    assert "4 was given already" in str(lower.exception)
+    assert lower.exception.cause == messages.NUMBER_GIVEN(number=4)
 
 
 def test_no_records_at_all(ask, folder):
-    assert "there is no" in str(ask("list").exception)
+    assert ask("list").exception.cause.id == messages.NO_RECORDS.id
     assert not folder.exists()
 
 

@@ -10,6 +10,7 @@ from station.devices.gripper.errors import GripperFaultError
 from station.errors import StationError
 from station.inspection.cycle import Action, Event
 from station.inspection.states import State
+from station.messages.message import verbatim
 from station.records.errors import DiskFullError
 from station.service.conductor import Conductor, event_of
 from station.service.grip import FramesError
@@ -25,7 +26,7 @@ from station.service.grip import FramesError
         (GripperFaultError(0xC), Event.GRIPPER_FAULT),
         (NoFrameError("x"), Event.CAMERA_FAULT),
         (FramesError("x", ()), Event.CAMERA_FAULT),
-        (DiskFullError("x", "y"), Event.RECORDS_FAULT),
+        (DiskFullError(verbatim("x"), verbatim("y")), Event.RECORDS_FAULT),
         (StationError("x"), Event.INTERNAL_FAULT),
         (ValueError("x"), Event.INTERNAL_FAULT),
     ],
