@@ -1,5 +1,5 @@
 """Everything the station can say; one module for each room that says it. Importing the package defines all of it."""
 
-from station.messages import channel, judge, message, reasons, records
+from station.messages import channel, judge, message, reasons, records, whatif
 
-__all__ = ["channel", "judge", "message", "reasons", "records"]
+__all__ = ["channel", "judge", "message", "reasons", "records", "whatif"]
