@@ -8,7 +8,7 @@ REFERENCE_BAD = define(
 )
 IMAGE_STALE = define("judge.image_stale", "No image as new as the step came in time.")
 LATE = define("judge.late", "The inspection did not end within its deadline.")
-CALLED_OFF = define("judge.called_off", "The inspection was called off.")
+CALLED_OFF = define("judge.called_off", "The inspection was aborted.")
 ARM_FAULT = define("judge.arm_fault", "The arm failed or was stopped during the inspection.")
 GRIPPER_FAULT = define("judge.gripper_fault", "The gripper failed during the inspection.")
 CAMERA_FAULT = define("judge.camera_fault", "The camera failed during the inspection.")

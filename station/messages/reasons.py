@@ -22,24 +22,22 @@ SATURATED = define("reason.saturated", "The image was saturated.")
 LOW_CONFIDENCE = define("reason.low_confidence", "The contact was found with too little confidence.")
 REFERENCE_BAD = define("reason.reference_bad", "No good reference image could be taken.")
 IMAGE_STALE = define("reason.image_stale", "The camera gave no image that was new enough.")
-OUT_OF_RANGE = define("reason.out_of_range", "The fruit's width is not one of the recipe's.")
+OUT_OF_RANGE = define("reason.out_of_range", "The fruit's width is outside the recipe's range.")
 LATE = define("reason.late", "The inspection was not done by its deadline.")
-CALLED_OFF = define("reason.called_off", "The inspection was called off.")
+CALLED_OFF = define("reason.called_off", "The inspection was aborted.")
 ARM_FAULT = define("reason.arm_fault", "The arm had a fault.")
 GRIPPER_FAULT = define("reason.gripper_fault", "The gripper had a fault.")
 CAMERA_FAULT = define("reason.camera_fault", "The camera had a fault.")
 RECORDS_FAULT = define("reason.records_fault", "The records could not be written.")
 STATION_LOST = define(
-    "reason.station_lost", "The station was lost or restarted before the outcome was surely the PLC's."
+    "reason.station_lost", "The station failed or restarted before the PLC had certainly received the outcome."
 )
-INTERNAL_FAULT = define("reason.internal_fault", "The program had a fault of its own; its log says where.")
+INTERNAL_FAULT = define("reason.internal_fault", "The program had an internal fault; its log says where.")
 NEAR_LIMIT = define(
     "reason.near_limit",
-    "The contact area or its growth is nearer to a limit than the measurement is certain.",
+    "The contact area or its growth is too near a limit for the uncertainty of the measurement.",
 )
-SIZE_UNKNOWN = define(
-    "reason.size_unknown", "The recipe needs the fruit's size, and the PLC gave none that can be true."
-)
+SIZE_UNKNOWN = define("reason.size_unknown", "The recipe needs the fruit's size, and the PLC gave no valid one.")
 
 
 def reason_message(code: str) -> Message:
