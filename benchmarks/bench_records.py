@@ -23,6 +23,7 @@ from typing import TypeVar
 
 from archive.many import FIRST_UTC_MS, PERIOD_MS, fill, grower_of, made
 
+from station.messages.judge import STOPPED_KEPT
 from station.records.database import FILE_NAME, reading
 from station.records.export import export
 from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
@@ -44,7 +45,7 @@ CURVE = tuple(CurvePoint(step, 30.0 - step, float(step), 9.0 * step, 12_000 * st
 RECORD = InspectionRecord(
     outcome="PASS",
     reasons=(),
-    explanation=("every area was below its limit",),
+    explanation=(STOPPED_KEPT(closing_mm=3.0),),
     late=False,
     partial=False,
     area_mm2=31.5,

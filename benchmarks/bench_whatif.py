@@ -62,7 +62,7 @@ def record_of(press: Press, recipe: Recipe) -> InspectionRecord:
     return InspectionRecord(
         outcome=verdict.outcome,
         reasons=() if verdict.outcome == "PASS" else tuple(map(str, verdict.reasons)),
-        explanation=tuple(finding.sentence for finding in verdict.findings),
+        explanation=tuple(finding.message for finding in verdict.findings),
         late=False,
         partial=verdict.partial,
         area_mm2=last.area_mm2,

@@ -144,7 +144,8 @@ class InspectionDetails(Model):
         description="The published outcome, or the one to be published; null while it runs."
     )
     reasons: list[str]
-    explanation: list[str]
+    explanation: list[str] = Field(description="In English.")
+    messages: list[ApiMessage] = Field(description="The explanation as data.")
     late: bool | None
     partial: bool | None
     area_mm2: float | None = Field(description="The contact area that decided.")
@@ -176,8 +177,9 @@ class InspectionDetails(Model):
             lot=reply.lot,
             simulated=reply.simulated,
             outcome=None if standing is None else standing.outcome,
-            reasons=[name for name, _ in reply.reasons],
-            explanation=list(reply.explanation),
+            reasons=list(reply.reasons),
+            explanation=[str(message) for message in reply.explanation],
+            messages=[ApiMessage.of(message) for message in reply.explanation],
             late=None if standing is None else standing.late,
             partial=None if standing is None else standing.partial,
             area_mm2=None if standing is None else standing.area_mm2,

@@ -205,7 +205,7 @@ class Line:
         database_bytes = 20_000 * self._writes // 4
         images = {"kept": self._images, "dropped": 0, "failed": 0, "removed": max(0, self._images - 1000)}
         free = 180_000_000_000 - image_bytes - database_bytes
-        return Status(self._writes, {}, 0, 0, images, database_bytes, image_bytes, free, 1.0, "")
+        return Status(self._writes, {}, 0, 0, images, database_bytes, image_bytes, free, 1.0, None)
 
     def _outbox(self) -> OutboxStatus:
         """The network is away for half an hour on the second day."""

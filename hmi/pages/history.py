@@ -34,6 +34,7 @@ from station.channel.panel_queries import (
     StartLotReport,
 )
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.messages.reasons import reason_message
 from station.vocabulary import Reason
 
 router = APIRouter(prefix="/history")
@@ -165,6 +166,7 @@ async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
         request,
         "inspection.html.j2",
         reply=reply,
+        reasons=[(code, reason_message(code)) for code in reply.reasons],
         drawn=_drawn(reply),
         steps=_steps(reply),
         reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),

@@ -225,8 +225,7 @@ class Fruit(ChannelMessage):
     """One fruit in full."""
 
     short: FruitSummary
-    explanation: tuple[str, ...]
-    """Sentences, English."""
+    explanation: tuple[Message, ...]
     recipe_title: str
     revision: str
     onset_mm: float | None

@@ -116,9 +116,13 @@ class InspectionView(ChannelMessage):
     standing: Outcome | None
     """The published outcome, or the one to be published; None while it runs."""
     judged: OutcomeName | None
-    reasons: tuple[tuple[str, str], ...]
-    """Of the final outcome: name and sentence."""
-    explanation: tuple[str, ...]
+    reasons: tuple[str, ...]
+    """Of the final outcome."""
+    explanation: tuple[Message, ...]
+    judgement: Message | None = None
+    """The area with its uncertainty and its limit; None if it was not measured."""
+    first_press_findings: Message | None = None
+    """Why the first press did not decide; None if the fruit was pressed once."""
     curve: tuple[CurvePointView, ...]
     recipe_name: str
     recipe_revision: str

@@ -1,11 +1,11 @@
-"""The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with every reason in a sentence.
+"""The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with a message for every reason.
 
 PASS is said only of a fruit all of whose limits were measured, by trusted points, to be kept with the uncertainty on
 top. FAIL needs a trusted proof. All else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as
 they are: docs/decisions/0015 and 0057.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,6 +13,9 @@ from station.inspection.evidence import Evidence, Growth
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.sized_limits import SizedLimits, sized_limits
 from station.inspection.uncertainty import Budget
+from station.messages import judge as messages
+from station.messages.message import Definition, Message, joined
+from station.messages.reasons import reason_message
 from station.settings.damage import AreaThreshold
 from station.settings.recipe_model import Recipe
 from station.vocabulary import OutcomeName, Reason
@@ -23,7 +26,7 @@ class Finding:
     """One reason against PASS."""
 
     reason: Reason
-    sentence: str
+    message: Message
     """For the quality manager: the value, its limit and the closing."""
     value: float | None = None
     limit: float | None = None
@@ -36,7 +39,7 @@ class Finding:
 class Stop:
     """Why no further step is made."""
 
-    sentence: str
+    message: Message
     finding: Finding | None = None
     """The limit that ended the steps, with reason `EARLY_STOP`; None where they ended as the outcome was decided."""
 
@@ -75,8 +78,8 @@ class Verdict:
     """By which the limits for this fruit differ from the recipe's."""
     budget: Budget
     """Of the area at the last damage threshold's closing."""
-    summary: str
-    """That area with its uncertainty, and the limit for the fruit: a sentence; empty where one of them is not known."""
+    summary: Message | None
+    """That area with its uncertainty, and the limit for the fruit; None where one of them is not known."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
@@ -86,30 +89,27 @@ class Verdict:
 
 
 _INTERRUPTED = {
-    Reason.REFERENCE_BAD: "The reference images were not usable, so nothing could be compared with them.",
-    Reason.IMAGE_STALE: "No image as new as the step came in time.",
-    Reason.LATE: "The inspection did not end within its deadline.",
-    Reason.CALLED_OFF: "The inspection was called off.",
-    Reason.ARM_FAULT: "The arm failed or was stopped during the inspection.",
-    Reason.GRIPPER_FAULT: "The gripper failed during the inspection.",
-    Reason.CAMERA_FAULT: "The camera failed during the inspection.",
-    Reason.RECORDS_FAULT: "The records could not be written.",
-    Reason.STATION_LOST: "The station was restarted during the inspection.",
-    Reason.INTERNAL_FAULT: "The station's own software failed; its log says where.",
-    Reason.NO_CONTACT: "Nothing was touched: no fruit in the nest, or one narrower than the recipe expects.",
+    Reason.REFERENCE_BAD: messages.REFERENCE_BAD,
+    Reason.IMAGE_STALE: messages.IMAGE_STALE,
+    Reason.LATE: messages.LATE,
+    Reason.CALLED_OFF: messages.CALLED_OFF,
+    Reason.ARM_FAULT: messages.ARM_FAULT,
+    Reason.GRIPPER_FAULT: messages.GRIPPER_FAULT,
+    Reason.CAMERA_FAULT: messages.CAMERA_FAULT,
+    Reason.RECORDS_FAULT: messages.RECORDS_FAULT,
+    Reason.STATION_LOST: messages.STATION_LOST,
+    Reason.INTERNAL_FAULT: messages.INTERNAL_FAULT,
+    Reason.NO_CONTACT: messages.NOTHING_TOUCHED,
 }
 _DOUBTS = {
-    Flag.NO_CONTACT: (Reason.CONTACT_LOST, "the contact was lost"),
-    Flag.UNDECIDED: (Reason.LOW_CONFIDENCE, "something bent the gel, but no edge of a contact was found"),
-    Flag.CUT_BY_BORDER: (
-        Reason.CUT_BY_BORDER,
-        "the image's border cuts the contact, so its area is only a lower bound",
-    ),
-    Flag.LOWER_BOUND: (Reason.LOW_CONFIDENCE, "the edge was lost, so the contact is at least as large as its area"),
-    Flag.SATURATED: (Reason.SATURATED, "much of the contact is at the end of the grey scale"),
-    Flag.LOW_CONFIDENCE: (Reason.LOW_CONFIDENCE, "the image supports the area too little"),
-    Flag.REFERENCE_MISMATCH: (Reason.REFERENCE_BAD, "the image does not fit its reference"),
+    Flag.NO_CONTACT: (Reason.CONTACT_LOST, messages.CONTACT_LOST),
+    Flag.UNDECIDED: (Reason.LOW_CONFIDENCE, messages.NO_EDGE),
+    Flag.CUT_BY_BORDER: (Reason.CUT_BY_BORDER, messages.CUT_BY_BORDER),
+    Flag.LOWER_BOUND: (Reason.LOW_CONFIDENCE, messages.EDGE_LOST),
+    Flag.SATURATED: (Reason.SATURATED, messages.SATURATED),
+    Flag.REFERENCE_MISMATCH: (Reason.REFERENCE_BAD, messages.REFERENCE_MISMATCH),
 }
+"""By a flag of a needed step. A confidence that is too small has a message of its own, with its value."""
 _LATE_START = 0.25
 """Share of the first damage threshold's closing by which the curve may seem to begin after the onset."""
 
@@ -182,7 +182,7 @@ class _Case:
         """Limits that are or may be passed, and what keeps the measurement from being trusted."""
         if self.nothing:
             return []
-        damage = [] if self.limits.problem else _damage(self.evidence, self.limits)
+        damage = [] if self.limits.problem is not None else _damage(self.evidence, self.limits)
         return [*damage, *_distrust(self.evidence, self.limits.recipe)]
 
     @cached_property
@@ -191,51 +191,46 @@ class _Case:
         if not self.evidence.points:
             return None
         if self.limits.recipe.steps.stop_when_decided and (why := self._decided()):
-            reached_mm = self.evidence.points[-1].closing_mm
-            return Stop(f"No further step was made at {reached_mm:.1f} mm of closing: {why}.")
+            return Stop(why(closing_mm=self.evidence.points[-1].closing_mm))
         finding = _over_early_stop(self.evidence, self.limits.recipe)
-        return None if finding is None else Stop(finding.sentence, finding)
+        return None if finding is None else Stop(finding.message, finding)
 
-    def _decided(self) -> str:
-        """Why no further step can change the outcome; empty where one can."""
+    def _decided(self) -> Definition | None:
+        """Why no further step can change the outcome; None where one can."""
         if self.void:
-            return "this cannot become a result any more"
+            return messages.STOPPED_VOID
         if any(finding.proves for finding in self.findings):
-            return "the fruit is damaged"
+            return messages.STOPPED_DAMAGED
         if self.evidence.points[-1].closing_mm < self.limits.recipe.damage.area[-1].closing_mm:
-            return ""
+            return None
         if not self.findings:
-            return "every limit is kept"
+            return messages.STOPPED_KEPT
         # Only an onset that excused steps hide may show itself, and with one step more.
         lasting = any(finding.reason is not Reason.AREA_NOT_RISING for finding in self.findings)
         beyond = len(self.evidence.judged) - len(self.evidence.needed)
-        return "" if self.evidence.excused and not lasting and not beyond else "the fruit cannot pass any more"
+        return None if self.evidence.excused and not lasting and not beyond else messages.STOPPED_CANNOT_PASS
 
 
 def _over_early_stop(evidence: Evidence, recipe: Recipe) -> Finding | None:
     """The recipe's limit that ends the steps, passed also by what is not trusted."""
     points, limits = evidence.points, recipe.early_stop
     last, growth = points[-1], evidence.latest_growth
-    place = f"No further step was made at {last.closing_mm:.1f} mm of closing"
+    at_mm = last.closing_mm
     over = max(points, key=lambda point: point.area_mm2)
     if over.area_mm2 > limits.area_mm2:
-        told = figure(limits.area_mm2)
-        sentence = f"{place}: the area, {over.area_mm2:.1f} mm², is over the early stop's {told} mm²."
-        return Finding(Reason.EARLY_STOP, sentence, over.area_mm2, limits.area_mm2, over.closing_mm)
+        why = messages.STOPPED_AREA(closing_mm=at_mm, area_mm2=over.area_mm2, limit_mm2=limits.area_mm2)
+        return Finding(Reason.EARLY_STOP, why, over.area_mm2, limits.area_mm2, over.closing_mm)
     if growth is not None and growth.mm2_per_mm > limits.growth_mm2_per_mm:
-        sentence = (
-            f"{place}: the area grows by {growth.mm2_per_mm:.1f} mm² a millimetre, over the early stop's "
-            f"{figure(limits.growth_mm2_per_mm)}."
-        )
-        return Finding(Reason.EARLY_STOP, sentence, growth.mm2_per_mm, limits.growth_mm2_per_mm, growth.to_closing_mm)
+        why = messages.STOPPED_GROWTH(closing_mm=at_mm, growth=growth.mm2_per_mm, limit=limits.growth_mm2_per_mm)
+        return Finding(Reason.EARLY_STOP, why, growth.mm2_per_mm, limits.growth_mm2_per_mm, growth.to_closing_mm)
     limit_mm = recipe.steps.closing_limit_mm
-    if last.closing_mm >= limit_mm:
-        sentence = f"{place}: that is the recipe's closing limit of {limit_mm:g} mm."
-        return Finding(Reason.EARLY_STOP, sentence, last.closing_mm, limit_mm, last.closing_mm)
-    return _hopeless(evidence, recipe, place)
+    if at_mm >= limit_mm:
+        why = messages.STOPPED_CLOSING(closing_mm=at_mm, limit_mm=limit_mm)
+        return Finding(Reason.EARLY_STOP, why, at_mm, limit_mm, at_mm)
+    return _hopeless(evidence, recipe)
 
 
-def _hopeless(evidence: Evidence, recipe: Recipe, place: str) -> Finding | None:
+def _hopeless(evidence: Evidence, recipe: Recipe) -> Finding | None:
     """Past the last damage threshold, whether a PASS is out of reach: then more closing can only hurt the fruit.
 
     Without this a contact of which only a seed was seen would be pressed up to the gripper's force.
@@ -248,28 +243,31 @@ def _hopeless(evidence: Evidence, recipe: Recipe, place: str) -> Finding | None:
         evidence.bounds(point) or point in evidence.excused for point in evidence.needed
     ):
         return None
-    sentence = f"{place}: what was measured by then cannot be trusted, so the fruit cannot pass any more."
-    return Finding(Reason.EARLY_STOP, sentence, area[0], threshold.least_area_mm2, threshold.closing_mm)
+    why = messages.STOPPED_UNTRUSTED(closing_mm=last.closing_mm)
+    return Finding(Reason.EARLY_STOP, why, area[0], threshold.least_area_mm2, threshold.closing_mm)
 
 
 def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
     """What makes the measurement no measurement of this recipe's fruit: nothing in it is a proof."""
     recipe = limits.recipe
     for reason in dict.fromkeys(press.interruptions):
-        yield Finding(reason, _INTERRUPTED.get(reason, f"The inspection was interrupted: {reason}."))
+        known = _INTERRUPTED.get(reason)
+        yield Finding(reason, known() if known else messages.INTERRUPTED(why=reason_message(reason)))
     if press.onset_mm is None:
         if Reason.NO_CONTACT not in press.interruptions:
-            yield Finding(Reason.NO_CONTACT, _INTERRUPTED[Reason.NO_CONTACT])
+            yield Finding(Reason.NO_CONTACT, messages.NOTHING_TOUCHED())
         return
     expected = recipe.expected_width
     if not expected.smallest_mm <= press.onset_mm <= expected.largest_mm:
         beyond = expected.smallest_mm if press.onset_mm < expected.smallest_mm else expected.largest_mm
-        sentence = (
-            f"The fruit is {press.onset_mm:.1f} mm wide; {recipe.title} is meant for {expected.smallest_mm:g} to "
-            f"{expected.largest_mm:g} mm."
+        why = messages.WRONG_WIDTH(
+            width_mm=press.onset_mm,
+            recipe=recipe.title,
+            smallest_mm=expected.smallest_mm,
+            largest_mm=expected.largest_mm,
         )
-        yield Finding(Reason.OUT_OF_RANGE, sentence, press.onset_mm, beyond, 0.0)
-    if limits.problem:
+        yield Finding(Reason.OUT_OF_RANGE, why, press.onset_mm, beyond, 0.0)
+    if limits.problem is not None:
         yield Finding(Reason.SIZE_UNKNOWN, limits.problem)
 
 
@@ -283,81 +281,78 @@ def _damage(evidence: Evidence, limits: SizedLimits) -> Iterator[Finding]:
     if not proofs and not doubts:
         return
     worst = max(proofs or doubts, key=lambda growth: growth.mm2_per_mm)
-    sentence = (
-        f"From {worst.from_closing_mm:.1f} to {worst.to_closing_mm:.1f} mm of closing the area grows by "
-        f"{worst.mm2_per_mm:.1f} ± {worst.uncertainty_mm2_per_mm:.1f} mm² a millimetre, "
-        f"{'' if proofs else 'which may be '}over the limit of {figure(limit)}."
+    reason, said = (
+        (Reason.GROWTH_OVER_LIMIT, messages.GROWTH_OVER) if proofs else (Reason.NEAR_LIMIT, messages.GROWTH_NEAR)
     )
-    reason = Reason.GROWTH_OVER_LIMIT if proofs else Reason.NEAR_LIMIT
-    yield Finding(reason, sentence, worst.mm2_per_mm, limit, worst.to_closing_mm, proves=bool(proofs))
+    why = said(
+        from_mm=worst.from_closing_mm,
+        to_mm=worst.to_closing_mm,
+        growth=worst.mm2_per_mm,
+        uncertainty=worst.uncertainty_mm2_per_mm,
+        limit=limit,
+    )
+    yield Finding(reason, why, worst.mm2_per_mm, limit, worst.to_closing_mm, proves=bool(proofs))
 
 
 def _area(evidence: Evidence, threshold: AreaThreshold, limits: SizedLimits) -> Iterator[Finding]:
     """One area threshold."""
     closing_mm, limit = threshold.closing_mm, threshold.area_mm2
     least, area = evidence.least_area_mm2(closing_mm), evidence.area_at(closing_mm)
-    at = f"at {closing_mm:g} mm of closing"
     if least is not None and least > limit:
-        sentence = f"The area {at} is at least {least:.1f} mm²; {limit_in_words(limit, limits)}: it is over the limit."
-        yield Finding(Reason.AREA_OVER_LIMIT, sentence, least, limit, closing_mm, proves=True)
+        why = messages.AREA_OVER(closing_mm=closing_mm, area_mm2=least, limit=limit_message(limit, limits))
+        yield Finding(Reason.AREA_OVER_LIMIT, why, least, limit, closing_mm, proves=True)
     elif area is not None and sum(area) > limit:
-        told = f"{area[0]:.1f} ± {area[1]:.1f} mm²; {limit_in_words(limit, limits)}"
-        sentence = f"The area {at} is {told}: it is not surely within the limit."
-        yield Finding(Reason.NEAR_LIMIT, sentence, area[0], limit, closing_mm)
-    elif area is not None and area[0] - area[1] < threshold.least_area_mm2:
-        sentence = (
-            f"The area {at} is {area[0]:.1f} ± {area[1]:.1f} mm², which may be less than any fruit's, "
-            f"{figure(threshold.least_area_mm2)} mm²: not all of the contact was seen."
+        why = messages.AREA_NEAR(
+            closing_mm=closing_mm, area_mm2=area[0], uncertainty_mm2=area[1], limit=limit_message(limit, limits)
         )
-        yield Finding(Reason.LOW_CONFIDENCE, sentence, area[0], threshold.least_area_mm2, closing_mm)
+        yield Finding(Reason.NEAR_LIMIT, why, area[0], limit, closing_mm)
+    elif area is not None and area[0] - area[1] < threshold.least_area_mm2:
+        why = messages.AREA_SMALL(
+            closing_mm=closing_mm, area_mm2=area[0], uncertainty_mm2=area[1], least_mm2=threshold.least_area_mm2
+        )
+        yield Finding(Reason.LOW_CONFIDENCE, why, area[0], threshold.least_area_mm2, closing_mm)
 
 
-def limit_in_words(limit_mm2: float, limits: SizedLimits) -> str:
+def limit_message(limit_mm2: float, limits: SizedLimits) -> Message:
     """An area limit with the fruit that it is for, as part of a sentence.
 
     Args:
         limit_mm2: the limit for the fruit.
         limits: what it was made from.
     """
-    told = f"{figure(limit_mm2)} mm²"
     if limits.without_size:
-        return f"the limit for a fruit of unknown size is {told}"
+        return messages.LIMIT_WITHOUT_SIZE(limit_mm2=limit_mm2)
     if limits.length_mm is None:
-        return f"the limit is {told}"
-    fruit = limits.recipe.title.lower()
-    if fruit[0] in "aeiou":
-        return f"the limit for an {fruit} of {figure(limits.length_mm)} mm is {told}"
-    return f"the limit for a {fruit} of {figure(limits.length_mm)} mm is {told}"
-
-
-def figure(value: float) -> str:
-    """A limit as a sentence has it: to a tenth, without a needless `.0`.
-
-    Args:
-        value: in its unit.
-    """
-    return f"{round(value, 1):g}"
+        return messages.LIMIT(limit_mm2=limit_mm2)
+    return messages.LIMIT_OF_LENGTH(fruit=limits.recipe.title, length_mm=limits.length_mm, limit_mm2=limit_mm2)
 
 
 def _distrust(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
     """What a PASS would need and does not have."""
-    for flag, (reason, what) in _DOUBTS.items():
-        asked = [point for point in evidence.needed if point not in evidence.excused]
-        doubtful = [point for point in asked if flag in evidence.doubts(point)]
-        if doubtful:
-            worst = min(doubtful, key=lambda point: point.confidence or 0.0)
-            places = ", ".join(f"{point.closing_mm:.1f}" for point in doubtful)
-            value, limit, told = None, None, ""
-            if flag == Flag.LOW_CONFIDENCE:
-                value, limit = worst.confidence, recipe.segmentation.robust.least_confidence
-                told = "unknown" if value is None else f"{value:.2f}"
-                told = f" (confidence {told}, {limit:g} is asked for)"
-            yield Finding(reason, f"At {places} mm of closing {what}{told}.", value, limit, worst.closing_mm)
+    needed = [point for point in evidence.needed if point not in evidence.excused]
+    for flag, (reason, said) in _DOUBTS.items():
+        if doubtful := [point for point in needed if flag in evidence.doubts(point)]:
+            yield Finding(reason, said(closings=_closings(doubtful)), closing_mm=_least_sure(doubtful).closing_mm)
+    if doubtful := [point for point in needed if Flag.LOW_CONFIDENCE in evidence.doubts(point)]:
+        worst, least = _least_sure(doubtful), recipe.segmentation.robust.least_confidence
+        if worst.confidence is None:
+            why = messages.NO_CONFIDENCE(closings=_closings(doubtful), least=least)
+        else:
+            why = messages.LOW_CONFIDENCE(closings=_closings(doubtful), confidence=worst.confidence, least=least)
+        yield Finding(Reason.LOW_CONFIDENCE, why, worst.confidence, least, worst.closing_mm)
     if falling := [point for point in evidence.falling if point in evidence.needed]:
-        places = ", ".join(f"{point.closing_mm:.1f} mm ({point.area_mm2:.1f} mm²)" for point in falling)
-        sentence = f"The area does not rise with the closing: {places} does not fit the other steps."
-        yield Finding(Reason.AREA_NOT_RISING, sentence, falling[0].area_mm2, None, falling[0].closing_mm)
+        points = [messages.POINT(closing_mm=point.closing_mm, area_mm2=point.area_mm2) for point in falling]
+        why = messages.NOT_RISING(points=points, number=len(points))
+        yield Finding(Reason.AREA_NOT_RISING, why, falling[0].area_mm2, None, falling[0].closing_mm)
     yield from _onset(evidence, recipe)
+
+
+def _closings(points: Sequence[Measured]) -> list[Message]:
+    return [messages.CLOSING(closing_mm=point.closing_mm) for point in points]
+
+
+def _least_sure(points: Sequence[Measured]) -> Measured:
+    return min(points, key=lambda point: point.confidence or 0.0)
 
 
 def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
@@ -365,9 +360,11 @@ def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
     begins_mm = evidence.begins_at_mm
     allowed_mm = _LATE_START * recipe.damage.area[0].closing_mm
     if evidence.needed and (begins_mm is None or begins_mm > allowed_mm):
-        seen = "does not rise" if begins_mm is None else f"rises as if the contact had begun at {begins_mm:.1f} mm"
-        sentence = f"The onset is doubtful: the area {seen}; up to {allowed_mm:g} mm of closing are allowed."
-        yield Finding(Reason.AREA_NOT_RISING, sentence, begins_mm, allowed_mm, 0.0)
+        if begins_mm is None:
+            why = messages.NO_ONSET()
+        else:
+            why = messages.LATE_ONSET(begins_mm=begins_mm, allowed_mm=allowed_mm)
+        yield Finding(Reason.AREA_NOT_RISING, why, begins_mm, allowed_mm, 0.0)
 
 
 def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
@@ -379,11 +376,11 @@ def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
         if case.press.interruptions:  # which say why
             return
         wanted_mm = missing[0].closing_mm if missing else recipe.steps.result_closings_mm[-1]
-        sentence = f"The steps ended at {reached_mm:.1f} mm of closing, before {wanted_mm:g} mm, and nothing says why."
-        yield Finding(Reason.INTERNAL_FAULT, sentence, reached_mm, wanted_mm, reached_mm)
+        why = messages.STEPS_ENDED(reached_mm=reached_mm, wanted_mm=wanted_mm)
+        yield Finding(Reason.INTERNAL_FAULT, why, reached_mm, wanted_mm, reached_mm)
     elif missing and stopped is not None and stopped.finding is not None:
-        sentence = f"{stopped.sentence} The area at {missing[0].closing_mm:g} mm is unknown."
-        yield replace(stopped.finding, sentence=sentence)
+        unknown = messages.AREA_UNKNOWN(closing_mm=missing[0].closing_mm)
+        yield replace(stopped.finding, message=joined([stopped.message, unknown]))
 
 
 def _almost(evidence: Evidence, recipe: Recipe) -> bool:
@@ -398,13 +395,17 @@ def _result(evidence: Evidence, recipe: Recipe, closing_mm: float) -> AreaAt:
     return AreaAt(closing_mm, area, uncertainty, limits[0] if limits else None)
 
 
-def _summary(case: _Case) -> str:
+def _summary(case: _Case) -> Message | None:
     threshold, limits = case.limits.recipe.damage.area[-1], case.limits
     area = case.evidence.area_at(threshold.closing_mm)
-    if area is None or limits.problem:
-        return ""
-    told = f"{area[0]:.1f} ± {area[1]:.1f} mm²; {limit_in_words(threshold.area_mm2, limits)}"
-    return f"The area at {threshold.closing_mm:g} mm of closing is {told}."
+    if area is None or limits.problem is not None:
+        return None
+    return messages.AREA_AND_LIMIT(
+        closing_mm=threshold.closing_mm,
+        area_mm2=area[0],
+        uncertainty_mm2=area[1],
+        limit=limit_message(threshold.area_mm2, limits),
+    )
 
 
 def _deciding(evidence: Evidence, recipe: Recipe, proofs: list[Finding]) -> Measured | None:

@@ -5,6 +5,8 @@ from math import hypot, sqrt
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.press import Press
+from station.messages import judge as messages
+from station.messages.message import Message
 from station.settings.damage import SizeClass, SizeOfFruit
 from station.settings.recipe_model import Recipe
 
@@ -26,8 +28,8 @@ class SizedLimits:
     """Standard uncertainty of the limits, from the length's, as a share."""
     without_size: bool = False
     """The recipe uses the size, the PLC gave none, and the recipe lets the limits as written be used."""
-    problem: str = ""
-    """Why the limits for this fruit are not known, a sentence; empty where they are."""
+    problem: Message | None = None
+    """Why the limits for this fruit are not known; None where they are."""
 
 
 def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
@@ -53,8 +55,8 @@ def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
     if rule.without_size == "plain_limit":
         return SizedLimits(recipe, relative_uncertainty=rule.exponent * rule.spread, without_size=True)
     if rule.judged_by == "length":
-        return SizedLimits(recipe, problem="The PLC gave no length of the fruit, with which its limits go.")
-    return SizedLimits(recipe, problem="The PLC gave no size class of the fruit, with which its limits go.")
+        return SizedLimits(recipe, problem=messages.NO_LENGTH())
+    return SizedLimits(recipe, problem=messages.NO_CLASS())
 
 
 def _length(size: FruitSize, rule: SizeOfFruit) -> tuple[float, float] | None:
@@ -73,46 +75,43 @@ def _class(size: FruitSize, rule: SizeOfFruit) -> SizeClass | None:
     return next((each for each in rule.classes if each.number == size.size_class), None)
 
 
-def _problem(size: FruitSize, rule: SizeOfFruit, title: str) -> str:
-    """Why a size that was given cannot be the fruit's; empty where it can, and where there is none."""
+def _problem(size: FruitSize, rule: SizeOfFruit, title: str) -> Message | None:
+    """Why a size that was given cannot be the fruit's; None where it can, and where there is none."""
     expected, length_mm, known = rule.expected_length, size.length_mm, _class(size, rule)
     if length_mm is not None and not expected.smallest_mm <= length_mm <= expected.largest_mm:
-        return (
-            f"The PLC gave a length of {length_mm:.1f} mm; {title} is expected with {expected.smallest_mm:g} to "
-            f"{expected.largest_mm:g} mm."
+        return messages.LENGTH_UNEXPECTED(
+            length_mm=length_mm, recipe=title, smallest_mm=expected.smallest_mm, largest_mm=expected.largest_mm
         )
     if size.size_class is None or not rule.classes:
-        return ""
+        return None
     if known is None:
-        return f"The PLC gave the size class {size.size_class}, which the recipe does not list."
+        return messages.CLASS_UNLISTED(number=size.size_class)
     room_mm = _CONTRADICTION * rule.uncertainty_mm
     if length_mm is not None and not known.smallest_mm - room_mm <= length_mm <= known.largest_mm + room_mm:
-        return (
-            f"The PLC gave a length of {length_mm:.1f} mm and the size class {known.number}, which is for "
-            f"{known.smallest_mm:g} to {known.largest_mm:g} mm: they contradict each other."
+        return messages.SIZE_CONTRADICTS(
+            length_mm=length_mm, number=known.number, smallest_mm=known.smallest_mm, largest_mm=known.largest_mm
         )
-    return ""
+    return None
 
 
-def _another_fruits(size: FruitSize, rule: SizeOfFruit, width_mm: float | None) -> str:
-    """Why a size does not fit the width that the gripper measured; empty where it does, and where nothing is known.
+def _another_fruits(size: FruitSize, rule: SizeOfFruit, width_mm: float | None) -> Message | None:
+    """Why a size does not fit the width that the gripper measured; None where it does, and where nothing is known.
 
     A line whose sizes have slipped by one fruit writes lengths that are all possible by themselves.
     """
     ratio, known = rule.expected_ratio, _class(size, rule)
     if ratio is None or width_mm is None:
-        return ""
+        return None
     if size.length_mm is not None:
         shortest_mm = longest_mm = size.length_mm
-        told = f"a length of {size.length_mm:.1f} mm"
+        problem = messages.LENGTH_OF_ANOTHER(length_mm=size.length_mm, width_mm=width_mm)
     elif known is not None:
         shortest_mm, longest_mm = known.smallest_mm, known.largest_mm
-        told = f"the size class {known.number}"
+        problem = messages.CLASS_OF_ANOTHER(number=known.number, width_mm=width_mm)
     else:
-        return ""
-    if longest_mm >= ratio.smallest * width_mm and shortest_mm <= ratio.largest * width_mm:
-        return ""
-    return f"The PLC gave {told}, and the fruit is {width_mm:.1f} mm wide: that is another fruit's size."
+        return None
+    fits = longest_mm >= ratio.smallest * width_mm and shortest_mm <= ratio.largest * width_mm
+    return None if fits else problem
 
 
 def _scaled(recipe: Recipe, factor: float) -> Recipe:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, Row, func, select
 
+from station.messages import records as messages
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.schema import (
@@ -20,6 +21,7 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, to_stored
 from station.records.write_requests import OutboxKind
 
 LARGEST_BATCH = 500
@@ -116,7 +118,7 @@ def json_text(data: dict[str, Any]) -> str:
 def _lineage(connection: Connection) -> tuple[Origin, ...]:
     rows = connection.execute(select(origins).order_by(origins.c.first_entry.desc())).all()
     if not rows:
-        raise RecordsError("the outbox's origin is missing from the database", "put back a backup")
+        raise RecordsError(messages.ORIGIN_MISSING(), messages.PUT_BACK_BACKUP())
     ends = [None, *(row.first_entry - 1 for row in rows)]
     return tuple(Origin(row.id, end) for row, end in zip(rows, ends, strict=False))
 
@@ -142,6 +144,7 @@ def _inspections(connection: Connection, sequences: list[int]) -> dict[int, dict
 
 def _inspection(row: Row[Any], curve: list[dict[str, Any]], kept: list[dict[str, Any]]) -> dict[str, Any]:
     standing: dict[str, Any] = json.loads(row.standing or "{}")
+    explanation = [from_stored(stored) for stored in row.explanation or []]
     return {
         "sequence": row.sequence,
         "boot": row.boot,
@@ -162,7 +165,8 @@ def _inspection(row: Row[Any], curve: list[dict[str, Any]], kept: list[dict[str,
         "outcome": row.outcome,
         "reasons": standing.get("reasons", []),
         "judged": row.judged,
-        "explanation": row.explanation or [],
+        "explanation": [str(message) for message in explanation],
+        "messages": [to_stored(message) for message in explanation],
         "late": bool(standing.get("late")),
         "partial": bool(standing.get("partial")),
         "area_mm2": standing.get("area_mm2"),
@@ -170,7 +174,10 @@ def _inspection(row: Row[Any], curve: list[dict[str, Any]], kept: list[dict[str,
         "closing_mm": standing.get("closing_mm"),
         "confidence": standing.get("confidence"),
         "phases_s": row.phases_s or {},
-        "measures": row.measures or {},
+        "measures": {
+            name: str(from_stored(value)) if name in {JUDGEMENT, FIRST_PRESS} else value
+            for name, value in (row.measures or {}).items()
+        },
         "devices": row.devices or {},
         "versions": row.versions or {},
         "published": _time(row.published_utc_ms),

@@ -7,6 +7,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, insert, select
 
+from station.messages import records as messages
 from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
 from station.records.errors import BadRecordError
@@ -178,7 +179,9 @@ def canonical(value: Any) -> str | None:
     try:
         return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     except (ValueError, TypeError) as error:
-        raise BadRecordError(f"the audit trail cannot hold {value!r:.200}: {error}", "see the log") from error
+        raise BadRecordError(
+            messages.AUDIT_VALUE(value=f"{value!r:.200}", words=str(error)), messages.SEE_LOG()
+        ) from error
 
 
 def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, seq: int | None) -> AuditRow:
@@ -210,12 +213,12 @@ def validate_entry(entry: AuditEntry) -> None:
     for name, text in words.items():
         if not text.strip() or len(text) > LONGEST_WORD or not text.isprintable():
             raise BadRecordError(
-                f"audit: {name}: expected one printable line of 1 to {LONGEST_WORD} characters, got {text!r:.100}",
-                f"give a proper {name}",
+                messages.AUDIT_WORD(field=name, most=LONGEST_WORD, text=f"{text!r:.100}"),
+                messages.PROPER_WORD(field=name),
             )
     for name, text in {"subject": entry.subject, "reason": entry.reason}.items():
         if len(text) > LONGEST_REASON or not all(letter.isprintable() or letter == "\n" for letter in text):
             raise BadRecordError(
-                f"audit: {name}: expected at most {LONGEST_REASON} printable characters, got {text!r:.100}",
-                f"give a shorter {name}, without control characters",
+                messages.AUDIT_TEXT(field=name, most=LONGEST_REASON, text=f"{text!r:.100}"),
+                messages.SHORTER_TEXT(field=name),
             )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from station.messages import records as messages
 from station.records.audit import has_row, newer_head
 from station.records.audit_head import Head, read_head
 from station.records.database import FILE_NAME, open_engine, plain, reading
@@ -54,7 +55,7 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
         RecordsError: it exists, there is no space, or the disk failed; then no `directory` is left.
     """
     if os.path.lexists(directory):
-        raise RecordsError(f"{directory} is there already", "name a new folder; a backup never changes another one")
+        raise RecordsError(messages.THERE_ALREADY(path=str(directory)), messages.NEW_FOLDER())
     partial = directory.with_name(f".{directory.name}{_PARTIAL}")
     try:
         _remove(partial)
@@ -87,9 +88,14 @@ def read_manifest(directory: Path) -> Manifest:
     try:
         return Manifest.model_validate_json((directory / MANIFEST_NAME).read_bytes())
     except FileNotFoundError:
-        raise RecordsError(f"{directory} is no backup: it has no {MANIFEST_NAME}", "name a folder made by it") from None
+        raise RecordsError(
+            messages.NO_BACKUP(path=str(directory), file=MANIFEST_NAME), messages.NAME_BACKUP()
+        ) from None
     except ValidationError as error:
-        raise DamagedError(f"{directory / MANIFEST_NAME}: {error.errors()[0]['msg']}", "take another backup") from error
+        raise DamagedError(
+            messages.BAD_FILE(path=str(directory / MANIFEST_NAME), words=error.errors()[0]["msg"]),
+            messages.TAKE_ANOTHER(),
+        ) from error
     except OSError as error:
         raise map_error(error, str(directory)) from error
 
@@ -106,7 +112,7 @@ def copy_image(source: Path, target: Path, sha256: str) -> int:
     """
     content = source.read_bytes()
     if hashlib.sha256(content).hexdigest() != sha256:
-        raise DamagedError(f"{source} is damaged: its content is not what its name says", "put back a backup")
+        raise DamagedError(messages.OTHER_CONTENT(path=str(source)), messages.PUT_BACK_BACKUP())
     target.parent.mkdir(exist_ok=True)
     target.write_bytes(content)
     _sync(target)
@@ -141,7 +147,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
         target.execute("PRAGMA journal_mode = DELETE")
         faults = list(integrity(target))
     if faults:
-        raise DamagedError(f"{folder / FILE_NAME}: {faults[0]}", "see `station records check`; keep the last backup")
+        raise DamagedError(messages.BAD_FILE(path=str(folder / FILE_NAME), words=faults[0]), messages.RUN_CHECK_KEEP())
     size_bytes, notes = _copy_images(folder, partial)
     head, cut = _audit_head(path, known)
     with closing(sqlite3.connect(path)) as target:
@@ -186,7 +192,7 @@ def _copy_images(folder: Path, partial: Path) -> tuple[int, list[str]]:
                     missing.add(sha256)
                 except DamagedError as error:
                     missing.add(sha256)
-                    damaged.append(error.cause)
+                    damaged.append(str(error.cause))
             if missing:
                 forget_missing(connection, frozenset(missing))
         with closing(sqlite3.connect(partial / FILE_NAME)) as plain:
@@ -206,7 +212,9 @@ def _room(folder: Path, place: Path) -> None:
     place.mkdir(parents=True, exist_ok=True)
     free = shutil.disk_usage(place).free
     if free < wanted:
-        raise DiskFullError(f"{place}: {free} bytes are free, the backup takes {wanted}", "free space, or name another")
+        raise DiskFullError(
+            messages.NO_SPACE_FOR_BACKUP(path=str(place), free=free, wanted=wanted), messages.FREE_SPACE_OR_OTHER()
+        )
 
 
 def _sync(path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool
 
+from station.messages import records as messages
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
 from station.records.high_water_mark import sync_folder
@@ -146,8 +147,8 @@ def migrate(engine: Engine, folder: Path) -> None:
         known = {script.revision for script in scripts.walk_revisions()}
         if found is not None and found not in known:
             raise SchemaError(
-                f"{engine.url.database} has the form {found!r} of a newer fruit-station",
-                f"install that version again, or put back the copy in {folder / 'backups'} that this version made",
+                messages.NEWER_SCHEMA(path=str(engine.url.database), schema=found),
+                messages.INSTALL_NEWER(folder=str(folder / "backups")),
             )
     if found is not None:
         backup = _backed_up(folder, found)
@@ -159,10 +160,10 @@ def migrate(engine: Engine, folder: Path) -> None:
         told = map_error(error, str(folder / FILE_NAME))
         if isinstance(told, (DiskFullError, ReadOnlyError, LockedError, DamagedError)):
             raise told from error
-        kept = f"; a copy of it is {backup}" if backup else ""
+        head = scripts.get_current_head()
         raise SchemaError(
-            f"the database could not be brought from form {found} to {scripts.get_current_head()}: {error}",
-            f"it is as it was; install the earlier version again and report this{kept}",
+            messages.NOT_MIGRATED(before=str(found), after=str(head), words=str(error)),
+            messages.INSTALL_EARLIER_COPY(path=str(backup)) if backup else messages.INSTALL_EARLIER(),
         ) from error
 
 
@@ -172,7 +173,7 @@ def _backed_up(folder: Path, revision: str) -> Path:
     backup.parent.mkdir(exist_ok=True)
     size_bytes = (folder / FILE_NAME).stat().st_size
     if shutil.disk_usage(folder).free < 2 * size_bytes:
-        raise DiskFullError(f"{backup}: no space for a copy of {size_bytes} bytes before the upgrade", "free space")
+        raise DiskFullError(messages.NO_SPACE_FOR_COPY(path=str(backup), size_bytes=size_bytes), messages.FREE_SPACE())
     partial = backup.with_suffix(".partial")
     with closing(sqlite3.connect(folder / FILE_NAME)) as source, closing(sqlite3.connect(partial)) as target:
         source.backup(target)
@@ -192,7 +193,7 @@ def reading(folder: Path) -> Iterator[Connection]:
     """
     path = folder / FILE_NAME
     if not path.exists():
-        raise RecordsError(f"there is no {path}", "give the station's home folder, or let the station begin one")
+        raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME())
     try:
         with open_engine(path, "ro").connect() as connection:
             yield connection

@@ -5,6 +5,8 @@ import sqlite3
 
 from sqlalchemy.exc import DBAPIError, StatementError
 
+from station.messages import records as messages
+from station.messages.message import Definition
 from station.records.errors import (
     BadRecordError,
     DamagedError,
@@ -15,38 +17,39 @@ from station.records.errors import (
     RecordsError,
 )
 
-DAMAGED_REMEDY = "open the records again: it is moved aside, and a new one is begun with the numbers going on"
+Mapped = tuple[type[RecordsError], Definition, Definition]
+"""Kind, cause with place and words, and remedy."""
 
-_FULL = ("the disk is full", "free space, or lower records.images_quota_mb")
-_READ_ONLY = ("cannot be written", "make the folder and its files writable for the station's user, and the disk too")
-_LOCKED = ("another program holds the database", "close what has it open for writing")
-_DISK = ("the disk failed", "look at the system's log, and replace the disk if it says so")
+_FULL: Mapped = (DiskFullError, messages.DISK_FULL, messages.FREE_SPACE_OR_QUOTA)
+_READ_ONLY: Mapped = (ReadOnlyError, messages.NOT_WRITABLE, messages.MAKE_WRITABLE)
+_LOCKED: Mapped = (LockedError, messages.LOCKED, messages.CLOSE_PROGRAM)
+_DISK: Mapped = (DiskError, messages.DISK_FAILED, messages.REPLACE_DISK)
+_NO_FOLDER: Mapped = (RecordsError, messages.FILE_OR_FOLDER, messages.MOVE_AWAY)
+_REFUSED: Mapped = (RecordsError, messages.REFUSED, messages.SEE_LOG)
 
-_NO_FOLDER = ("a file is where a folder has to be, or a folder where a file", "move it away, or set another home")
-
-_SQLITE: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
-    sqlite3.SQLITE_FULL: (DiskFullError, _FULL),
-    sqlite3.SQLITE_READONLY: (ReadOnlyError, _READ_ONLY),
-    sqlite3.SQLITE_PERM: (ReadOnlyError, _READ_ONLY),
-    sqlite3.SQLITE_CANTOPEN: (ReadOnlyError, _READ_ONLY),
-    sqlite3.SQLITE_BUSY: (LockedError, _LOCKED),
-    sqlite3.SQLITE_LOCKED: (LockedError, _LOCKED),
-    sqlite3.SQLITE_CORRUPT: (DamagedError, ("the database is damaged", DAMAGED_REMEDY)),
-    sqlite3.SQLITE_NOTADB: (DamagedError, ("the database is none", DAMAGED_REMEDY)),
-    sqlite3.SQLITE_IOERR: (DiskError, _DISK),
+_SQLITE: dict[int, Mapped] = {
+    sqlite3.SQLITE_FULL: _FULL,
+    sqlite3.SQLITE_READONLY: _READ_ONLY,
+    sqlite3.SQLITE_PERM: _READ_ONLY,
+    sqlite3.SQLITE_CANTOPEN: _READ_ONLY,
+    sqlite3.SQLITE_BUSY: _LOCKED,
+    sqlite3.SQLITE_LOCKED: _LOCKED,
+    sqlite3.SQLITE_CORRUPT: (DamagedError, messages.DAMAGED, messages.OPEN_AGAIN),
+    sqlite3.SQLITE_NOTADB: (DamagedError, messages.NO_DATABASE, messages.OPEN_AGAIN),
+    sqlite3.SQLITE_IOERR: _DISK,
 }
 """By SQLite's primary result code (sqlite.org/rescode.html): the lowest 8 bits."""
 
-_SYSTEM: dict[int, tuple[type[RecordsError], tuple[str, str]]] = {
-    errno.ENOSPC: (DiskFullError, _FULL),
-    errno.EDQUOT: (DiskFullError, _FULL),
-    errno.EFBIG: (DiskFullError, _FULL),
-    errno.EROFS: (ReadOnlyError, _READ_ONLY),
-    errno.EACCES: (ReadOnlyError, _READ_ONLY),
-    errno.EPERM: (ReadOnlyError, _READ_ONLY),
-    errno.EEXIST: (RecordsError, _NO_FOLDER),
-    errno.ENOTDIR: (RecordsError, _NO_FOLDER),
-    errno.EISDIR: (RecordsError, _NO_FOLDER),
+_SYSTEM: dict[int, Mapped] = {
+    errno.ENOSPC: _FULL,
+    errno.EDQUOT: _FULL,
+    errno.EFBIG: _FULL,
+    errno.EROFS: _READ_ONLY,
+    errno.EACCES: _READ_ONLY,
+    errno.EPERM: _READ_ONLY,
+    errno.EEXIST: _NO_FOLDER,
+    errno.ENOTDIR: _NO_FOLDER,
+    errno.EISDIR: _NO_FOLDER,
 }
 
 
@@ -62,11 +65,12 @@ def map_error(error: Exception, place: str) -> RecordsError:
     said = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
     if isinstance(said, sqlite3.Error):
         code = getattr(said, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
-        kind, (cause, remedy) = _SQLITE.get(code, (RecordsError, (f"the database refused: {said}", "see the log")))
-        return kind(f"{place}: {cause} ({said})", remedy)
+        kind, cause, remedy = _SQLITE.get(code, _REFUSED)
+        return kind(cause(place=place, words=str(said)), remedy())
     if isinstance(said, OSError):
-        kind, (cause, remedy) = _SYSTEM.get(said.errno or 0, (DiskError, _DISK))
-        return kind(f"{place}: {cause} ({said.strerror or said})", remedy)
+        kind, cause, remedy = _SYSTEM.get(said.errno or 0, _DISK)
+        return kind(cause(place=place, words=said.strerror or str(said)), remedy())
     if isinstance(said, (StatementError, ValueError, TypeError)):
-        return BadRecordError(f"what was to be recorded is malformed: {said}", "this is a fault of the program")
-    return RecordsError(f"{place}: {type(said).__name__}: {said}", "see the log")
+        return BadRecordError(messages.MALFORMED(words=str(said)), messages.REPORT_FAULT())
+    unexpected = messages.UNEXPECTED(place=place, kind=type(said).__name__, words=str(said))
+    return RecordsError(unexpected, messages.SEE_LOG())

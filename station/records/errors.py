@@ -1,6 +1,8 @@
 """Records errors, each with a code, a cause and a remedy."""
 
 from station.errors import StationError
+from station.messages.message import Message
+from station.messages.records import FAULT
 
 
 class RecordsError(StationError):
@@ -8,8 +10,8 @@ class RecordsError(StationError):
 
     code = "records"
 
-    def __init__(self, cause: str, remedy: str) -> None:
-        super().__init__(f"records: {cause}; {remedy}")
+    def __init__(self, cause: Message, remedy: Message) -> None:
+        super().__init__(FAULT(cause=cause, remedy=remedy))
         self.cause = cause
         self.remedy = remedy
 

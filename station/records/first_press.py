@@ -6,18 +6,19 @@ from typing import Any
 
 from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
+from station.messages.message import Message, joined
 
-_PRESSES, _FINDINGS, _PRESS = "presses", "first_press_findings", "first_press"
+_PRESSES, _PRESS = "presses", "first_press"
 _FLAGS = {flag.value for flag in Flag}
 
 
-def first_press_measures(earlier: Sequence[Press], verdict: Verdict | None) -> dict[str, int | str]:
-    """Return what the record stores of an inconclusive press; nothing if there was none.
+def first_press_measures(earlier: Sequence[Press]) -> dict[str, int | str]:
+    """Return the measurements of an inconclusive press for the record; nothing if there was none.
 
     Args:
         earlier: the presses before the last one.
     """
-    if not earlier or verdict is None:
+    if not earlier:
         return {}
     first = earlier[0]
     points = [
@@ -25,8 +26,7 @@ def first_press_measures(earlier: Sequence[Press], verdict: Verdict | None) -> d
         for point in first.points
     ]
     stored = json.dumps([first.onset_mm, first.onset_uncertainty_mm, points], separators=(",", ":"))
-    why = " ".join(finding.sentence for finding in verdict.findings)
-    return {_PRESSES: 1 + len(earlier), _FINDINGS: why, _PRESS: stored}
+    return {_PRESSES: 1 + len(earlier), _PRESS: stored}
 
 
 def first_press(measures: Mapping[str, Any]) -> Press | None:
@@ -41,11 +41,16 @@ def first_press(measures: Mapping[str, Any]) -> Press | None:
     return Press(onset_mm, uncertainty_mm, measured)
 
 
-def first_press_findings(measures: Mapping[str, Any]) -> str:
-    """Return why the first press did not decide, in sentences; empty if the fruit was pressed once."""
-    return str(measures.get(_FINDINGS) or "")
+def first_press_findings(verdict: Verdict | None) -> Message | None:
+    """Return why the first press did not decide.
+
+    Args:
+        verdict: on it; None if the fruit was pressed once.
+    """
+    found = [finding.message for finding in verdict.findings] if verdict is not None else []
+    return joined(found) if found else None
 
 
 def is_first_press(measure: str) -> bool:
-    """Check whether a measure is the first press's, and has a line of its own."""
-    return measure in {_FINDINGS, _PRESS}
+    """Check whether a measure is the first press's curve, which no list shows."""
+    return measure == _PRESS

@@ -8,6 +8,7 @@ import os
 import zlib
 from pathlib import Path
 
+from station.messages import records as messages
 from station.records.errors import SequenceError
 
 LARGEST = 2**32 - 1
@@ -49,9 +50,7 @@ class HighWaterMark:
             SequenceError: all numbers were given.
         """
         if self.value >= LARGEST:
-            raise SequenceError(
-                f"all {LARGEST} sequence numbers were given", "archive the records' folder and begin a new one"
-            )
+            raise SequenceError(messages.NUMBERS_USED_UP(largest=LARGEST), messages.ARCHIVE())
         self.value += 1
         return self.value
 

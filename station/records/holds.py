@@ -4,6 +4,8 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, update
 
+from station.messages import records as messages
+from station.messages.message import Message
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
 from station.records.write_requests import utc_ms
@@ -41,7 +43,7 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
     table = inspections.c
     condition = table.sequence == thing if isinstance(thing, int) else table.lot == thing
     if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
-        raise RecordsError(f"there is no {_named(thing)}", "`station records list` shows what there is")
+        raise RecordsError(_unknown(thing), messages.LIST_SHOWS())
     connection.execute(insert(holds).values(**_key(thing), reason=reason, by=by, placed_utc_ms=utc_ms()))
     held = _active(connection, thing)
     if held is None:
@@ -61,7 +63,7 @@ def release(connection: Connection, thing: int | str, reason: str, by: str) -> H
     _given(reason)
     active = _active(connection, thing)
     if active is None:
-        raise RecordsError(f"{_named(thing)} is not on hold", "`station records holds` shows what is")
+        raise RecordsError(_not_held(thing), messages.HOLDS_SHOW())
     connection.execute(
         update(holds)
         .where(_is(thing), holds.c.released_utc_ms.is_(None))
@@ -100,10 +102,16 @@ def _active(connection: Connection, thing: int | str) -> Hold | None:
     return None if row is None else Hold(*row)
 
 
-def _named(thing: int | str) -> str:
-    return f"inspection {thing}" if isinstance(thing, int) else f"lot {thing!r}"
+def _unknown(thing: int | str) -> Message:
+    return messages.NO_INSPECTION(number=thing) if isinstance(thing, int) else messages.NO_LOT(lot=repr(thing))
+
+
+def _not_held(thing: int | str) -> Message:
+    if isinstance(thing, int):
+        return messages.INSPECTION_NOT_HELD(number=thing)
+    return messages.LOT_NOT_HELD(lot=repr(thing))
 
 
 def _given(reason: str) -> None:
     if not reason.strip():
-        raise RecordsError("no reason was given", "say why, for whoever asks later")
+        raise RecordsError(messages.NO_REASON(), messages.GIVE_REASON())

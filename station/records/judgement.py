@@ -1,4 +1,4 @@
-"""Judgement in an inspection's record: the area with its limit, and its uncertainty budget."""
+"""Judgement among an inspection's measures: the limits' factor and the uncertainty budget."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -6,22 +6,22 @@ from typing import Any
 from station.inspection.judge import Verdict
 from station.inspection.uncertainty import COMPONENTS
 
-_SENTENCE, _FACTOR, _COMBINED, _SHARE = "judgement", "coverage_factor", "uncertainty", "uncertainty_"
+_FACTOR, _COMBINED, _SHARE = "coverage_factor", "uncertainty", "uncertainty_"
 _LIMITS = "limit_factor"
 
 
-def judgement_measures(verdict: Verdict) -> dict[str, float | str]:
+def judgement_measures(verdict: Verdict) -> dict[str, float]:
     """Return what the record stores of a verdict beside its reasons: relative standard uncertainties.
 
     Args:
         verdict: of a press that touched something; nothing is stored if its last threshold was not reached.
     """
-    if not verdict.summary:
+    if verdict.summary is None:
         return {}
     shares = {_SHARE + each.name: round(each.relative, 5) for each in verdict.budget.components}
     combined, factor = round(verdict.budget.combined, 5), round(verdict.budget.factor, 4)
     scaled = {} if verdict.limit_factor == 1 else {_LIMITS: round(verdict.limit_factor, 5)}
-    return {_SENTENCE: verdict.summary, **scaled, **shares, _COMBINED: combined, _FACTOR: factor}
+    return {**scaled, **shares, _COMBINED: combined, _FACTOR: factor}
 
 
 def limit_factor(measures: Mapping[str, Any]) -> float:
@@ -31,12 +31,7 @@ def limit_factor(measures: Mapping[str, Any]) -> float:
 
 def is_judgement(measure: str) -> bool:
     """Check whether a measure is one of the judgement's."""
-    return measure in {_SENTENCE, _FACTOR, _COMBINED} or measure.startswith(_SHARE)
-
-
-def judgement_sentence(measures: Mapping[str, Any]) -> str:
-    """Describe the area with its uncertainty and its limit, in a sentence; empty if the record has none."""
-    return str(measures.get(_SENTENCE) or "")
+    return measure in {_FACTOR, _COMBINED} or measure.startswith(_SHARE)
 
 
 def budget_rows(measures: Mapping[str, Any]) -> Iterator[tuple[str, float]]:

@@ -71,7 +71,7 @@ def pdf_report(lot: LotSummary) -> bytes:
         _line(pdf, "No area was measured.")
     _heading(pdf, "Why not accepted")
     for name, sentence, number in lot.reasons:
-        _line(pdf, f"{number}  {name.replace('_', ' ')}: {sentence} ({100 * number / max(1, lot.total):.2f} %)")
+        _line(pdf, f"{number} ({100 * number / max(1, lot.total):.2f} %)  {name.replace('_', ' ')}: {sentence}")
     if not lot.reasons:
         _line(pdf, "Nothing was rejected.")
     _heading(pdf, "Recipes")

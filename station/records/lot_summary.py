@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from station.messages import records as messages
+from station.messages.reasons import reason_message
 from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
 from station.records.search import Query, find_page
-from station.records.texts import sentence
 
 BINS = 24
 EXAMPLES = 12
@@ -84,7 +85,7 @@ def summarise(folder: Path, name: str) -> LotSummary:
         )
         first, last, began, ended = ask(ends, (name,)).fetchone()
         if first is None:
-            raise RecordsError(f"no inspection is of a lot {name!r}", "`station records list` shows the lots' names")
+            raise RecordsError(messages.LOT_WITHOUT_INSPECTIONS(lot=repr(name)), messages.LIST_SHOWS_LOTS())
         outcomes: Counter[str] = Counter({"PASS": 0, "FAIL": 0, "NO_RESULT": 0})
         outcomes.update(
             dict(
@@ -124,7 +125,7 @@ def summarise(folder: Path, name: str) -> LotSummary:
             first=first,
             last=last,
             outcomes=dict(outcomes),
-            reasons=tuple((why, sentence(why), number) for why, number in reasons),
+            reasons=tuple((why, str(reason_message(why)), number) for why, number in reasons),
             recipes=tuple(recipes),
             slices=tuple((ok, bad, none) for ok, bad, none in slices),
             areas=_areas(ask, name),

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from sqlalchemy import Connection, insert, select, update
 
+from station.messages import records as messages
 from station.records.errors import RecordsError
 from station.records.schema import lots
 from station.records.write_requests import queue_event, utc_ms
@@ -35,21 +36,18 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
     Raises:
         RecordsError: the name or grower is invalid, or the lot is another grower's.
     """
-    for what, text in (("lot", name), ("grower", grower)):
+    for bad, text in ((messages.BAD_LOT_NAME, name), (messages.BAD_GROWER, grower)):
         if not text.strip() or not text.isprintable():
-            raise RecordsError(f"the {what} {text!r} is no name", "give one of printable letters")
+            raise RecordsError(bad(text=repr(text)), messages.PRINTABLE_NAME())
     if len(name) > LONGEST_NAME:
-        raise RecordsError(f"the lot's name has {len(name)} letters", f"the PLC gives at most {LONGEST_NAME}")
+        raise RecordsError(messages.LONG_LOT_NAME(letters=len(name)), messages.LONGEST_LOT_NAME(most=LONGEST_NAME))
     known = _known(connection, name)
     if known is None:
         connection.execute(insert(lots).values(name=name, grower=grower, began_utc_ms=utc_ms(), revision=1))
     elif known.grower == grower:
         return known
     elif not correct:
-        raise RecordsError(
-            f"lot {name} is told to be of {known.grower} already, not of {grower}",
-            "give the new lot another name, or correct it: station records lot start --correct",
-        )
+        raise RecordsError(messages.ANOTHER_GROWER(lot=name, known=known.grower, grower=grower), messages.CORRECT_LOT())
     else:
         _change(connection, known, grower=grower)
     return _changed(connection, name)
@@ -63,7 +61,7 @@ def end_lot(connection: Connection, name: str) -> Lot:
     """
     known = _known(connection, name)
     if known is None:
-        raise RecordsError(f"there is no lot {name!r}", "tell of its begin first: station records lot start")
+        raise RecordsError(messages.NO_LOT(lot=repr(name)), messages.REGISTER_LOT())
     if known.ended_utc_ms is not None:
         return known
     _change(connection, known, ended_utc_ms=utc_ms())

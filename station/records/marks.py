@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple
 from sqlalchemy import Connection, delete, select
 from sqlalchemy.dialects.sqlite import insert as upsert
 
+from station.messages import records as messages
 from station.records.errors import UnknownInspectionError
 from station.records.schema import inspections, marks
 from station.records.write_requests import utc_ms
@@ -35,7 +36,7 @@ def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str
         UnknownInspectionError: there is no such inspection.
     """
     if connection.scalar(select(inspections.c.sequence).where(inspections.c.sequence == sequence)) is None:
-        raise UnknownInspectionError(f"there is no inspection {sequence}", "`station records list` shows what there is")
+        raise UnknownInspectionError(messages.NO_INSPECTION(number=sequence), messages.LIST_SHOWS())
     row = connection.execute(select(marks).where(marks.c.sequence == sequence)).one_or_none()
     before = None if row is None else Marked(*row)
     if mark is None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from station.channel.line import Outcome, OutcomeName
 from station.inspection.fruit_size import FruitSize
+from station.messages.message import Message
 
 ImageKind = Literal["reference", "step", "mask"]
 
@@ -111,8 +112,7 @@ class InspectionRecord:
     outcome: OutcomeName
     reasons: tuple[str, ...]
     """The first one decided; empty only for PASS."""
-    explanation: tuple[str, ...]
-    """Explanation in sentences."""
+    explanation: tuple[Message, ...]
     late: bool
     partial: bool
     area_mm2: float | None
@@ -127,6 +127,10 @@ class InspectionRecord:
     """Duration of each phase of the cycle, by the monotonic clock."""
     measures: Mapping[str, float | int | str | bool | None] = field(default_factory=dict)
     """Values that the judge used beside the area."""
+    judgement: Message | None = None
+    """The area with its uncertainty and its limit; None if one of them is not known."""
+    first_press_findings: Message | None = None
+    """Why the first press did not decide; None if the fruit was pressed once."""
     devices: Mapping[str, str] = field(default_factory=dict)
     """Names of the devices."""
     versions: Mapping[str, str] = field(default_factory=dict)

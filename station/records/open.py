@@ -9,10 +9,12 @@ from pathlib import Path
 
 from sqlalchemy import Connection, func, select
 
+from station.messages import records as messages
+from station.messages.message import Message
 from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
-from station.records.error_mapping import DAMAGED_REMEDY, map_error
+from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
 from station.records.high_water_mark import HighWaterMark, sync_folder
 from station.records.images import FOLDER_NAME, ImageStore
@@ -37,8 +39,8 @@ class Notice:
 
     code: str
     """The code of the corresponding `RecordsError`, as `damaged`."""
-    cause: str
-    remedy: str
+    cause: Message
+    remedy: Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,7 @@ def lock_folder(folder: Path) -> int:
         holder = os.read(descriptor, 20).decode("ascii", "replace") or "unknown"
         os.close(descriptor)
         raise LockedError(
-            f"{folder}: another station has it, process {holder}", "stop that one, or set another home"
+            messages.ANOTHER_STATION(folder=str(folder), process=holder), messages.STOP_OTHER()
         ) from error
     except OSError as error:
         os.close(descriptor)
@@ -119,8 +121,8 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
     if not path.exists() or not path.stat().st_size:
         if mark.value:
             aside = move_aside(folder, *BELONGING)
-            cause = f"{path}: there was none, though {mark.value} inspections were numbered; a new one was begun"
-            return (Notice("damaged", cause, f"look for the old one; its images are in {aside}"),)
+            cause = messages.MISSING_DATABASE(path=str(path), number=mark.value)
+            return (Notice("damaged", cause, messages.FIND_OLD(folder=str(aside))),)
         if not mark.known and (folder / "aside").exists():
             raise _lost_mark(mark)
         return ()
@@ -131,16 +133,13 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
             raise _lost_mark(mark) from error
         aside = move_aside(folder, *BELONGING)
         log.exception("%s; moved to %s", error.cause, aside)
-        remedy = f"the old one and its images are in {aside}: `sqlite3 FILE .recover` reads what is left of it"
-        return (Notice(error.code, f"{error.cause}; a new one was begun after number {mark.value}", remedy),)
+        cause = messages.BEGUN_ANEW(cause=error.cause, number=mark.value)
+        return (Notice(error.code, cause, messages.RECOVER_OLD(folder=str(aside))),)
     return ()
 
 
 def _lost_mark(mark: HighWaterMark) -> SequenceError:
-    return SequenceError(
-        f"{mark.path}: which numbers were given is not known, and the database does not tell",
-        "see the last number that the PLC or the reports know, then: station records continue-after NUMBER",
-    )
+    return SequenceError(messages.NUMBERS_UNKNOWN(path=str(mark.path)), messages.CONTINUE_AFTER())
 
 
 def _migrate(folder: Path) -> None:
@@ -170,7 +169,7 @@ def _connector(
         """Check that the file still exists: one that was removed could be written for ever, and would be lost."""
         now = path.stat() if path.exists() else None
         if now is None or (now.st_dev, now.st_ino) != (found.st_dev, found.st_ino):
-            raise DamagedError(f"{path}: was removed or replaced while the station ran", DAMAGED_REMEDY)
+            raise DamagedError(messages.REMOVED(path=str(path)), messages.OPEN_AGAIN())
 
     def connect() -> Connection:
         confirm()
@@ -202,7 +201,8 @@ def _first_transaction(
     add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
     continue_audit(connection, head)
     for notice in notices:
-        add_event(connection, f"notice_{notice.code}", None, {"cause": notice.cause, "remedy": notice.remedy})
+        details = {"cause": str(notice.cause), "remedy": str(notice.remedy)}
+        add_event(connection, f"notice_{notice.code}", None, details)
     return tuple(lost)
 
 
@@ -220,7 +220,7 @@ def set_mark(folder: Path, number: int) -> None:
     try:
         mark = HighWaterMark(folder / MARK_NAME)
         if number < mark.value:
-            raise SequenceError(f"{mark.value} was given already", f"give {mark.value} or a higher number")
+            raise SequenceError(messages.NUMBER_GIVEN(number=mark.value), messages.GIVE_HIGHER(number=mark.value))
         mark.value = number
         mark.save()
     except OSError as error:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, func, select, true
 
 from station.channel.line import Outcome
+from station.messages import records as messages
 from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
@@ -24,6 +25,7 @@ from station.records.model import (
     Trigger,
 )
 from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored
 
 
 class Summary(NamedTuple):
@@ -88,10 +90,8 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
         first, last = connection.execute(
             select(func.min(inspections.c.sequence), func.max(inspections.c.sequence))
         ).one()
-        there = f"the records hold {first} to {last}" if last else "the records are empty"
-        raise UnknownInspectionError(
-            f"there is no inspection {sequence}", f"{there}; `station records list` shows them"
-        )
+        there = messages.LIST_SHOWS_RANGE(first=first, last=last) if last else messages.RECORDS_EMPTY()
+        raise UnknownInspectionError(messages.NO_INSPECTION(number=sequence), there)
     kept = connection.execute(select(images).where(images.c.sequence == sequence).order_by(images.c.id))
     standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
     return FullRecord(
@@ -180,10 +180,15 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
     points = connection.execute(
         select(curve_points).where(curve_points.c.sequence == row.sequence).order_by(curve_points.c.step)
     )
+    measures = dict(row.measures)
+    judgement, first_press = (
+        None if (stored := measures.pop(name, None)) is None else from_stored(stored)
+        for name in (JUDGEMENT, FIRST_PRESS)
+    )
     return InspectionRecord(
         outcome=row.judged,
         reasons=tuple(row.reasons),
-        explanation=tuple(row.explanation),
+        explanation=tuple(map(from_stored, row.explanation)),
         late=row.late,
         partial=row.partial,
         area_mm2=row.area_mm2,
@@ -208,7 +213,9 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
             for point in points
         ),
         phases_s=row.phases_s,
-        measures=row.measures,
+        measures=measures,
+        judgement=judgement,
+        first_press_findings=first_press,
         devices=row.devices,
         versions=row.versions,
     )

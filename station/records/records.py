@@ -14,6 +14,8 @@ from typing import Any, Self, TypeVar
 from sqlalchemy import Connection
 
 from station.channel.line import Outcome
+from station.messages import records as messages
+from station.messages.message import Message
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.database import FILE_NAME, reading
 from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
@@ -62,8 +64,8 @@ class Status:
     free_bytes: int
     last_write_age_s: float | None
     """By the monotonic clock; None before the first."""
-    error: str
-    """Error of the last write; empty if it succeeded."""
+    error: Message | None
+    """Error of the last write; None if it succeeded."""
 
 
 class Records:
@@ -78,7 +80,7 @@ class Records:
         self._settings = settings
         self._boot = boot
         self._opened: Opened | None = None
-        self._why_closed: RecordsError = RecordsClosedError("they are closed", "open them first")
+        self._why_closed: RecordsError = RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST())
         self._lock: int | None = None
         self._helper = ThreadPoolExecutor(1, "records-helper")
 
@@ -131,7 +133,7 @@ class Records:
 
     async def close(self) -> None:
         """Finish the queue, images for `IMAGES_CLOSE_S` at most, and end the threads. Idempotent."""
-        self._why_closed = RecordsClosedError("they are closed", "open them first")
+        self._why_closed = RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST())
         with contextlib.suppress(RuntimeError):  # the helper has ended
             await asyncio.get_running_loop().run_in_executor(self._helper, self._shut)
         self._helper.shutdown()
@@ -154,9 +156,10 @@ class Records:
             free_mb = shutil.disk_usage(self.folder).free // MB
             if free_mb < self._settings.free_reserve_mb:
                 raise DiskFullError(
-                    f"{free_mb} MB are free on the disk of {self.folder}, less than the reserve of "
-                    f"{self._settings.free_reserve_mb} MB",
-                    "free space, or lower records.images_quota_mb",
+                    messages.RESERVE_REACHED(
+                        free_mb=free_mb, folder=str(self.folder), reserve_mb=self._settings.free_reserve_mb
+                    ),
+                    messages.FREE_SPACE_OR_QUOTA(),
                 )
             sequence = opened.mark.next()
             insert_trigger(connection, sequence, trigger, self._boot)
@@ -328,7 +331,7 @@ class Records:
             image_bytes=opened.images.size_bytes if opened else 0,
             free_bytes=free_bytes,
             last_write_age_s=None if written_s is None else time.monotonic() - written_s,
-            error=opened.writer.error if opened else str(self._why_closed),
+            error=opened.writer.error if opened else self._why_closed.message,
         )
 
     def _get(self) -> Opened:
@@ -346,9 +349,7 @@ class Records:
             async with asyncio.timeout(deadline_s):
                 return await asyncio.wrap_future(future)
         except TimeoutError:
-            raise RecordsDeadlineError(
-                f"the disk did not take it within {deadline_s:g} s", "look at the disk, or raise records.deadline_s"
-            ) from None
+            raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=deadline_s), messages.CHECK_DISK()) from None
 
     async def _read(self, question: Callable[[Connection], T]) -> T:
         self._get()
@@ -361,4 +362,6 @@ class Records:
             async with asyncio.timeout(READING_S):
                 return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
         except TimeoutError:
-            raise RecordsDeadlineError(f"no answer within {READING_S:g} s", "look at the disk, or ask again") from None
+            raise RecordsDeadlineError(
+                messages.NO_ANSWER(limit_s=READING_S), messages.CHECK_DISK_AND_REPEAT()
+            ) from None

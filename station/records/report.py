@@ -6,11 +6,14 @@ from datetime import UTC, datetime
 from typing import Any
 
 from station.channel.line import Outcome
-from station.records.first_press import first_press_findings, is_first_press
-from station.records.judgement import budget_rows, is_judgement, judgement_sentence
+from station.messages.judge import AREA_NEAR
+from station.messages.message import Message
+from station.messages.reasons import reason_message
+from station.records.first_press import is_first_press
+from station.records.judgement import budget_rows, is_judgement
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, RecipeSnapshot
 from station.records.queries import Summary
-from station.records.texts import printable, sentence, size_sentence, sparkline
+from station.records.texts import printable, size_sentence, sparkline
 
 
 def format_inspection(record: FullRecord) -> str:
@@ -71,21 +74,26 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
         late = ", late" if judged.late else ""
         partial = ", ended before its last step" if judged.partial else ""
         yield _field("judged", f"{judged.outcome}, {area}{closing}{late}{partial}")
-        told = judgement_sentence(judged.measures)
-        if told and not any(text.startswith(told.removesuffix(".")) for text in judged.explanation):
-            yield f"  {told}"
-        for text in judged.explanation:
-            yield f"  {text}"
-        if why := first_press_findings(judged.measures):
-            yield f"  Pressed twice, since the first press did not decide: {why}"
+        judgement = judged.judgement
+        if judgement is not None and not any(_repeats(message, judgement) for message in judged.explanation):
+            yield f"  {judgement}"
+        for message in judged.explanation:
+            yield f"  {message}"
+        if judged.first_press_findings is not None:
+            yield f"  Pressed twice, since the first press did not decide: {judged.first_press_findings}"
         for reason in judged.reasons:
-            yield f"  {reason}: {sentence(reason)}"
+            yield f"  {reason}: {reason_message(reason)}"
     else:
         yield _field("judged", "not")
     if standing and (judged is None or judged.outcome != standing.outcome or judged.reasons != standing.reasons):
         yield _field("stands", standing.outcome)
         for reason in standing.reasons:
-            yield f"  {reason}: {sentence(reason)}"
+            yield f"  {reason}: {reason_message(reason)}"
+
+
+def _repeats(message: Message, judgement: Message) -> bool:
+    """Check whether a finding says the judgement's area and limit already."""
+    return message.id == AREA_NEAR.id and message.parameters == judgement.parameters
 
 
 def _published_text(record: FullRecord) -> str:

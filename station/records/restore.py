@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from sqlalchemy import func, insert, select
 
+from station.messages import records as messages
 from station.records.audit import append_restored
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
@@ -23,7 +24,6 @@ from station.records.retention import referred
 from station.records.schema import origins, outbox
 
 _NEW = "restoring"
-_OTHER = "take another backup: this one is not whole"
 
 
 class RestoreResult(NamedTuple):
@@ -77,12 +77,12 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
     """Copy database and images, each verified against the manifest."""
     source, path = directory / FILE_NAME, new / FILE_NAME
     if not source.exists() or hash_of(source) != manifest.database_sha256:
-        raise DamagedError(f"{source} is missing, or not the one that was verified", _OTHER)
+        raise DamagedError(messages.NOT_THE_VERIFIED(path=str(source)), messages.TAKE_ANOTHER())
     shutil.copyfile(source, path)
     with closing(sqlite3.connect(path)) as connection:
         faults = list(integrity(connection))
     if faults:
-        raise DamagedError(f"{source}: {faults[0]}", _OTHER)
+        raise DamagedError(messages.BAD_FILE(path=str(source), words=faults[0]), messages.TAKE_ANOTHER())
     engine = open_engine(path, "rw")
     try:
         with engine.connect() as connection:
@@ -93,7 +93,9 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
         try:
             copy_image(image_path(directory, sha256), image_path(new, sha256), sha256)
         except FileNotFoundError:
-            raise DamagedError(f"{directory}: the image {sha256} is missing", _OTHER) from None
+            raise DamagedError(
+                messages.IMAGE_MISSING(path=str(directory), image=sha256), messages.TAKE_ANOTHER()
+            ) from None
     for subfolder in (new / FOLDER_NAME, *(new / FOLDER_NAME).iterdir()):
         sync_folder(subfolder)
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from sqlalchemy import Connection
 
 from station.channel.line import OutcomeName, Reason
+from station.messages import records as messages
 from station.records.database import plain
 from station.records.errors import RecordsError
 from station.records.high_water_mark import LARGEST
@@ -67,7 +68,7 @@ def find_page(connection: Connection, query: Query, limit: int = 50, below: int 
         RecordsError: the limit is invalid.
     """
     if not 1 <= limit <= LARGEST_PAGE:
-        raise RecordsError(f"a page of {limit} inspections", f"ask for 1 to {LARGEST_PAGE}")
+        raise RecordsError(messages.PAGE_TOO_LARGE(number=limit), messages.ASK_FOR_FEWER(most=LARGEST_PAGE))
     found = list(islice(find(connection, query, LARGEST if below is None else below - 1), limit + 1))
     rows = tuple(read_summaries(connection, found[:limit]))
     return Page(rows, found[limit - 1] if len(found) > limit else None)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection
 
+from station.messages import records as messages
 from station.records.audit import newer_head
 from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, open_engine
@@ -22,7 +23,7 @@ def short_transaction(folder: Path) -> Iterator[Connection]:
     """
     path = folder / FILE_NAME
     if not path.exists():
-        raise RecordsError(f"there is no {path}", "give the station's home folder, or let the station begin one")
+        raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME())
     engine = open_engine(path, "rw")
     try:
         with engine.begin() as connection:

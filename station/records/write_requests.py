@@ -10,6 +10,7 @@ from sqlalchemy import Connection, delete, insert, select, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
+from station.messages import records as messages
 from station.records.errors import BadRecordError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
@@ -24,6 +25,7 @@ from station.records.schema import (
     recipe_snapshots,
 )
 from station.records.search_index import index_hour, index_reasons
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, to_stored
 
 OutboxKind = Literal["inspection", "lot", "audit"]
 PENDING = "pending"
@@ -102,7 +104,7 @@ def conclude(
         .values(
             judged=record.outcome,
             reasons=[str(reason) for reason in record.reasons],
-            explanation=list(record.explanation),
+            explanation=[to_stored(message) for message in record.explanation],
             late=record.late,
             partial=record.partial,
             area_mm2=judged.area_mm2,
@@ -112,7 +114,7 @@ def conclude(
             ended_utc_ms=record.ended_utc_ms,
             duration_ms=record.duration_ms,
             phases_s=dict(record.phases_s),
-            measures=dict(record.measures),
+            measures={**record.measures, **_messages(record)},
             devices=dict(record.devices),
             versions=dict(record.versions),
             images_state=images_state,
@@ -130,6 +132,12 @@ def conclude(
     return standing, images_state
 
 
+def _messages(record: InspectionRecord) -> dict[str, Any]:
+    """Return the messages that are stored among the measures."""
+    messages = ((JUDGEMENT, record.judgement), (FIRST_PRESS, record.first_press_findings))
+    return {name: to_stored(message) for name, message in messages if message is not None}
+
+
 def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: str) -> bool:
     """Store that the PLC was given an outcome, unless it is stored already; True the first time."""
     table = inspections.c
@@ -140,7 +148,7 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
         return False
     if found is None:
         if outcome.sequence > given_up_to:
-            raise UnknownInspectionError(f"inspection {outcome.sequence} was never begun", "ask what is open")
+            raise UnknownInspectionError(messages.NEVER_BEGUN(number=outcome.sequence), messages.ASK_OPEN())
         _insert_published(connection, outcome, boot)
     connection.execute(
         update(inspections)
@@ -235,7 +243,7 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
 def _row(connection: Connection, sequence: int) -> Any:
     row = connection.execute(select(inspections).where(inspections.c.sequence == sequence)).one_or_none()
     if row is None:
-        raise UnknownInspectionError(f"inspection {sequence} is not in this database", "begin it first")
+        raise UnknownInspectionError(messages.NO_INSPECTION(number=sequence), messages.BEGIN_FIRST())
     return row
 
 
@@ -259,7 +267,12 @@ def _lost(begun: Mapping[str, Any]) -> Outcome:
 def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
     """Return the outcome for the PLC of a record."""
     if bool(record.reasons) == (record.outcome == "PASS"):
-        raise BadRecordError(f"inspection {begun['sequence']}: {record.outcome} with {record.reasons}", "see the log")
+        raise BadRecordError(
+            messages.WRONG_REASONS(
+                number=begun["sequence"], outcome=record.outcome, reasons=", ".join(record.reasons) or "-"
+            ),
+            messages.SEE_LOG(),
+        )
     return _outcome(
         begun,
         outcome=record.outcome,
@@ -291,7 +304,9 @@ def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
     try:
         return Outcome(**{name: begun[name] for name in columns}, **ended)
     except ValidationError as error:
-        raise BadRecordError(f"inspection {begun['sequence']} is malformed: {error}", "see the log") from error
+        raise BadRecordError(
+            messages.BAD_INSPECTION(number=begun["sequence"], words=str(error)), messages.SEE_LOG()
+        ) from error
 
 
 def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> None:

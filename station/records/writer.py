@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 from sqlalchemy import Connection
 
+from station.messages import records as messages
+from station.messages.message import Message
 from station.records.error_mapping import map_error
 from station.records.errors import (
     DamagedError,
@@ -55,7 +57,7 @@ class Writer:
         self.writes = 0
         self.failures: Counter[str] = Counter()
         self.last_write_s: float | None = None
-        self.error = ""
+        self.error: Message | None = None
         self._connect = connect
         self._connection: Connection | None = None
         self._before_commit, self._after_commit = before_commit, after_commit
@@ -87,7 +89,7 @@ class Writer:
         future: Future[T] = Future()
         with self._gate:
             if self._closed and threading.current_thread() is not self._thread:
-                future.set_exception(RecordsClosedError("they are closed", "ask before closing"))
+                future.set_exception(RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST()))
             else:
                 self._queue.put((work, future))
         return future
@@ -130,13 +132,13 @@ class Writer:
         except Exception as error:  # noqa: BLE001 (raised to all callers)
             told = map_error(error, self._place)
             answers = [told] * len(batch)
-            self.error = str(told)
+            self.error = told.message
             self._disconnect()  # the next batch begins with a sound connection, if there can be one
         else:
             self._after_commit()
             self.writes += 1
             self.last_write_s = time.monotonic()
-            self.error = ""
+            self.error = None
         for (_, future), answer in zip(batch, answers, strict=True):
             if isinstance(answer, RecordsError):
                 self.failures[answer.code] += 1

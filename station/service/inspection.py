@@ -12,7 +12,7 @@ from station.inspection.judge import Verdict
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.second_press import together
 from station.messages.message import Message
-from station.records.first_press import first_press_measures
+from station.records.first_press import first_press_findings, first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.service.active_recipes import ActiveRecipe
@@ -68,7 +68,7 @@ class Inspection:
     first_verdict: Verdict | None = None
     """On the first press, where it was inconclusive."""
     interruptions: list[Reason] = field(default_factory=list)
-    explanation: list[str] = field(default_factory=list)
+    explanation: list[Message] = field(default_factory=list)
     verdict: Verdict | None = None
     outcome_name: OutcomeName = "NO_RESULT"
     phases_s: dict[str, float] = field(default_factory=dict)
@@ -114,8 +114,8 @@ class Inspection:
         """
         if reason not in self.interruptions:
             self.interruptions.append(reason)
-        if why is not None and str(why) not in self.explanation:
-            self.explanation.append(str(why))
+        if why is not None and why not in self.explanation:
+            self.explanation.append(why)
 
     def press_again(self) -> None:
         """Begin another press on the fruit. Of the one before stays what was measured, not its images."""
@@ -175,11 +175,11 @@ class Inspection:
         if self.interruptions and not self.seen:
             found = []  # that nothing was touched is no news where nothing was looked at
         reasons = tuple(dict.fromkeys([*self.interruptions, *found]))
-        sentences = [finding.sentence for finding in verdict.findings if finding.reason in found] if verdict else []
+        said = [finding.message for finding in verdict.findings if finding.reason in found] if verdict else []
         return InspectionRecord(
             outcome=self.outcome_name,
             reasons=() if self.outcome_name == "PASS" else tuple(map(str, reasons)),
-            explanation=tuple(dict.fromkeys([*self.explanation, *sentences])),
+            explanation=tuple(dict.fromkeys([*self.explanation, *said])),
             late=Reason.LATE in self.interruptions,
             partial=verdict.partial if verdict is not None else True,
             area_mm2=None if deciding is None else deciding.area_mm2,
@@ -192,7 +192,7 @@ class Inspection:
             phases_s=dict(self.phases_s),
             measures={
                 **self.measures,
-                **first_press_measures(self.earlier, self.first_verdict),
+                **first_press_measures(self.earlier),
                 "closings": self.closings,
                 "onset_mm": onset_mm,
                 "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
@@ -201,6 +201,8 @@ class Inspection:
                 "gripper_resolution_mm": self.resolution_mm,
                 **({} if verdict is None else judgement_measures(verdict)),
             },
+            judgement=verdict.summary if verdict is not None else None,
+            first_press_findings=first_press_findings(self.first_verdict),
             images=self._images(),
         )
 

@@ -13,7 +13,7 @@ from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.device_manager import DeviceManager
 from station.service.inspection import Inspection
-from station.service.log_line import fruit_line
+from station.service.log_line import log_fruit
 from station.service.recent_triggers import PendingTrigger, RecentTriggers
 from station.vocabulary import Reason
 
@@ -97,7 +97,7 @@ class InspectionRegistry:
             self.on_outcome(now)
             areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
             with inspecting(now.standing.sequence):
-                log.info(fruit_line(now.standing, now.active.recipe.name, now.record().explanation, areas))
+                log_fruit(log, now.standing, now.active.recipe.name, now.record().explanation, areas)
 
     async def close_unfinished(self) -> Event:
         """Store NO_RESULT for every inspection that has no durable outcome.

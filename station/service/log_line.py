@@ -1,24 +1,31 @@
 """Log line of one fruit, for people who follow the log."""
 
+import logging
 from collections.abc import Sequence
 
 from station.channel.line import Outcome
+from station.messages.message import Message, joined
 from station.records.texts import sparkline
 
 
-def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_mm2: Sequence[float | None]) -> str:
-    """Describe one fruit in one line: sequence, fruit, curve as a sparkline, outcome, explanation, time.
+def log_fruit(
+    log: logging.Logger,
+    outcome: Outcome,
+    fruit: str,
+    explanation: Sequence[Message],
+    areas_mm2: Sequence[float | None],
+) -> None:
+    """Log one fruit in one line: sequence, fruit, curve as a sparkline, outcome, time, explanation.
 
     Args:
+        log: of the caller.
         outcome: as published to the PLC.
         fruit: the recipe's name.
-        explanation: in sentences.
         areas_mm2: the curve, step by step.
     """
     area = "no area" if outcome.area_mm2 is None else f"{outcome.area_mm2:.1f} mm²"
     if outcome.closing_mm is not None:
         area = f"{area} at {outcome.closing_mm:.1f} mm"
-    why = "; ".join(explanation) or ", ".join(outcome.reasons)
     parts = [
         f"fruit {outcome.sequence}",
         f"trigger {outcome.trigger_id}",
@@ -28,4 +35,6 @@ def fruit_line(outcome: Outcome, fruit: str, explanation: Sequence[str], areas_m
         area,
         f"{outcome.duration_ms / 1000:.2f} s",
     ]
-    return "  ".join([*parts, *(["late"] if outcome.late else []), *([why] if why else [])])
+    line = "  ".join([*parts, *(["late"] if outcome.late else [])])
+    why = joined(explanation) if explanation else ", ".join(outcome.reasons)
+    log.info("%s  %s" if why else "%s%s", line, why)

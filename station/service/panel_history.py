@@ -41,7 +41,6 @@ from station.records.model import FullRecord
 from station.records.queries import Summary, read_inspection
 from station.records.records import Records
 from station.records.search import Query, find_page
-from station.records.texts import sentence
 from station.service.panel_jobs import PanelJobs
 from station.service.panel_worker import PanelWorker
 
@@ -190,7 +189,6 @@ def _lot(lot: Lot) -> LotView:
 
 def _inspection_view(record: FullRecord) -> InspectionView:
     trigger, judged, standing, recipe = record.trigger, record.judged, record.standing, record.trigger.recipe
-    reasons = standing.reasons if standing is not None else ()
     return InspectionView(
         sequence=record.sequence,
         trigger_id=trigger.trigger_id,
@@ -200,8 +198,10 @@ def _inspection_view(record: FullRecord) -> InspectionView:
         simulated=trigger.simulated,
         standing=standing,
         judged=judged.outcome if judged else None,
-        reasons=tuple((str(reason), sentence(reason)) for reason in reasons),
+        reasons=tuple(map(str, standing.reasons)) if standing is not None else (),
         explanation=judged.explanation if judged else (),
+        judgement=judged.judgement if judged else None,
+        first_press_findings=judged.first_press_findings if judged else None,
         curve=tuple(
             CurvePointView(**{name: value for name, value in asdict(point).items() if name != "captured_s"})
             for point in (judged.curve if judged else ())

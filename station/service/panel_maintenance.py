@@ -154,7 +154,7 @@ class PanelMaintenance:
                 "images_waiting": status.images_waiting,
                 "writes": status.writes,
             },
-            records_error=verbatim(status.error) if status.error else None,
+            records_error=status.error,
             calibration_age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
             simulated=self._devices.simulated,

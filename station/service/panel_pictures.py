@@ -9,6 +9,8 @@ from station.calibration.gate import gated
 from station.channel.messages import ChannelMessage
 from station.channel.panel_queries import GetImage, GetStages, Picture, Stages
 from station.channel.server import Handler
+from station.messages import records as messages
+from station.messages.message import message_of
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.images import image_path
@@ -56,15 +58,15 @@ class PanelPictures:
         with reading(self._folder) as connection:
             record = read_inspection(connection, request.sequence, self._folder)
         if record.trigger.recipe is None:
-            raise RecordsError(f"inspection {request.sequence} has no recipe", "look at another one")
+            raise RecordsError(messages.NO_RECIPE(number=request.sequence), messages.OPEN_ANOTHER())
         try:
             recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
         except SettingsError as error:
-            raise RecordsError("its recipe is of a form that this program does not take", str(error)) from error
+            raise RecordsError(messages.UNKNOWN_RECIPE(), message_of(error)) from error
         reference = _picture(_stored(record, "reference", None))
         image = _picture(_stored(record, "step", request.step))
         if reference.shape != image.shape:
-            raise RecordsError("its reference and this image differ in size", "look at another step")
+            raise RecordsError(messages.IMAGES_DIFFER(), messages.OPEN_ANOTHER_STEP())
         pictures: list[tuple[str, Picture]] = []
 
         def take(name: str, picture: np.ndarray) -> None:
@@ -90,26 +92,25 @@ def _stored(record: FullRecord, kind: str, step: int | None) -> StoredImage:
     for image in record.images:
         if image.kind == kind and image.step == step:
             return image
-    what = "reference" if step is None else f"image of step {step}"
-    raise RecordsError(
-        f"the {what} of inspection {record.sequence} was not kept ({record.images_state})",
-        "look at another one; records.images_quota_mb and records.accepted_share say what is kept",
-    )
+    number, state = record.sequence, record.images_state
+    if step is None:
+        raise RecordsError(messages.REFERENCE_NOT_KEPT(number=number, state=state), messages.WHAT_IS_KEPT())
+    raise RecordsError(messages.STEP_NOT_KEPT(step=step, number=number, state=state), messages.WHAT_IS_KEPT())
 
 
 def _file(path: Path) -> bytes:
     try:
         if path.stat().st_size > LARGEST_IMAGE_BYTES:
-            raise RecordsError("the image's file is larger than any of a sensor", f"look at {path}")
+            raise RecordsError(messages.IMAGE_TOO_LARGE(), messages.LOOK_AT_FILE(path=str(path)))
         return path.read_bytes()
     except OSError as error:
-        raise RecordsError("the image is not kept any more", "the oldest images make room for new ones") from error
+        raise RecordsError(messages.IMAGE_GONE(), messages.OLDEST_GO_FIRST()) from error
 
 
 def _picture(image: StoredImage) -> Image:
     picture = cv2.imdecode(np.frombuffer(_file(Path(image.path)), np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
-        raise RecordsError("the image's file is damaged", "run `station records check`")
+        raise RecordsError(messages.IMAGE_DAMAGED(), messages.RUN_CHECK())
     return np.asarray(picture, np.uint8)
 
 

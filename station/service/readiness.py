@@ -114,7 +114,7 @@ class Interlock:
         fault, status = self._service.registry.fault, self._service.registry.records.status()
         if fault is None:
             return Dependency("records", "ok", status.last_write_age_s)
-        return Dependency("records", "fault", status.last_write_age_s, verbatim(fault.cause), verbatim(fault.remedy))
+        return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
 
     def _line(self) -> Dependency:
         age_s = self._plc_commands.line_age_s

@@ -4,6 +4,7 @@ import asyncio
 from collections import OrderedDict
 
 from station.channel.line import Begin, BeginReply, Outcome
+from station.messages import records as messages
 from station.records.errors import UnknownInspectionError
 from station.service.inspection import Inspection
 
@@ -75,9 +76,7 @@ class RecentTriggers:
         """
         waiting = self._outcomes.get(sequence)
         if waiting is None:
-            raise UnknownInspectionError(
-                f"no inspection {sequence} has begun since this start of the station", "ask what is open with Resume"
-            )
+            raise UnknownInspectionError(messages.NOT_THIS_START(number=sequence), messages.ASK_OPEN())
         return await asyncio.shield(waiting)
 
 

@@ -13,6 +13,7 @@ from sqlalchemy import Connection
 from station.channel.line import Outcome
 from station.channel.panel_live import FruitSummary
 from station.errors import StationError
+from station.messages import records as messages
 from station.records.database import plain, reading
 from station.records.errors import RecordsError
 from station.records.model import FullRecord, StoredImage
@@ -111,5 +112,5 @@ def _step_reader(record: FullRecord, step: int) -> ReadStep | None:
 def _read(image: StoredImage, flag: int) -> Image:
     picture = cv2.imread(image.path, flag)
     if picture is None:
-        raise RecordsError("the image is not kept any more", "the oldest images make room for new ones")
+        raise RecordsError(messages.IMAGE_GONE(), messages.OLDEST_GO_FIRST())
     return np.asarray(picture, np.uint8)

@@ -5,6 +5,7 @@ from io import StringIO
 from pathlib import Path
 
 from station.errors import BadInputError
+from station.messages import whatif as messages
 from station.records.marks import Mark
 
 _LARGEST_FILE_BYTES = 50_000_000
@@ -24,30 +25,32 @@ def read_marks(path: Path) -> dict[int, Mark]:
             data = file.read(_LARGEST_FILE_BYTES + 1)
         text = data.decode("utf-8-sig")
     except OSError as error:
-        raise BadInputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise BadInputError(
+            messages.UNREADABLE(path=str(path), words=(error.strerror or str(error)).lower())
+        ) from error
     except UnicodeDecodeError as error:
-        raise BadInputError(f"{path}: expected UTF-8; save the table as CSV UTF-8") from error
+        raise BadInputError(messages.NOT_UTF8(path=str(path))) from error
     if len(data) > _LARGEST_FILE_BYTES:
-        raise BadInputError(f"{path}: expected at most {_LARGEST_FILE_BYTES} bytes")
+        raise BadInputError(messages.TOO_LARGE(path=str(path), most=_LARGEST_FILE_BYTES))
     reader = csv.DictReader(StringIO(text, newline=""))
     marks: dict[int, Mark] = {}
     try:
         if not {"sequence", "mark"} <= set(reader.fieldnames or ()):
-            raise BadInputError(f"{path}:1: expected the header sequence,mark")
+            raise BadInputError(messages.NO_HEADER(path=str(path)))
         for row in reader:
             sequence, mark = _row(f"{path}:{reader.line_num}", row)
             if marks.setdefault(sequence, mark) != mark:
-                raise BadInputError(f"{path}:{reader.line_num}: {sequence} is marked good and bad")
+                raise BadInputError(messages.MARKED_TWICE(place=f"{path}:{reader.line_num}", number=sequence))
     except csv.Error as error:
-        raise BadInputError(f"{path}:{reader.line_num}: not a CSV table: {error}") from error
+        raise BadInputError(messages.NO_TABLE(place=f"{path}:{reader.line_num}", words=str(error))) from error
     return marks
 
 
 def _row(place: str, row: dict[str, str]) -> tuple[int, Mark]:
     number, word = (row["sequence"] or "").strip(), (row["mark"] or "").strip().lower()
     if not (number.isascii() and number.isdigit() and len(number) <= 10):
-        raise BadInputError(f"{place}: sequence: expected an inspection's number, got {number!r:.50}")
+        raise BadInputError(messages.BAD_NUMBER(place=place, text=f"{number!r:.50}"))
     marks: dict[str, Mark] = {"good": "good", "bad": "bad"}
     if word not in marks:
-        raise BadInputError(f"{place}: mark: expected good or bad, got {word!r:.50}")
+        raise BadInputError(messages.BAD_MARK(place=place, text=f"{word!r:.50}"))
     return int(number), marks[word]

@@ -7,10 +7,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from station.messages.message import ENGLISH, Renderer
 from station.whatif.replay import Replayed
 
 BEFORE = ("PASS", "FAIL", "NO_RESULT")
 AFTER = (*BEFORE, "UNDECIDABLE")
+_WITHOUT_FIGURES = Renderer(ENGLISH.form, lambda _value, _digits: "…")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ def counted(results: Iterable[Replayed]) -> Counted:
         unfaithful += not each.faithful
         measured_again += bool(each.areas_mm2)
         if each.after == "UNDECIDABLE":
-            why[_without_figures(each.why)] += 1
+            why[_WITHOUT_FIGURES.sentence(each.why) if each.why is not None else ""] += 1
     return Counted(pairs, why, unfaithful, sides["rejected"], sides["passes"], measured_again)
 
 
@@ -94,10 +96,5 @@ def as_csv(results: Sequence[Replayed]) -> str:
     table.writerow(["sequence", "lot", "before", "after", "changes_side", "why"])
     for each in results:
         if each.before != each.after:
-            table.writerow([each.sequence, each.lot, each.before, each.after, each.changes_side, each.why])
+            table.writerow([each.sequence, each.lot, each.before, each.after, each.changes_side, each.why or ""])
     return text.getvalue()
-
-
-def _without_figures(text: str) -> str:
-    words = text.split(" ")
-    return " ".join("…" if word.replace(".", "", 1).replace("-", "", 1).isdigit() else word for word in words)

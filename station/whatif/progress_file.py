@@ -10,6 +10,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from station.errors import BadInputError, StationError
+from station.messages import whatif as messages
+from station.records.stored_message import from_stored, to_stored
 from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
 from station.whatif.replay import Replayed
@@ -48,21 +50,22 @@ class ProgressFile:
             with open(self._descriptor, "rb", closefd=False) as file:
                 content = file.read()
         except OSError as error:
-            raise BadInputError(f"--out {self._path.parent}: cannot be written: {error.strerror}") from error
+            raise BadInputError(
+                messages.OUT_NOT_WRITABLE(folder=str(self._path.parent), words=error.strerror or str(error))
+            ) from error
         whole = content[: content.rfind(b"\n") + 1]  # a line that a crash cut short is done again
         lines = whole.splitlines()
         if lines and _parsed(lines[0]) != self._header:
             self.__exit__(None, None, None)
-            raise BadInputError(
-                f"--out {self._path.parent}: it holds the results of another draft or version; give another folder"
-            )
+            raise BadInputError(messages.OTHER_DRAFT(folder=str(self._path.parent)))
         os.ftruncate(self._descriptor, len(whole))
         os.lseek(self._descriptor, 0, os.SEEK_END)
         for line in lines[1:]:
             values = _parsed(line)
             if values is not None:
-                areas_mm2 = tuple(values.pop("areas_mm2"))
-                self.done[values["sequence"]] = Replayed(**values, areas_mm2=areas_mm2)
+                areas_mm2, why = tuple(values.pop("areas_mm2")), values.pop("why")
+                said = from_stored(why) if why else None
+                self.done[values["sequence"]] = Replayed(**values, why=said, areas_mm2=areas_mm2)
         if not lines:
             self._append([self._header])
         return self
@@ -80,7 +83,7 @@ class ProgressFile:
             StationError: they cannot be written; earlier results remain.
         """
         fresh = list(results)
-        self._append([asdict(each) for each in fresh])
+        self._append([{**asdict(each), "why": each.why and to_stored(each.why)} for each in fresh])
         self.done.update((each.sequence, each) for each in fresh)
 
     def _append(self, values: Iterable[dict[str, Any]]) -> None:
@@ -90,7 +93,7 @@ class ProgressFile:
                 data = data[os.write(self._descriptor, data) :]
         except OSError as error:
             raise StationError(
-                f"{self._path}: {(error.strerror or str(error)).lower()}; free space, and the same command goes on"
+                messages.RESULTS_NOT_WRITTEN(path=str(self._path), words=(error.strerror or str(error)).lower())
             ) from error
 
 

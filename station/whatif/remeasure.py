@@ -9,6 +9,7 @@ import numpy as np
 from station.calibration.gate import gated
 from station.errors import StationError
 from station.inspection.press import Flag, Measured, Press
+from station.messages import whatif as messages
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Image
 from station.vision.methods import make_method
@@ -45,11 +46,11 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     reference = decoded.get(None)
     missing = [step for step in range(len(press.points)) if step not in decoded]
     if reference is None or missing:
-        raise CannotRemeasureError("the draft measures otherwise, and not all of its images were kept")
+        raise CannotRemeasureError(messages.IMAGES_NOT_KEPT())
     before, after = (PressTracker(make_method([reference], one), one.robust.least_confidence) for one in (own, draft))
     points = [_point(press, step, decoded, before, after, draft) for step in range(len(press.points))]
     if not points or points[0].area_px == 0:
-        raise CannotRemeasureError("the draft sees no contact at the stored onset, so its steps would be others")
+        raise CannotRemeasureError(messages.OTHER_ONSET())
     return replace(press, points=tuple(points))
 
 
@@ -64,7 +65,7 @@ def _point(
     stored = press.points[step]
     then, now = before.measure_step([decoded[step]]), after.measure_step([decoded[step]])
     if abs(then.area_px - stored.area_px) > max(_SAME_PX, _SAME_AREA * stored.area_px):
-        raise CannotRemeasureError("its images do not give its stored areas: they were measured by another program")
+        raise CannotRemeasureError(messages.OTHER_PROGRAM())
     confidence = now.confidence
     if confidence is not None and then.confidence and stored.confidence is not None:
         confidence *= min(1.0, stored.confidence / then.confidence)
@@ -80,12 +81,12 @@ def _scale(press: Press) -> float:
     """Return mm² per pixel, from the points that have an area."""
     known = [point.area_mm2 / point.area_px for point in press.points if point.area_px]
     if not known:
-        raise CannotRemeasureError("no stored point has an area, so the scale of its images is not known")
+        raise CannotRemeasureError(messages.NO_SCALE())
     return known[0]
 
 
 def _decoded(data: bytes) -> Image:
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if image is None:
-        raise CannotRemeasureError("one of its images is damaged")
+        raise CannotRemeasureError(messages.DAMAGED_IMAGE())
     return np.asarray(image, np.uint8)

@@ -14,6 +14,8 @@ from pydantic import ValidationError
 from station.inspection.judge import Verdict, early_stop, judge
 from station.inspection.press import Press
 from station.inspection.second_press import needs_second_press, together
+from station.messages import whatif as messages
+from station.messages.message import Message, joined
 from station.settings.recipe_form import upgrade
 from station.settings.recipe_model import Recipe
 from station.vocabulary import OutcomeName
@@ -31,8 +33,8 @@ class Replayed:
     lot: str
     before: OutcomeName
     after: After
-    why: str
-    """The draft's reasons in sentences, or why the result is unknown; empty for PASS."""
+    why: Message | None
+    """The draft's reasons, or why the result is unknown; None for PASS."""
     faithful: bool
     """Judged again by its own recipe, the inspection has the stored outcome."""
     areas_mm2: tuple[float, ...] = ()
@@ -69,7 +71,7 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
         draft: the recipe to try.
     """
     if own is None:
-        return _undecidable(stored, "its own recipe is of a form that this program does not take", faithful=False)
+        return _undecidable(stored, messages.OLD_RECIPE(), faithful=False)
     faithful = judge(stored.judged, own).outcome == stored.before
     if why := pressed_otherwise(own, draft):
         return _undecidable(stored, why, faithful=faithful)
@@ -78,18 +80,17 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
         presses = [press] if stored.first is None else [stored.first, press]
         return _judged(stored, [(each, each) for each in presses], own, draft, faithful=faithful)
     if stored.first is not None:
-        why = "the draft measures otherwise, and of a fruit that was pressed twice the first images are not kept"
-        return _undecidable(stored, why, faithful=faithful)
+        return _undecidable(stored, messages.FIRST_IMAGES_NOT_KEPT(), faithful=faithful)
     try:
         again = remeasured(stored, own.segmentation, draft.segmentation)
     except CannotRemeasureError as error:
-        return _undecidable(stored, str(error), faithful=faithful)
+        return _undecidable(stored, error.message, faithful=faithful)
     replayed = _judged(stored, [(press, again)], own, draft, faithful=faithful)
     return replace(replayed, areas_mm2=tuple(point.area_mm2 for point in again.points))
 
 
-def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
-    """Return why a curve pressed by one recipe is no evidence for the other; empty if it is.
+def pressed_otherwise(own: Recipe, draft: Recipe) -> Message | None:
+    """Return why a curve pressed by one recipe is no evidence for the other; None if it is.
 
     Args:
         own: the recipe that the fruit was pressed by.
@@ -104,7 +105,7 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> str:
         "steps.measured": (own.steps.measured, draft.steps.measured),
     }
     other = [name for name, (before, after) in pairs.items() if before != after]
-    return f"the draft presses otherwise ({', '.join(other)})" if other else ""
+    return messages.PRESSES_OTHERWISE(fields=", ".join(other)) if other else None
 
 
 def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
@@ -137,20 +138,20 @@ def _judged(
     for pressed in range(1, len(presses) + 1):
         then, now = (together(each) for each in zip(*presses[:pressed], strict=True))
         verdict = _verdict(then, now, own, draft)
-        if isinstance(verdict, str):
+        if isinstance(verdict, Message):
             return _undecidable(stored, verdict, faithful=faithful)
         if pressed >= draft.press.attempts or not needs_second_press(verdict):
             return _decided(stored, verdict, faithful=faithful)
-    return _undecidable(stored, "the draft would have pressed the fruit once more", faithful=faithful)
+    return _undecidable(stored, messages.ANOTHER_PRESS(), faithful=faithful)
 
 
-def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict | str:
+def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict | Message:
     """Return the draft's verdict on presses together, or why it is not known."""
     if whole.onset_mm is None:
         sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
         if sooner or whole.interruptions:
             return judge(whole, draft)
-        return "nothing was touched, and the draft would have closed further"
+        return messages.CLOSES_FURTHER()
     stopped = judge(then, own).stopped is not None
     press = _until_stop(whole, draft)
     verdict = judge(press, draft)
@@ -164,8 +165,7 @@ def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict |
     if (hopeless := judge(press, _stopping(draft))).stopped is not None and hopeless.outcome != "PASS":
         return hopeless
     reached_mm = press.points[-1].closing_mm if press.points else 0.0
-    cut = ", where it was stopped early" if stopped else ""
-    return f"the curve ends at {reached_mm:.1f} mm of closing{cut}, and the draft would have pressed on"
+    return (messages.CURVE_STOPPED if stopped else messages.CURVE_ENDS)(reached_mm=reached_mm)
 
 
 def _until_stop(press: Press, draft: Recipe) -> Press:
@@ -195,9 +195,10 @@ def _fits(onset_mm: float | None, draft: Recipe) -> bool:
 
 
 def _decided(stored: StoredPress, verdict: Verdict, *, faithful: bool) -> Replayed:
-    why = " ".join(finding.sentence for finding in verdict.findings)
+    found = [finding.message for finding in verdict.findings]
+    why = joined(found) if found else None
     return Replayed(stored.sequence, stored.lot, stored.before, verdict.outcome, why, faithful)
 
 
-def _undecidable(stored: StoredPress, why: str, *, faithful: bool) -> Replayed:
+def _undecidable(stored: StoredPress, why: Message, *, faithful: bool) -> Replayed:
     return Replayed(stored.sequence, stored.lot, stored.before, "UNDECIDABLE", why, faithful)

@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 import cv2
 
 from station.errors import BadInputError, StationError
+from station.messages import whatif as messages
 from station.records.database import reading
 from station.settings.recipe_model import Recipe
 from station.whatif.replay import Replayed, measured_otherwise, recipe_of_snapshot, replay
@@ -111,16 +112,16 @@ def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
     try:
         distributed = importlib.import_module("distributed")
     except ImportError as error:
-        raise BadInputError("--scheduler: install the extra first: pip install fruit-station[cluster]") from error
+        raise BadInputError(messages.NO_CLUSTER_EXTRA()) from error
     _reach(address)
     try:
         client = distributed.Client(address, timeout=f"{_REACH_S:g}s", set_as_default=False)
     except (OSError, ValueError) as error:
-        raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
+        raise BadInputError(messages.NO_SCHEDULER(address=address, words=str(error))) from error
     with closing(client):
         width = sum(client.nthreads().values())
         if not width:
-            raise StationError(f"--scheduler {address}: it has no workers; start some with `dask worker {address}`")
+            raise StationError(messages.NO_WORKERS(address=address))
         executor = client.get_executor(pure=False)
         yield lambda batch: executor.submit(replay_batch, batch), width
 
@@ -130,10 +131,10 @@ def _reach(address: str) -> None:
     try:
         parts = urlsplit(address)
         if parts.scheme not in {"tcp", "tls"} or parts.hostname is None or parts.port is None:
-            raise BadInputError(f"--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT")
+            raise BadInputError(messages.BAD_SCHEDULER(address=address))
         socket.create_connection((parts.hostname, parts.port), _REACH_S).close()
     except (OSError, ValueError) as error:
-        raise BadInputError(f"--scheduler {address}: no Dask scheduler answers there: {error}") from error
+        raise BadInputError(messages.NO_SCHEDULER(address=address, words=str(error))) from error
 
 
 def _flow(
@@ -154,10 +155,7 @@ def _flow(
             for future in done:
                 yield future.result()
     except BrokenProcessPool as error:
-        raise StationError(
-            "a process of the what-if was ended from outside, perhaps for want of memory; the same command goes on "
-            "where it was, with --jobs 1 in this process alone"
-        ) from error
+        raise StationError(messages.PROCESS_ENDED()) from error
     finally:
         for future in under_way:
             future.cancel()

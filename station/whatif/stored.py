@@ -12,8 +12,11 @@ from sqlalchemy import Connection
 from station.inspection.fruit_size import FruitSize
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.second_press import together
+from station.messages.judge import STEPS_ENDED
+from station.messages.message import Message
 from station.records.first_press import first_press
 from station.records.images import image_path
+from station.records.stored_message import from_stored
 from station.vocabulary import OutcomeName, Reason
 
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
@@ -31,8 +34,6 @@ _INTERRUPTIONS = frozenset(
         Reason.STATION_LOST,
     }
 )
-_STEPS_ENDED = "The steps ended at"
-"""Start of the judge's own sentence for `INTERNAL_FAULT`; it distinguishes it from a fault of the program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +120,8 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
     points = tuple(_points(curve))
     onset_mm = measured.get("onset_mm")
     uncertainty_mm = measured.get("onset_uncertainty_mm", USUAL_ONSET_UNCERTAINTY_MM)
-    told = json.loads(explanation or "[]")
-    interruptions = tuple(_interruptions(found, points, told))
+    said = [from_stored(each) for each in json.loads(explanation or "[]")]
+    interruptions = tuple(_interruptions(found, points, said))
     press = Press(
         onset_mm,
         uncertainty_mm if onset_mm is not None else 0.0,
@@ -153,13 +154,17 @@ def _points(curve: Iterable[Any]) -> Iterator[Measured]:
 _NONE: frozenset[Flag] = frozenset()
 
 
-def _interruptions(found: set[Reason], points: Sequence[Measured], told: Sequence[str]) -> Iterator[Reason]:
-    """Return the reasons from outside the measurement; the judge gives the others itself."""
+def _interruptions(found: set[Reason], points: Sequence[Measured], said: Sequence[Message]) -> Iterator[Reason]:
+    """Return the reasons from outside the measurement; the judge gives the others itself.
+
+    Steps that ended for no known reason are the judge's finding; any other internal fault is one of the program. A
+    record of before messages does not tell them apart, and counts as the latter: no draft makes a result of it.
+    """
     yield from (reason for reason in Reason if reason in found & _INTERRUPTIONS)
     mismatch = any(Flag.REFERENCE_MISMATCH in point.flags for point in points)
     if Reason.REFERENCE_BAD in found and not mismatch:
         yield Reason.REFERENCE_BAD
-    if Reason.INTERNAL_FAULT in found and not any(sentence.startswith(_STEPS_ENDED) for sentence in told):
+    if Reason.INTERNAL_FAULT in found and not any(message.id == STEPS_ENDED.id for message in said):
         yield Reason.INTERNAL_FAULT
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from station.messages import records as messages
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.audit_head import Head, read_head, save_head
 from station.records.database import reading
@@ -15,6 +16,7 @@ from station.records.direct_transaction import direct_transaction
 from station.records.errors import BadRecordError
 from station.records.records import Records
 from station.settings.records import RecordsSettings
+from tests.records.causes import because
 
 
 def test_a_whole_trail_is_whole_and_can_be_read(trail, station):
@@ -162,7 +164,7 @@ def test_the_station_writes_to_the_same_trail_as_a_command_beside_it(trail, fold
                 AuditEntry("plc", "plc", "test.done", "b"), AuditEntry("plc", "plc", "test.done", "c")
             )
             assert (first.seq, second.seq, third.seq) == (1, 3, 4)
-            with pytest.raises(BadRecordError, match="who: expected one printable line"):
+            with pytest.raises(BadRecordError, check=because(messages.AUDIT_WORD)):
                 await records.audit(AuditEntry(" ", "plc", "test.done", "d"))
         finally:
             await records.close()
@@ -195,7 +197,7 @@ def test_an_anchor_that_is_none_is_bad_input(trail, station, anchor):
 
 @pytest.mark.parametrize("values", [{"who": "a\nb"}, {"role": ""}, {"action": "x" * 65}, {"reason": "\x1b[2J"}])
 def test_a_malformed_entry_is_refused(trail, station, values):
-    with pytest.raises(BadRecordError, match="audit:"):
+    with pytest.raises(BadRecordError, check=because(messages.AUDIT_WORD, messages.AUDIT_TEXT)):
         trail(1, **values)
 
 

@@ -219,7 +219,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
                 InspectionRecord(
                     outcome=verdict.outcome,
                     reasons=() if verdict.outcome == "PASS" else tuple(map(str, verdict.reasons)),
-                    explanation=tuple(finding.sentence for finding in verdict.findings),
+                    explanation=tuple(finding.message for finding in verdict.findings),
                     late=False,
                     partial=verdict.partial,
                     area_mm2=None if deciding is None else deciding.area_mm2,

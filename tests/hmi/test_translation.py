@@ -22,7 +22,7 @@ from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
-from station.messages import arm, camera, gripper
+from station.messages import arm, camera, gripper, judge
 from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
@@ -47,19 +47,10 @@ COMPOSED = {
         "recipe {}: it was changed since {} was looked at, to {}",
         "; look at it as it is now and",
     ),
-    "sentence.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
-    "sentence.stopped_growth": (
-        "No further step was made at {} mm of closing",
-        ": the area grows by {} mm² a millimetre,",
-    ),
     "sentence.verification_old": (
         " h old, at most {} h are allowed",
         "The last verification is {}: verify with the ball",
     ),
-    "sentence.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
-    "sentence.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
-    "sentence.growth_near": ("closing the area grows by {} ± {} mm² a millimetre, ", "which may be "),
-    "sentence.growth_over": ("closing the area grows by {} ± {} mm² a millimetre, ", "over the limit of {}."),
 }
 """What the station puts together of several."""
 NO_PAGES = {
@@ -161,18 +152,33 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
         ("es", "Lot B-7 cannot begin: an inspection is under way. No recipe is active: choose one by its number (1).",
          "El lote B-7 no puede empezar: hay una inspección en curso. No hay receta activa: elija una (1)."),
         ("es", "No recipe is active: choose one by its number (1, 2).", "No hay receta activa: elija una (1, 2)."),
-        ("es", "The area at 3.0 mm of closing is at least 61.2 mm²; the limit is 45 mm²: it is over the limit.",
-         "El área a 3,0 mm de cierre es de al menos 61,2 mm²; el límite es 45 mm²: está por encima del límite."),
-        ("de", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for a strawberry of 48 mm is 117.4 mm².",
-         "Die Fläche bei 3 mm Schließweg ist 131,0 ± 7,2 mm²; die Grenze für strawberry von 48 mm ist 117,4 mm²."),
-        ("es", "The PLC gave a length of 26.0 mm, and the fruit is 35.0 mm wide: that is another fruit's size.",
-         "El PLC indicó una longitud de 26,0 mm, y la fruta mide 35,0 mm de ancho: ese es el tamaño de otra fruta."),
         ("de", "the <arm> is away", '<span lang="en">the &lt;arm&gt; is away</span>'),
         ("de", "", ""),
     ],
 )  # fmt: skip
 def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
     assert Locale(language).sentence(english) == said
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for Strawberry of 48.0 mm is 117.4 mm²."),
+        ("de",
+         "Die Fläche bei 3 mm Schließweg ist 131,0 ± 7,2 mm²; die Grenze für Strawberry von 48,0 mm ist 117,4 mm²."),
+        ("es", "El área a 3 mm de cierre es de 131,0 ± 7,2 mm²; el límite para Strawberry de 48,0 mm es 117,4 mm²."),
+    ],
+)  # fmt: skip
+def test_what_the_judge_found_is_said_in_the_language_of_the_page(language, said):
+    limit = judge.LIMIT_OF_LENGTH(fruit="Strawberry", length_mm=48.0, limit_mm2=117.4)
+    found = judge.AREA_AND_LIMIT(closing_mm=3.0, area_mm2=131.0, uncertainty_mm2=7.2, limit=limit)
+    assert Locale(language).sentence(found) == said
+
+
+def test_words_that_are_not_the_stations_are_marked_as_english_on_other_pages():
+    said = verbatim("The <area> of a record of before.")
+    assert Locale("en").sentence(said) == "The <area> of a record of before."
+    assert Locale("de").sentence(said) == '<span lang="en">The &lt;area&gt; of a record of before.</span>'
 
 
 @pytest.mark.parametrize(

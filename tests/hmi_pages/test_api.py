@@ -66,6 +66,9 @@ def test_results_are_found_by_their_reason_and_told_whole(orchard: Any, api: Any
     whole = api("GET", f"/api/v1/inspections/{soft.sequence}", token=reading).body
     assert whole["outcome"] == soft.outcome
     assert whole["reasons"] == [str(reason) for reason in soft.reasons]
+    assert [each["text"] for each in whole["messages"]] == whole["explanation"]
+    assert {each["id"].partition(".")[0] for each in whole["messages"]} == {"judge"}
+    assert all(each["parameters"] for each in whole["messages"])
     assert len(whole["curve"]) >= 3
     assert whole["recipe"] == "strawberry"
     assert (whole["fruit_length_mm"], whole["size_class"]) == (48.0, 3)

@@ -1,6 +1,8 @@
 """The pages Recipes, History and Maintenance, as people use them in a real browser."""
 
+import json
 import re
+import sqlite3
 from collections.abc import Callable
 from typing import Any
 
@@ -8,8 +10,10 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
+from hmi.roles import Role
 from hmi.translation import Locale
 from station.channel.panel_queries import AuditRows, ReadAudit
+from station.records.database import FILE_NAME, records_folder
 from station.settings.hmi import LANGUAGES, Language
 from station.settings.recipe import load_recipes
 
@@ -163,6 +167,34 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     assert pictures.count() >= 8
     sizes = pictures.evaluate_all("all => Promise.all(all.map(each => each.decode().then(() => each.naturalWidth)))")
     assert all(size == 480 for size in sizes)
+
+
+def test_why_a_fruit_was_diverted_is_said_in_german(orchard: Any, panel: Any) -> None:
+    page = panel("", locale="de").go(f"/history/{orchard.soft.sequence}")
+    why = page.locator("section[aria-labelledby=why]")
+    expect(why).to_contain_text("mm Schließweg")
+    assert why.locator("[lang=en]").count() == 0
+
+
+def test_a_record_of_before_messages_is_shown_in_english_and_marked(
+    orchard: Any, panel: Any, api: Any, token_of: Any
+) -> None:
+    told, number = "The area at 3 mm of closing was over the limit.", orchard.fruit[0].sequence
+    database = sqlite3.connect(records_folder(orchard.home) / FILE_NAME, timeout=60)
+    (before,) = database.execute("SELECT explanation FROM inspections WHERE sequence = ?", (number,)).fetchone()
+    change = "UPDATE inspections SET explanation = ? WHERE sequence = ?"
+    try:
+        with database:
+            database.execute(change, (json.dumps([told]), number))
+        page = panel("", locale="de").go(f"/history/{number}")
+        expect(page.locator("section[aria-labelledby=why] p [lang=en]")).to_have_text(told)
+        whole = api("GET", f"/api/v1/inspections/{number}", token=token_of("before", Role.VIEWER)).body
+        assert whole["explanation"] == [told]
+        assert whole["messages"] == [{"id": "text.verbatim", "parameters": {"text": told}, "text": told}]
+    finally:
+        with database:
+            database.execute(change, (before, number))
+        database.close()
 
 
 def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orchard: Any, panel: Any) -> None:

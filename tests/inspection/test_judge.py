@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Flag, Measured, Press
+from station.messages import judge as messages
+from station.messages.message import SENTENCES
 from station.settings.recipe import load_recipe
 from station.settings.recipe_model import Recipe
 from station.vision.contact import Flag as MeasurementFlag
@@ -82,9 +84,7 @@ def test_a_full_field_after_the_last_threshold_spares_a_sound_fruit_and_passes_i
     assert verdict.outcome == "PASS"
     assert verdict.partial
     assert verdict.stopped
-    assert verdict.stopped.sentence == (
-        "No further step was made at 7.0 mm of closing: the area, 191.0 mm², is over the early stop's 190 mm²."
-    )
+    assert verdict.stopped.message == messages.STOPPED_AREA(closing_mm=7.0, area_mm2=191.0, limit_mm2=190.0)
     assert verdict.areas[-1].area_mm2 is None
 
 
@@ -94,9 +94,14 @@ def test_a_soft_fruit_fails_with_value_limit_and_closing():
     assert verdict.reasons == (Reason.GROWTH_OVER_LIMIT, Reason.EARLY_STOP)
     growth = verdict.findings[0]
     assert (growth.value, growth.limit, growth.closing_mm) == (pytest.approx(48), 41, 4)
-    assert growth.sentence == (
-        "From 2.0 to 4.0 mm of closing the area grows by 48.0 ± 6.8 mm² a millimetre, over the limit of 41."
-    )
+    assert growth.message.id == messages.GROWTH_OVER.id
+    assert growth.message.parameters == {
+        "from_mm": 2.0,
+        "to_mm": 4.0,
+        "growth": pytest.approx(48),
+        "uncertainty": pytest.approx(6.8, abs=0.05),
+        "limit": 41,
+    }
 
 
 def test_an_early_stop_before_the_threshold_proves_the_area_over_it():
@@ -104,7 +109,10 @@ def test_an_early_stop_before_the_threshold_proves_the_area_over_it():
     verdict = judge(Press(35.0, 0.2, points), STRAWBERRY)
     assert verdict.outcome == "FAIL"
     assert Reason.AREA_OVER_LIMIT in verdict.reasons
-    assert "is at least 197.7 mm²; the limit is 165 mm²: it is over the limit." in verdict.findings[0].sentence
+    over = verdict.findings[0].message
+    assert over.id == messages.AREA_OVER.id
+    assert over.parameters["area_mm2"] == pytest.approx(197.7, abs=0.05)
+    assert over.parameters["limit"] == messages.LIMIT(limit_mm2=165.0)
     assert verdict.deciding == points[-1]
 
 
@@ -126,19 +134,19 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, reason):
 
 
 @pytest.mark.parametrize(
-    ("flag", "reason"),
+    ("flag", "reason", "said"),
     [
-        (Flag.NO_CONTACT, Reason.CONTACT_LOST),
-        (Flag.UNDECIDED, Reason.LOW_CONFIDENCE),
-        (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER),
-        (Flag.SATURATED, Reason.SATURATED),
-        (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD),
+        (Flag.NO_CONTACT, Reason.CONTACT_LOST, messages.CONTACT_LOST),
+        (Flag.UNDECIDED, Reason.LOW_CONFIDENCE, messages.NO_EDGE),
+        (Flag.CUT_BY_BORDER, Reason.CUT_BY_BORDER, messages.CUT_BY_BORDER),
+        (Flag.SATURATED, Reason.SATURATED, messages.SATURATED),
+        (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD, messages.REFERENCE_MISMATCH),
     ],
 )
-def test_a_step_that_is_not_trusted_is_no_pass(flag, reason):
+def test_a_step_that_is_not_trusted_is_no_pass(flag, reason, said):
     verdict = judge(spoilt(pressed(20), 3.0, flag), STRAWBERRY)
     assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (reason,))
-    assert "At 3.0 mm of closing" in verdict.findings[0].sentence
+    assert verdict.findings[0].message == said(closings=[messages.CLOSING(closing_mm=3.0)])
     # Beyond the last damage threshold, and on a light touch, it is no criterion.
     for closing in (1.0, 9.0):
         assert judge(spoilt(pressed(15), closing, flag), STRAWBERRY).outcome == "PASS"
@@ -177,7 +185,9 @@ def test_it_does_not_where_it_may_be_over_the_limit_itself_or_the_onset_was_too_
 def test_a_confidence_that_is_low_or_unknown_is_no_pass(confidence):
     verdict = judge(spoilt(pressed(20), 4.0, confidence=confidence), STRAWBERRY)
     assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
-    assert "0.5 is asked for" in verdict.findings[0].sentence
+    said = verdict.findings[0].message
+    assert said.id == (messages.NO_CONFIDENCE if confidence is None else messages.LOW_CONFIDENCE).id
+    assert (said.parameters.get("confidence"), said.parameters["least"]) == (confidence, 0.5)
 
 
 def test_a_contact_cut_by_the_border_is_a_lower_bound():
@@ -193,7 +203,7 @@ def test_a_contact_whose_edge_was_lost_proves_a_fail_and_never_carries_a_pass():
     assert Reason.AREA_OVER_LIMIT in verdict.reasons
     spoiled = judge(spoilt(pressed(20), 4.0, Flag.LOWER_BOUND), STRAWBERRY)
     assert (spoiled.outcome, spoiled.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
-    assert "the contact is at least as large as its area" in spoiled.findings[0].sentence
+    assert spoiled.findings[0].message.id == messages.EDGE_LOST.id
 
 
 @pytest.mark.parametrize("flag", [Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND])
@@ -229,7 +239,8 @@ def test_a_contact_that_is_lost_or_does_not_rise_is_no_result():
     assert {Reason.CONTACT_LOST, Reason.AREA_NOT_RISING} <= set(lost.reasons)
     fallen = judge(spoilt(pressed(20), 4.0, area_mm2=30.0), STRAWBERRY)
     assert (fallen.outcome, fallen.reasons) == ("NO_RESULT", (Reason.AREA_NOT_RISING,))
-    assert "4.0 mm (30.0 mm²) does not fit the other steps" in fallen.findings[0].sentence
+    points = [messages.POINT(closing_mm=4.0, area_mm2=30.0)]
+    assert fallen.findings[0].message == messages.NOT_RISING(points=points, number=1)
 
 
 def test_one_step_that_does_not_fit_the_others_proves_nothing():
@@ -242,7 +253,8 @@ def test_an_onset_seen_too_soon_does_not_make_a_soft_fruit_pass():
     late = Press(37.0, 0.4, tuple(point(float(c), max(0.5, 34.0 * (c - 2))) for c in range(7)))
     verdict = judge(late, STRAWBERRY)
     assert verdict.outcome == "NO_RESULT"
-    assert "rises as if the contact had begun at 2.0 mm" in verdict.findings[0].sentence
+    assert verdict.findings[0].message.id == messages.LATE_ONSET.id
+    assert verdict.findings[0].message.parameters["begins_mm"] == pytest.approx(2.0, abs=0.05)
 
 
 def test_nothing_touched_and_a_wrong_fruit():
@@ -252,7 +264,8 @@ def test_nothing_touched_and_a_wrong_fruit():
         wrong = judge(pressed(48, onset_mm=width), STRAWBERRY)
         assert wrong.outcome == "NO_RESULT"
         assert Reason.OUT_OF_RANGE in wrong.reasons
-        assert "Strawberry is meant for 22 to 53 mm" in " ".join(finding.sentence for finding in wrong.findings)
+        said = messages.WRONG_WIDTH(width_mm=width, recipe="Strawberry", smallest_mm=22.0, largest_mm=53.0)
+        assert said in [finding.message for finding in wrong.findings]
 
 
 @pytest.mark.parametrize("reason", [Reason.LATE, Reason.CALLED_OFF, Reason.CAMERA_FAULT, Reason.REFERENCE_BAD])
@@ -266,7 +279,7 @@ def test_an_interruption_is_no_result_whatever_was_measured(reason):
 def test_steps_that_end_for_no_reason_are_not_taken_for_a_pass():
     short = judge(pressed(20, to_mm=6), STRAWBERRY)
     assert (short.outcome, short.reasons) == ("NO_RESULT", (Reason.INTERNAL_FAULT,))
-    assert "ended at 6.0 mm of closing, before 12 mm" in short.findings[0].sentence
+    assert short.findings[0].message == messages.STEPS_ENDED(reached_mm=6.0, wanted_mm=12.0)
     missing = judge(pressed(20, to_mm=3, interruptions=(Reason.GRIPPER_FAULT,)), STRAWBERRY)
     assert missing.reasons == (Reason.GRIPPER_FAULT,), "what ended the steps is known: no fault of the program"
     assert missing.partial
@@ -276,9 +289,22 @@ def test_steps_that_end_for_no_reason_are_not_taken_for_a_pass():
 def test_the_closing_limit_ends_the_steps():
     press = pressed(15)
     assert early_stop(press, STRAWBERRY) is None
-    finding = early_stop(replace(press, points=(*press.points, point(12.5, 190.0))), STRAWBERRY)
-    assert finding
-    assert "closing limit of 12.5 mm" in finding.sentence
+    stop = early_stop(replace(press, points=(*press.points, point(12.5, 190.0))), STRAWBERRY)
+    assert stop
+    assert stop.message == messages.STOPPED_CLOSING(closing_mm=12.5, limit_mm=12.5)
+
+
+def test_a_stop_before_a_limit_says_that_the_area_there_is_unknown():
+    points = tuple(point(float(c), 24.0 * c, Flag.CUT_BY_BORDER) for c in range(3))
+    recipe = STRAWBERRY.model_copy(update={"early_stop": STRAWBERRY.early_stop.model_copy(update={"area_mm2": 40.0})})
+    verdict = judge(Press(35.0, 1.0, points), recipe)
+    (why,) = [finding.message for finding in verdict.findings if finding.reason == Reason.EARLY_STOP]
+    assert why == SENTENCES(
+        sentences=[
+            messages.STOPPED_AREA(closing_mm=2.0, area_mm2=48.0, limit_mm2=40.0),
+            messages.AREA_UNKNOWN(closing_mm=4.0),
+        ]
+    )
 
 
 def test_steps_that_share_a_closing_are_one_of_the_least_trust():
@@ -382,6 +408,10 @@ def test_the_unit_of_the_areas_does_not_matter(press, recipe, factor):
     assert (there.outcome, there.reasons, there.partial) == (here.outcome, here.reasons, here.partial)
 
 
+NO_LIMIT = {messages.STOPPED_UNTRUSTED.id}
+"""Of a press that is not trusted, whatever its value."""
+
+
 @given(PRESSES, RECIPES)
 def test_every_verdict_explains_itself(press, recipe):
     verdict = judge(press, recipe)
@@ -389,10 +419,11 @@ def test_every_verdict_explains_itself(press, recipe):
     if verdict.outcome == "FAIL":
         assert any(finding.proves for finding in verdict.findings)
     for finding in verdict.findings:
-        assert finding.sentence[0].isupper()
-        assert finding.sentence.endswith(".")
-        if finding.limit is not None and finding.value is not None:
-            assert any(f"{finding.limit:{form}}" in finding.sentence for form in ("g", ".1f"))
+        said = str(finding.message)
+        assert said[0].isupper()
+        assert said.endswith(".")
+        if finding.limit is not None and finding.value is not None and finding.message.id not in NO_LIMIT:
+            assert any(f"{finding.limit:{form}}" in said for form in ("g", ".1f"))
     assert early_stop(press, recipe) == verdict.stopped
 
 
@@ -436,11 +467,11 @@ def steps_made(growth: float, *flags: Flag, recipe: Recipe = DECIDING, **changes
 @pytest.mark.parametrize(
     ("growth", "flags", "changes", "outcome", "last_mm", "why"),
     [
-        (20, (), {}, "PASS", 4, "every limit is kept"),
-        (40, (), {}, "NO_RESULT", 4, "the fruit cannot pass any more"),
-        (20, (Flag.CUT_BY_BORDER,), {}, "NO_RESULT", 4, "the fruit cannot pass any more"),
-        (60, (), {}, "FAIL", 3, "the fruit is damaged"),
-        (20, (), {"onset_mm": 60.0}, "NO_RESULT", 0, "this cannot become a result any more"),
+        (20, (), {}, "PASS", 4, messages.STOPPED_KEPT),
+        (40, (), {}, "NO_RESULT", 4, messages.STOPPED_CANNOT_PASS),
+        (20, (Flag.CUT_BY_BORDER,), {}, "NO_RESULT", 4, messages.STOPPED_CANNOT_PASS),
+        (60, (), {}, "FAIL", 3, messages.STOPPED_DAMAGED),
+        (20, (), {"onset_mm": 60.0}, "NO_RESULT", 0, messages.STOPPED_VOID),
     ],
 )
 def test_no_step_is_made_that_could_not_change_the_outcome(growth, flags, changes, outcome, last_mm, why):
@@ -452,7 +483,7 @@ def test_no_step_is_made_that_could_not_change_the_outcome(growth, flags, change
     assert (press.points[-1].closing_mm, verdict.partial) == (last_mm, last_mm < 4)
     assert verdict.stopped
     assert verdict.stopped.finding is None
-    assert why in verdict.stopped.sentence
+    assert verdict.stopped.message == why(closing_mm=last_mm)
     assert not {Reason.EARLY_STOP, Reason.INTERNAL_FAULT} & set(verdict.reasons)
 
 
@@ -484,7 +515,7 @@ def test_a_doubtful_onset_does_not_press_a_fruit_on_to_the_early_stop():
     assert early_stop(late(3), DECIDING) is None
     stop = early_stop(late(4), DECIDING)
     assert stop is not None
-    assert "cannot pass any more" in stop.sentence
+    assert stop.message.id == messages.STOPPED_CANNOT_PASS.id
     # An excused step may hide where the onset was; one more step tells, and a third tells nothing new.
     hides = {"confidence": 0.1, "area_mm2": 60.0}
     assert early_stop(late(5, **hides), DECIDING) is not None

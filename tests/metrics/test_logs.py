@@ -13,8 +13,8 @@ from station.channel.line import Reason
 from station.devices.gripper.errors import GripperFaultError
 from station.logs import configure_logging, inspecting
 from station.messages import gripper as messages
-from station.messages.message import Message
-from station.service.log_line import fruit_line
+from station.messages.message import Message, verbatim
+from station.service.log_line import log_fruit
 
 
 @pytest.fixture
@@ -145,12 +145,17 @@ def test_lines_for_a_person(logged):
     assert not line.startswith("{")
 
 
-def test_one_line_a_fruit(outcome):
-    areas = [0.0, 10.0, None, 31.5]
-    assert fruit_line(outcome, "strawberry", (), areas) == (
-        "fruit 4711  trigger 12  strawberry  ▁▃·█  PASS  31.5 mm² at 4.0 mm  3.21 s"
-    )
+def test_one_line_a_fruit(outcome, caplog):
+    log, areas = logging.getLogger("fruit"), [0.0, 10.0, None, 31.5]
+    caplog.set_level(logging.INFO)
+    log_fruit(log, outcome, "strawberry", (), areas)
     late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "closing_mm": None}
-    assert fruit_line(outcome.model_copy(update=late), "", ("the deadline of 8 s was over",), []) == (
-        "fruit 4711  trigger 12  no recipe  -  NO_RESULT  no area  3.21 s  late  the deadline of 8 s was over"
-    )
+    why = (verbatim("The deadline of 8 s was over."), verbatim("Nothing was measured."))
+    log_fruit(log, outcome.model_copy(update=late), "", why, [])
+    log_fruit(log, outcome.model_copy(update=late), "", (), [])
+    begins = "fruit 4711  trigger 12  no recipe  -  NO_RESULT  no area  3.21 s  late"
+    assert caplog.messages == [
+        "fruit 4711  trigger 12  strawberry  ▁▃·█  PASS  31.5 mm² at 4.0 mm  3.21 s",
+        f"{begins}  The deadline of 8 s was over. Nothing was measured.",
+        f"{begins}  late",
+    ]

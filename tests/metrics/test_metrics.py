@@ -46,7 +46,7 @@ def everything_told(metrics, outcome):
     metrics.waiting(3)
     metrics.restarted("plc")
     metrics.ready(ready=True)
-    status = Status(9, {"disk_full": 2}, 1, 2, {"kept": 5, "dropped": 1}, 1000, 2000, 3000, 0.5, "")
+    status = Status(9, {"disk_full": 2}, 1, 2, {"kept": 5, "dropped": 1}, 1000, 2000, 3000, 0.5, None)
     metrics.watch_records(lambda: status)
     metrics.watch_calibration(lambda: (86_400.0, 60.0, -0.02))
     told = DestinationStatus(connected=False, told=7, refused=1, waiting=12, oldest_utc_ms=5, error="away")
@@ -127,12 +127,12 @@ def test_what_is_not_known_is_absent_and_not_nought(metrics):
     found = scraped(metrics)
     assert ("station_reference_age_seconds",) not in found
     assert not [key for key in found if key[0] == "station_link_age_seconds"]
-    metrics.watch_records(lambda: Status(0, {}, 0, 0, {}, 0, 0, 0, None, ""))
+    metrics.watch_records(lambda: Status(0, {}, 0, 0, {}, 0, 0, 0, None, None))
     assert ("station_records_last_write_age_seconds",) not in scraped(metrics)
 
 
 def test_what_may_be_counted_is_there_before_it_happens(metrics):
-    metrics.watch_records(lambda: Status(0, {"disk_full": 2}, 0, 0, {}, 0, 0, 0, None, ""))
+    metrics.watch_records(lambda: Status(0, {"disk_full": 2}, 0, 0, {}, 0, 0, 0, None, None))
     found = scraped(metrics)
     for alarm, row in ALARMS.items():
         assert found["station_alarms_active", ("id", alarm), ("priority", row.priority)] == 0

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from station.cli import cli
+from station.messages.judge import AREA_OVER, LIMIT, STOPPED_KEPT
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
@@ -84,7 +85,7 @@ def passed() -> InspectionRecord:
     return InspectionRecord(
         outcome="PASS",
         reasons=(),
-        explanation=("every area was below its limit",),
+        explanation=(STOPPED_KEPT(closing_mm=4.0),),
         late=False,
         partial=False,
         area_mm2=31.5,
@@ -107,7 +108,7 @@ def failed(passed: InspectionRecord) -> InspectionRecord:
         passed,
         outcome="FAIL",
         reasons=("area_over_limit", "early_stop"),
-        explanation=("170.0 mm² at 4 mm of closing, the limit is 165.0 mm²",),
+        explanation=(AREA_OVER(closing_mm=4.0, area_mm2=170.0, limit=LIMIT(limit_mm2=165.0)),),
         area_mm2=170.0,
         partial=True,
     )

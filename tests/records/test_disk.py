@@ -17,6 +17,8 @@ from click.testing import CliRunner
 from sqlalchemy import event
 
 from station.cli import cli
+from station.messages import records as messages
+from station.messages.message import verbatim
 from station.records.database import FILE_NAME, open_engine
 from station.records.errors import (
     DamagedError,
@@ -31,6 +33,7 @@ from station.records.high_water_mark import HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
 from station.records.open import MARK_NAME
 from station.records.records import Records
+from tests.records.causes import because
 
 
 def bulky(trigger: Trigger, size_bytes: int) -> Trigger:
@@ -57,17 +60,17 @@ def test_a_full_disk_refuses_and_takes_again_when_there_is_space(opened, scenari
             sequence = await records.begin(trigger)
             filler = small_disk / "filler"
             fill(filler)
-            with pytest.raises(DiskFullError, match="less than the reserve"):
+            with pytest.raises(DiskFullError, check=because(messages.RESERVE_REACHED)):
                 await records.begin(trigger)
-            large = replace(passed, explanation=("x" * 8_000_000,))
-            with pytest.raises(DiskFullError, match="the disk is full"):
+            large = replace(passed, explanation=(verbatim("x" * 8_000_000),))
+            with pytest.raises(DiskFullError, check=because(messages.DISK_FULL)):
                 await records.conclude(sequence, large)
             assert records.status().failures["disk_full"] == 2
-            assert "the disk is full" in records.status().error
+            assert records.status().error.parameters["cause"].id == messages.DISK_FULL.id
             filler.unlink()
             assert (await records.conclude(sequence, passed)).outcome == "PASS"
             assert await records.begin(trigger) > sequence
-            assert records.status().error == ""
+            assert records.status().error is None
 
     scenario(steps)
 
@@ -99,7 +102,7 @@ def test_a_file_size_limit_is_told_and_nothing_is_lost(opened, scenario, trigger
             before = resource.getrlimit(resource.RLIMIT_FSIZE)
             resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, before[1]))
             try:
-                with pytest.raises(RecordsError, match="the disk"):
+                with pytest.raises(RecordsError, check=because(messages.DISK_FULL, messages.DISK_FAILED)):
                     await begin_many(records, (bulky(trigger, 40_000) for _ in range(100)))
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -120,7 +123,7 @@ def test_a_read_only_disk_is_told(opened, scenario, trigger, passed, small_disk)
         async with opened(small_disk) as records:
             await records.begin(trigger)
         remount("ro")
-        with pytest.raises(ReadOnlyError, match="cannot be written"):
+        with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
             async with opened(small_disk):
                 pass
         remount("rw")
@@ -134,7 +137,7 @@ def test_a_database_that_becomes_read_only_is_told_and_got_over(opened, scenario
     async def steps():
         async with opened() as records:
             await _run_in_writer(records, lambda connection: connection.exec_driver_sql("PRAGMA query_only = 1"))
-            with pytest.raises(ReadOnlyError, match="readonly"):
+            with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
                 await records.begin(trigger)
             assert await records.begin(trigger), "the next one has a new connection"
             assert records.status().failures == {"read_only": 1}
@@ -155,7 +158,7 @@ def test_something_else_in_the_place_of_the_records_is_told(opened, scenario, fo
         place.write_text("a file")
 
     async def steps():
-        with pytest.raises(RecordsError, match="move it away, or set another home"):
+        with pytest.raises(RecordsError, check=because(messages.FILE_OR_FOLDER)):
             async with opened():
                 pass
 
@@ -167,7 +170,7 @@ def test_a_locked_database_is_told_and_waits_for_nobody_for_ever(opened, scenari
         async with opened() as records:
             other = sqlite3.connect(folder / FILE_NAME, isolation_level=None)
             other.execute("BEGIN IMMEDIATE")
-            with pytest.raises(LockedError, match="another program holds the database"):
+            with pytest.raises(LockedError, check=because(messages.LOCKED)):
                 await records.begin(trigger)
             other.execute("ROLLBACK")
             other.close()
@@ -183,7 +186,7 @@ def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
             waiting = asyncio.create_task(_run_in_writer(records, lambda _: gate.wait(30)))
             await asyncio.sleep(0)
             under_way = asyncio.create_task(records.begin(trigger))
-            with pytest.raises(RecordsDeadlineError, match="it within"):
+            with pytest.raises(RecordsDeadlineError, check=because(messages.TOO_SLOW)):
                 await under_way
             gate.set()
             await waiting
@@ -207,7 +210,7 @@ def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario
         async with opened(deadline_s=0.2) as records:
             with monkeypatch.context() as patch:
                 patch.setattr(HighWaterMark, "save", slowly)
-                with pytest.raises(RecordsDeadlineError, match="it within"):
+                with pytest.raises(RecordsDeadlineError, check=because(messages.TOO_SLOW)):
                     await records.begin(trigger)
                 closing = asyncio.create_task(records.close())
                 while records._opened is not None and not records._opened.writer._closed:
@@ -273,9 +276,9 @@ def test_a_damaged_database_is_moved_aside_and_the_numbers_go_on(
         async with opened() as records:
             (notice,) = records.notices
             assert notice.code == "damaged"
-            assert "after number 3" in notice.cause
+            assert (notice.cause.id, notice.cause.parameters["number"]) == (messages.BEGUN_ANEW.id, 3)
             (aside,) = (folder / "aside").iterdir()
-            assert str(aside) in notice.remedy
+            assert notice.remedy == messages.RECOVER_OLD(folder=str(aside))
             assert (aside / FILE_NAME).exists()
             assert len(list((aside / "images").glob("*/*.png"))) == 3, "their images are evidence"
             assert await records.begin(trigger) == 4
@@ -297,11 +300,11 @@ def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(
             for file in folder.glob(f"{FILE_NAME}*"):
                 file.unlink()
             for _ in range(2):
-                with pytest.raises(DamagedError, match="was removed or replaced"):
+                with pytest.raises(DamagedError, check=because(messages.REMOVED)):
                     await records.begin(trigger)
             await records.reopen()
             (notice,) = records.notices
-            assert "there was none, though" in notice.cause
+            assert notice.cause.id == messages.MISSING_DATABASE.id
             assert len(list(folder.glob("aside/*/images/*/*.png"))) == 1, "no images are taken for orphans"
             assert await records.published(outcome), "what only the interface still knows is taken from it"
             full = await records.inspection(sequence)
@@ -335,7 +338,7 @@ def test_numbers_are_refused_when_nothing_tells_which_were_given(opened, scenari
             assert await records.begin(trigger) == 1
         (folder / FILE_NAME).write_bytes(b"nothing" * 5000)
         (folder / MARK_NAME).write_bytes(b"\0" * 40)
-        with pytest.raises(SequenceError, match="continue-after"):
+        with pytest.raises(SequenceError, check=because(messages.NUMBERS_UNKNOWN)):
             async with opened():
                 pass
         assert not (folder / "aside").exists(), "nothing was changed"

@@ -1,14 +1,14 @@
-"""What a record keeps of a judgement: the sentence, the fruit's limits, and the budget, read back as a table."""
+"""What a record keeps of a judgement: the fruit's limits, and the budget, read back as a table."""
 
 import pytest
 
 from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.inspection.judge import judge
+from station.messages.judge import AREA_AND_LIMIT, LIMIT_OF_LENGTH
 from station.records.judgement import (
     budget_rows,
     is_judgement,
     judgement_measures,
-    judgement_sentence,
     limit_factor,
 )
 from tests.inspection.test_sized_limits import RECIPE, pressed, recipe_with
@@ -17,10 +17,12 @@ from tests.inspection.test_sized_limits import RECIPE, pressed, recipe_with
 def test_a_budget_is_kept_and_read_back_as_its_table():
     verdict = judge(pressed(80, FruitSize(48.0)), RECIPE)
     kept = judgement_measures(verdict)
-    assert judgement_sentence(kept) == verdict.summary
-    assert verdict.summary == (
-        "The area at 3 mm of closing is 80.0 ± 4.2 mm²; the limit for a strawberry of 48 mm is 115.7 mm²."
-    )
+    assert verdict.summary
+    assert verdict.summary.id == AREA_AND_LIMIT.id
+    limit = LIMIT_OF_LENGTH(fruit="Strawberry", length_mm=48.0, limit_mm2=100 * (48 / 40) ** 0.8)
+    assert verdict.summary.parameters == {
+        "closing_mm": 3.0, "area_mm2": 80.0, "uncertainty_mm2": pytest.approx(4.2, abs=0.05), "limit": limit
+    }  # fmt: skip
     assert limit_factor(kept) == pytest.approx((48 / 40) ** 0.8, abs=1e-5)
     rows = dict(budget_rows(kept))
     assert list(rows)[-2:] == ["combined", "guard band, 1.64 times that"]
@@ -31,8 +33,9 @@ def test_a_budget_is_kept_and_read_back_as_its_table():
 
 
 def test_nothing_is_kept_where_the_limit_is_not_known_and_records_of_before_have_none():
-    assert judgement_measures(judge(pressed(80, NO_SIZE), RECIPE)) == {}
-    assert (judgement_sentence({}), list(budget_rows({})), limit_factor({})) == ("", [], 1.0)
+    without = judge(pressed(80, NO_SIZE), RECIPE)
+    assert (without.summary, judgement_measures(without)) == (None, {})
+    assert (list(budget_rows({})), limit_factor({})) == ([], 1.0)
     plain = judgement_measures(judge(pressed(80, NO_SIZE), recipe_with(without_size="plain_limit")))
     assert limit_factor(plain) == 1.0
     assert "limit_factor" not in plain

@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import pytest
 
+from station.messages import records as messages
 from station.records.backup import MANIFEST_NAME, make_backup
 from station.records.database import FILE_NAME
 from station.records.errors import DamagedError, DiskFullError, LockedError, RecordsError
 from station.records.holds import hold, release
 from station.records.integrity_check import check_records
 from station.records.restore import restore_backup
+from tests.records.causes import because
 
 
 @pytest.fixture
@@ -77,12 +79,12 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
             await writing
             assert 3 <= made.inspections <= 13
             assert made.notes == ()
-            with pytest.raises(LockedError, match="stop that one"):
+            with pytest.raises(LockedError, check=because(messages.ANOTHER_STATION)):
                 await asyncio.to_thread(restore_backup, folder, copy, "ada")
         return made
 
     made = scenario(steps)
-    assert "is there already" in str(ask("backup", copy).exception)
+    assert ask("backup", copy).exception.cause == messages.THERE_ALREADY(path=str(copy))
     last = sqlite3.connect(folder / FILE_NAME).execute("SELECT max(sequence) FROM inspections").fetchone()[0]
     shutil.rmtree(folder / "images")
     said = ask("restore", copy, "--by", "ada")
@@ -115,7 +117,10 @@ def test_a_backup_that_is_not_whole_is_not_put_back(opened, scenario, inspected,
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(content)
     before = (folder / FILE_NAME).read_bytes()
-    with pytest.raises(DamagedError, match=r"take another backup|put back a backup"):
+    with pytest.raises(
+        DamagedError,
+        check=because(messages.OTHER_CONTENT, messages.BAD_FILE, messages.NOT_THE_VERIFIED, messages.IMAGE_MISSING),
+    ):
         restore_backup(folder, tmp_path / "copy", "ada")
     assert (folder / FILE_NAME).read_bytes() == before
     assert names(folder)
@@ -129,10 +134,10 @@ def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario,
                 await inspected(records, 1, noise(side_px=700))
 
     scenario(steps)
-    with pytest.raises(DiskFullError, match="bytes are free, the backup takes"):
+    with pytest.raises(DiskFullError, check=because(messages.NO_SPACE_FOR_BACKUP)):
         make_backup(folder, small_disk / "copy")
     assert list(small_disk.iterdir()) == []
-    with pytest.raises(RecordsError, match="is no backup"):
+    with pytest.raises(RecordsError, check=because(messages.NO_BACKUP)):
         restore_backup(folder, small_disk, "ada")
 
 

@@ -9,8 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.channel.line import Outcome, Reason
+from station.messages import records as messages
 from station.records.errors import BadRecordError, LockedError, RecordsClosedError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow
+from tests.records.causes import because
 
 
 def test_a_trigger_goes_its_way_from_begin_to_acknowledged(opened, scenario, trigger, failed):
@@ -275,7 +277,7 @@ def test_totals_count_what_the_plc_was_told(opened, scenario, trigger, passed, f
 def test_a_second_station_is_refused(opened, scenario):
     async def steps():
         async with opened():
-            with pytest.raises(LockedError, match="another station has it, process"):
+            with pytest.raises(LockedError, check=because(messages.ANOTHER_STATION)):
                 async with opened():
                     pass
         async with opened():

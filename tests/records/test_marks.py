@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from station.messages import records as messages
 from station.records.audit_report import read_audit
 from station.records.database import reading
 
@@ -41,6 +42,6 @@ def test_fruit_are_marked_good_and_bad_and_the_trail_tells_what_changed(three_fr
 def test_where_one_of_several_fruit_is_not_there_none_is_marked(three_fruit, ask):
     said = ask("mark", 1, 99, "bad")
     assert said.exit_code == 1
-    assert "there is no inspection 99" in str(said.exception)
+    assert said.exception.cause == messages.NO_INSPECTION(number=99)
     assert ask("marks").output == ""
     assert ask("mark", 1, "ripe").exit_code == 2

@@ -13,10 +13,16 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from station.inspection.fruit_size import FruitSize
+from station.messages import records as messages
+from station.messages.judge import AREA_UNKNOWN, CLOSING, CONTACT_LOST, NO_ONSET
+from station.messages.message import Message, joined, verbatim
+from station.outbox.feed import read_batch
 from station.records import database
 from station.records.database import FILE_NAME, MIGRATIONS, migrate, open_engine
 from station.records.errors import SchemaError
 from station.records.schema import metadata
+from station.records.stored_message import from_stored
+from tests.records.causes import because
 
 NEXT = """
 from alembic import op
@@ -155,12 +161,65 @@ def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, f
     assert [(row["fruit_length_mm"], row["size_class"]) for row in rows] == [("", ""), ("48.3", "3")]
 
 
+def test_records_from_before_messages_read_with_their_sentences(opened, scenario, folder, trigger, failed, ask):
+    area = (
+        "The area at 4 mm of closing is at least 170.0 mm²; the limit for a strawberry of 40 mm is 165 mm²: it is over."
+    )
+    judgement, first = "The area at 4 mm of closing is 170.0 ± 7.2 mm².", "At 4.0 mm of closing the contact was lost."
+    now = replace(
+        failed,
+        judgement=AREA_UNKNOWN(closing_mm=4.0),
+        first_press_findings=joined([CONTACT_LOST(closings=[CLOSING(closing_mm=3.0)]), NO_ONSET()]),
+    )
+
+    async def steps():
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), failed))
+        connection = sqlite3.connect(folder / FILE_NAME)
+        connection.execute(
+            "UPDATE inspections SET explanation = ?, measures = json_set(measures, '$.judgement', ?, "
+            "'$.first_press_findings', ?)",
+            (json.dumps([area]), judgement, first),
+        )
+        connection.execute("UPDATE alembic_version SET version_num = '0007'")
+        connection.commit()
+        connection.close()
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), now))
+            return [(await records.inspection(sequence)).judged for sequence in (1, 2)]
+
+    old, new = scenario(steps)
+    assert (old.explanation, old.judgement) == ((verbatim(area),), verbatim(judgement))
+    assert (old.first_press_findings, old.measures) == (verbatim(first), failed.measures)
+    assert (new.explanation, new.judgement, new.first_press_findings, new.measures) == (
+        now.explanation, now.judgement, now.first_press_findings, now.measures
+    )  # fmt: skip
+    for sequence, each in ((1, old), (2, new)):
+        said = ask("show", sequence).output
+        for message in (*each.explanation, each.judgement, each.first_press_findings):
+            assert str(message) in said
+        assert "judge." not in said
+    events = {event.data["sequence"]: event.data for event in read_batch(folder, "one", 0).events}
+    assert events[1]["explanation"] == [area]
+    assert events[1]["messages"] == [{"id": "text.verbatim", "parameters": {"text": area}}]
+    assert events[1]["measures"]["judgement"] == judgement
+    assert events[2]["explanation"] == [str(message) for message in now.explanation]
+    assert [Message.model_validate_json(json.dumps(each)) for each in events[2]["messages"]] == list(now.explanation)
+    assert events[2]["measures"]["first_press_findings"] == str(now.first_press_findings)
+
+
+def test_what_is_stored_and_is_no_message_is_shown_as_it_is():
+    assert from_stored({"id": "judge.late", "parameters": {"late": True}}) == verbatim(
+        '{"id": "judge.late", "parameters": {"late": true}}'
+    )
+
+
 def test_a_failed_migration_leaves_the_database_as_it_was(opened, scenario, folder, trigger, next_form, head):
     async def steps():
         async with opened() as records:
             await records.begin(trigger)
         next_form('op.execute("INSERT INTO nowhere VALUES (1)")')
-        with pytest.raises(SchemaError, match=rf"it is as it was.*; a copy of it is .*form-{head}"):
+        with pytest.raises(SchemaError, match=f"form-{head}", check=because(messages.NOT_MIGRATED)):
             async with opened():
                 pass
         assert query(folder / FILE_NAME, "SELECT version_num FROM alembic_version") == [(head,)]
@@ -180,7 +239,7 @@ def test_a_newer_form_is_left_alone(opened, scenario, folder, trigger, next_form
                 pass
         monkeypatch.setattr(database, "MIGRATIONS", MIGRATIONS)
         before = (folder / FILE_NAME).read_bytes()
-        with pytest.raises(SchemaError, match=r"form '9999' of a newer fruit-station; install that version again"):
+        with pytest.raises(SchemaError, match="9999", check=because(messages.NEWER_SCHEMA)):
             async with opened():
                 pass
         assert (folder / FILE_NAME).read_bytes() == before

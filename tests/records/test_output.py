@@ -10,10 +10,12 @@ from dataclasses import replace
 import pyarrow.parquet as pq
 import pytest
 
+from station.messages import records as messages
 from station.records import export as exporting
 from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
 from station.records.search import Query
+from tests.records.causes import because
 
 
 @pytest.fixture
@@ -62,7 +64,7 @@ def test_an_export_that_does_not_fit_leaves_the_file_as_it_was(history, folder, 
     with contextlib.suppress(OSError), (small_disk / "filler").open("wb", buffering=0) as filler:
         while True:
             filler.write(bytes(4096))
-    with pytest.raises(DiskFullError, match="the disk is full"):
+    with pytest.raises(DiskFullError, check=because(messages.DISK_FULL)):
         export(folder, Query(), target)
     assert target.read_text() == "the last one"
     assert list(small_disk.glob(".*")) == []

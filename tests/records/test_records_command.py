@@ -8,7 +8,10 @@ from dataclasses import replace
 import pytest
 
 from station.channel.line import Reason
-from station.records.texts import SENTENCES, sparkline
+from station.messages import records as messages
+from station.messages.message import definition
+from station.messages.reasons import reason_message
+from station.records.texts import sparkline
 from station.settings.recipe import find_recipe
 
 
@@ -33,13 +36,13 @@ def history(opened, scenario, trigger, passed, failed, noise, settled):
     scenario(steps)
 
 
-def test_a_rejected_fruit_is_explained(history, folder):
+def test_a_rejected_fruit_is_explained(history, failed, folder):
     environment = {**os.environ, "STATION_HOME": str(folder.parent)}
     command = [sys.executable, "-m", "station", "records", "show", "1"]
     said = subprocess.check_output(command, env=environment, text=True, timeout=100)
     assert "inspection 1: strawberry, FAIL" in said
-    assert "170.0 mm² at 4 mm of closing, the limit is 165.0 mm²" in said
-    assert f"area_over_limit: {SENTENCES[Reason.AREA_OVER_LIMIT]}" in said
+    assert f"  {failed.explanation[0]}\n" in said
+    assert f"area_over_limit: {reason_message(Reason.AREA_OVER_LIMIT)}" in said
     limit = find_recipe("strawberry").damage.area[0]
     assert f"fails above {limit.area_mm2:g} mm² at {limit.closing_mm:g} mm of closing" in said
     assert "▁▃▅▇█" in said
@@ -55,11 +58,11 @@ def test_what_the_plc_was_told_stands_beside_what_was_judged(history, ask):
     said = ask("show", 2).output
     assert "judged:       PASS, area 31.5 mm² (44500 px) at 4.02 mm of closing" in said
     assert "stands:       NO_RESULT" in said
-    assert f"called_off: {SENTENCES[Reason.CALLED_OFF]}" in said
+    assert f"called_off: {reason_message(Reason.CALLED_OFF)}" in said
 
 
 def test_a_lost_and_a_running_one_say_so(history, ask):
-    assert f"station_lost: {SENTENCES[Reason.STATION_LOST]}" in ask("show", 3).output
+    assert f"station_lost: {reason_message(Reason.STATION_LOST)}" in ask("show", 3).output
     running = ask("show", 4).output
     assert "inspection 4: strawberry, running" in running
     assert "\x1b" not in running, "a lot's name commands no terminal"
@@ -76,19 +79,20 @@ def test_the_last_ones_are_listed_newest_first(history, ask):
 def test_what_is_not_there_is_said_in_words(ask, history, folder):
     missing = ask("show", 99)
     assert missing.exit_code == 1
-    assert "the records hold 1 to 4" in str(missing.exception)
+    assert missing.exception.remedy == messages.LIST_SHOWS_RANGE(first=1, last=4)
     assert ask("show", 0).exit_code == 2
     lower = ask("continue-after", 2)
-    assert "4 was given already" in str(lower.exception)
+    assert lower.exception.cause == messages.NUMBER_GIVEN(number=4)
 
 
 def test_no_records_at_all(ask, folder):
-    assert "there is no" in str(ask("list").exception)
+    assert ask("list").exception.cause.id == messages.NO_RECORDS.id
     assert not folder.exists()
 
 
 def test_every_reason_has_a_sentence():
-    assert set(SENTENCES) == set(Reason)
+    assert all(definition(f"reason.{reason}") for reason in Reason)
+    assert str(reason_message("of_a_later_version")) == "of_a_later_version"
 
 
 @pytest.mark.parametrize(

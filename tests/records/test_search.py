@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from station.channel.line import Reason
+from station.messages import records as messages
 from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, read_lots, start_lot
@@ -17,6 +18,7 @@ from station.records.search import Query, find, find_page
 from station.records.search_index import HOUR_MS
 from station.records.short_transaction import short_transaction
 from station.records.write_requests import conclude, insert_trigger, publish
+from tests.records.causes import because
 
 FRUIT = st.sampled_from(["strawberry", "strawberry, revised", "raspberry", None])
 GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}
@@ -140,7 +142,7 @@ def test_a_page_is_of_some_size(opened, scenario, folder):
             pass
 
     scenario(steps)
-    with reading(folder) as connection, pytest.raises(RecordsError, match="ask for 1 to 1000"):
+    with reading(folder) as connection, pytest.raises(RecordsError, check=because(messages.PAGE_TOO_LARGE)):
         find_page(connection, Query(), 1001)
 
 
@@ -169,7 +171,8 @@ def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, as
     assert refused.exit_code == 2
     assert "write 2026-06-30" in refused.output
     other = ask("lot", "start", "west", "--grower", "Huber")
-    assert "lot west is told to be of Meier already" in str(other.exception)
+    assert other.exception.cause.id == messages.ANOTHER_GROWER.id
+    assert other.exception.cause.parameters["known"] == "Meier"
     assert ask("lot", "start", "west", "--grower", "Huber", "--correct", "--by", "ada").exit_code == 0
     assert ask("lot", "end", "west").output.startswith("west: Huber, began")
     with short_transaction(folder) as connection:

@@ -26,7 +26,7 @@ from station.service.grip import FramesError
         (GripperFaultError(0xC), Event.GRIPPER_FAULT),
         (NoFrameError("x"), Event.CAMERA_FAULT),
         (FramesError(verbatim("x"), ()), Event.CAMERA_FAULT),
-        (DiskFullError("x", "y"), Event.RECORDS_FAULT),
+        (DiskFullError(verbatim("x"), verbatim("y")), Event.RECORDS_FAULT),
         (StationError("x"), Event.INTERNAL_FAULT),
         (ValueError("x"), Event.INTERNAL_FAULT),
     ],

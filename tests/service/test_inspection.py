@@ -58,7 +58,7 @@ def test_what_cannot_be_measured_is_no_result(bench):
     empty, in_contact, explanation = asyncio.run(scenario())
     assert (empty.outcome, empty.reasons, empty.area_mm2) == ("NO_RESULT", (Reason.NO_CONTACT,), None)
     assert (in_contact.outcome, in_contact.reasons) == ("NO_RESULT", (Reason.REFERENCE_BAD,))
-    assert "something touches the gel" in " ".join(explanation)
+    assert "something touches the gel" in " ".join(map(str, explanation))
 
 
 def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench, monkeypatch):

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from station.inspection.states import State
+from station.messages.judge import CUT_BY_BORDER
 from station.records.database import reading, records_folder
 from station.records.report import format_inspection
 from station.vocabulary import Reason
@@ -42,7 +43,7 @@ def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(i
     assert openings == [State.OPENING_AGAIN], judged.explanation
     assert outcome.outcome == "PASS", judged.explanation
     assert judged.measures["presses"] == 2
-    assert "border cuts the contact" in judged.measures["first_press_findings"]
+    assert judged.first_press_findings.id == CUT_BY_BORDER.id
     assert not any("cut_by_border" in point.flags for point in judged.curve)
     assert judged.phases_s["opening_again"] > 0
     shown = format_inspection(record)

@@ -2,8 +2,10 @@
 
 import csv
 import json
+import sqlite3
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
@@ -13,10 +15,15 @@ from hypothesis import strategies as st
 from station.errors import StationError
 from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.inspection.judge import judge
-from station.records.database import reading
+from station.messages import whatif as messages
+from station.messages.judge import AREA_NEAR, INTERNAL_FAULT, STEPS_ENDED
+from station.messages.message import VERBATIM, verbatim
+from station.records.database import FILE_NAME, reading
 from station.vocabulary import Reason
 from station.whatif import runner
-from station.whatif.replay import replay
+from station.whatif.outcome_table import counted
+from station.whatif.progress_file import ProgressFile
+from station.whatif.replay import Replayed, replay
 from station.whatif.stored import StoredPress, read_stored
 
 SOUND, BRUISED, BETWEEN = 27.0, 45.0, 33.5
@@ -65,30 +72,63 @@ def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orcha
     further = changed(orchard.recipe, early_stop__area_mm2=200.0)
     replayed = replay(stored, orchard.recipe, further)
     assert replayed.after == "UNDECIDABLE"
-    assert "where it was stopped early, and the draft would have pressed on" in replayed.why
+    assert replayed.why == messages.CURVE_STOPPED(reached_mm=stored.press.points[-1].closing_mm)
     stricter = changed(further, damage__area__0__area_mm2=62.0)
     assert replay(stored, orchard.recipe, stricter).after == "FAIL", "what is proven stands, whatever would have come"
     near = changed(further, damage__area__0__area_mm2=stored.press.points[3].area_mm2 + 1)
     replayed = replay(stored, orchard.recipe, near)
-    assert (replayed.after, "not surely within the limit" in replayed.why) == ("NO_RESULT", True), "it cannot pass"
+    assert (replayed.after, replayed.why and replayed.why.id) == ("NO_RESULT", AREA_NEAR.id), "it cannot pass"
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "why"),
     [
-        ({"steps__step_mm": 1.02}, "the draft presses otherwise (steps.step_mm)"),
-        ({"gripper__speed_mm_s": 30.0, "imaging__settle_s": 0.5}, "the draft presses otherwise (gripper, imaging)"),
+        ({"steps__step_mm": 1.02}, messages.PRESSES_OTHERWISE(fields="steps.step_mm")),
         (
-            {"segmentation__robust__gate_ratio": 4.0},
-            "the draft measures otherwise, and not all of its images",
+            {"gripper__speed_mm_s": 30.0, "imaging__settle_s": 0.5},
+            messages.PRESSES_OTHERWISE(fields="gripper, imaging"),
         ),
+        ({"segmentation__robust__gate_ratio": 4.0}, messages.IMAGES_NOT_KEPT()),
     ],
 )
-def test_what_no_stored_curve_can_tell_is_not_guessed(orchard, changed, changes, told):
+def test_what_no_stored_curve_can_tell_is_not_guessed(orchard, changed, changes, why):
     own = orchard.recipe
     replayed = replay(stored_of(orchard.press(SOUND), own), own, changed(own, **changes))
     assert replayed.after == "UNDECIDABLE"
-    assert replayed.why.startswith(told)
+    assert replayed.why == why
+
+
+@pytest.mark.parametrize(
+    ("said", "interrupted"),
+    [
+        (STEPS_ENDED(reached_mm=2.0, wanted_mm=4.0), False),
+        (INTERNAL_FAULT(), True),
+        (verbatim("The steps ended at 2.0 mm of closing, before 4 mm, and nothing says why."), True),
+    ],
+)
+def test_steps_that_ended_for_no_known_reason_are_no_fault_of_the_program(orchard, said, interrupted):
+    (sequence,) = orchard.store([orchard.press(SOUND)])
+    stored = said.parameters["text"] if said.id == VERBATIM.id else said.model_dump(mode="json")
+    with closing(sqlite3.connect(orchard.folder / FILE_NAME)) as database, database:
+        database.execute(
+            "UPDATE inspections SET reasons = ?, explanation = ?",
+            (json.dumps([Reason.INTERNAL_FAULT]), json.dumps([stored])),
+        )
+    with reading(orchard.folder) as connection:
+        (read,) = read_stored(connection, [sequence], orchard.folder, with_images=False)
+    assert read.press.interruptions == ((Reason.INTERNAL_FAULT,) if interrupted else ())
+
+
+def test_why_results_are_unknown_is_counted_whatever_their_figures(tmp_path, orchard):
+    results = [
+        Replayed(n, "A", "PASS", "UNDECIDABLE", messages.CURVE_ENDS(reached_mm=n / 2), faithful=True) for n in range(3)
+    ]
+    why = "the curve ends at … mm of closing, and the draft would have pressed on"
+    assert counted(results).summary()["undecidable_because"] == {why: 3}
+    with ProgressFile(tmp_path, orchard.recipe) as progress:
+        progress.add(results)
+    with ProgressFile(tmp_path, orchard.recipe) as progress:
+        assert progress.done == {each.sequence: each for each in results}
 
 
 def test_an_interrupted_inspection_stays_no_result_and_an_unknown_recipe_is_said(orchard, changed):
@@ -162,7 +202,7 @@ def test_a_process_that_is_killed_is_told_with_how_to_go_on():
         future.set_exception(BrokenProcessPool("killed"))
         return future
 
-    with pytest.raises(StationError, match="the same command goes on where it was"):
+    with pytest.raises(StationError, check=lambda error: error.message == messages.PROCESS_ENDED()):
         list(runner._flow([None, None], lost, 1))  # type: ignore[list-item] (no part is looked at)
 
 

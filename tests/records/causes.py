@@ -1,0 +1,11 @@
+"""What a test expects a records' error to say."""
+
+from collections.abc import Callable
+
+from station.messages.message import Definition
+from station.records.errors import RecordsError
+
+
+def because(*causes: Definition) -> Callable[[RecordsError], bool]:
+    """Whether an error has one of these causes."""
+    return lambda error: error.cause.id in {each.id for each in causes}
