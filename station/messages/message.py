@@ -19,6 +19,14 @@ class Message(BaseModel):
     def __str__(self) -> str:
         return ENGLISH.sentence(self)
 
+    def ids(self) -> Iterator[str]:
+        """Yield the id, and the ids of the messages that it encloses."""
+        yield self.id
+        for value in self.parameters.values():
+            for each in value if isinstance(value, tuple) else (value,):
+                if isinstance(each, Message):
+                    yield from each.ids()
+
     def __hash__(self) -> int:
         return hash((self.id, tuple(self.parameters.items())))
 

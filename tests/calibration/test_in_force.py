@@ -26,6 +26,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.panel_live import GetPanelState, PanelState
+from station.messages.message import verbatim
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
 from station.service.active_calibration import ActiveCalibration
@@ -37,7 +38,9 @@ from station.settings.plc import line_endpoint
 from station.settings.segmentation import Segmentation
 
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
-FAILED = Check(name="wear", passed=False, found="41%", expected="75%")
+FAILED = Check(
+    name="wear", passed=False, found=verbatim("41%"), expected=verbatim("75%"), remedy=verbatim("change the gel")
+)
 
 
 def verification(calibration, made_at, *checks):
@@ -70,7 +73,7 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     )
     calibrated = in_use(tmp_path, draft.calibration.made_at)
     assert calibrated.in_force.mm_per_px == draft.calibration.mm_per_px
-    assert draft.calibration.id in calibrated.in_force.words
+    assert draft.calibration.id in str(calibrated.in_force.words)
     stored.add_calibration(calibration, calibration_files(draft))
     assert calibrated.calibration == calibration
     assert calibrated.gate_factor == 1.3
@@ -132,7 +135,7 @@ def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_all
     )
     allowed = in_use(tmp_path, made_at, "D11111", uncalibrated="allow")
     assert (allowed.refusal(), allowed.alarm_detail()) == (None, None)
-    assert "allowed by service.uncalibrated" in allowed.in_force.words
+    assert "allowed by service.uncalibrated" in str(allowed.in_force.words)
 
 
 @pytest.mark.timeout(600)

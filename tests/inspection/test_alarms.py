@@ -33,7 +33,7 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
     assert numbers == sorted(set(numbers))
     assert numbers[0] == 1
     for alarm, row in ALARMS.items():
-        for text in (row.cause, row.consequence, row.action):
+        for text in map(str, (row.cause, row.consequence, row.action)):
             assert text[0].isupper(), alarm
             assert text.endswith("."), alarm
         assert row.provoked_by
