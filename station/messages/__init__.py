@@ -1,11 +1,13 @@
 """Everything the station can say; one module for each room that says it. Importing the package defines all of it."""
 
 from station.messages import (
+    alarm_commands,
     alarms,
     calibration,
     can,
     channel,
     commands,
+    expectations,
     jobs,
     line,
     lots,
@@ -14,15 +16,18 @@ from station.messages import (
     operation,
     outbox,
     readiness,
+    recipes,
     states,
 )
 
 __all__ = [
+    "alarm_commands",
     "alarms",
     "calibration",
     "can",
     "channel",
     "commands",
+    "expectations",
     "jobs",
     "line",
     "lots",
@@ -31,5 +36,6 @@ __all__ = [
     "operation",
     "outbox",
     "readiness",
+    "recipes",
     "states",
 ]

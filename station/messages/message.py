@@ -208,7 +208,9 @@ class Renderer:
 
 
 def _english_number(value: float, digits: int | None) -> str:
-    return f"{value:g}" if digits is None else f"{value:.{digits}f}"
+    if digits is not None:
+        return f"{value:.{digits}f}"
+    return str(value) if isinstance(value, int) else f"{value:g}"
 
 
 ENGLISH = Renderer(lambda known, count: known.plural if known.plural and count != 1 else known.english, _english_number)

@@ -14,7 +14,7 @@ from hmi import charts
 from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import groups
 from hmi.texts import texts
-from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, page_translations, preferred
+from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, page_translations, preferred, translations
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
@@ -22,6 +22,7 @@ from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
+from station.messages import commands, lots, outbox, recipes
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
 from station.vision.contact import Flag
@@ -29,10 +30,6 @@ from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
 STATION = HMI.parent / "station"
-NOT_FOR_OPERATORS = {
-    "alarm {}: expected an id of docs/alarms.md, as {}",
-}
-"""Of addresses that a page never asks for."""
 FAULTS_FROM = (
     *(
         f"devices/arm/{name}"
@@ -46,9 +43,7 @@ FAULTS_FROM = (
             "bare_grip",
             "device_manager",
             "grip",
-            "outcome_monitor",
             "reference",
-            "housekeeping",
             "device_monitor",
         )
     ),
@@ -77,21 +72,10 @@ NO_FAULTS = {
 }
 """Names, what is asked on the wire or looked for in an answer, and what a setting is refused with."""
 COMPOSED = {
-    "sentence.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
-    "sentence.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
-    "sentence.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
-    "sentence.changed_since": (
-        "recipe {}: it was changed since {} was looked at, to {}",
-        "; look at it as it is now and",
-    ),
     "sentence.stopped_area": ("No further step was made at {} mm of closing", ": the area, {} mm², is over the early"),
     "sentence.stopped_growth": (
         "No further step was made at {} mm of closing",
         ": the area grows by {} mm² a millimetre,",
-    ),
-    "sentence.verification_old": (
-        " h old, at most {} h are allowed",
-        "The last verification is {}: verify with the ball",
     ),
     "sentence.area_near": ("The area {} is {}: it is not surely within the limit.", "{} ± {} mm²; {}"),
     "sentence.area_and_limit": ("The area at {} mm of closing is {}.", "{} ± {} mm²; {}"),
@@ -137,13 +121,6 @@ def test_every_language_has_the_stations_sentences():
             assert fields(text) == fields(english[key]), key
 
 
-@pytest.mark.parametrize("language", LANGUAGES[1:])
-def test_what_the_station_says_in_english_is_said_in_every_language(language):
-    own = {key for key in catalogue(language) if key.startswith("station.")}
-    wanted = {f"station.{what}.{alarm}" for what in ("cause", "consequence", "action") for alarm in ALARMS}
-    assert own == wanted | {f"station.state.{state}" for state in STATES}
-
-
 def sentences(path):
     """The sentences of a module that somebody is told, with {} for what they are filled with."""
     tree, skipped = ast.parse(path.read_text(encoding="utf-8")), set()
@@ -165,13 +142,6 @@ def anonymous(text):
     return "".join(literal + ("{}" if name else "") for literal, name, _, _ in Formatter().parse(text))
 
 
-def test_what_operators_are_refused_with_is_said_in_every_language():
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
-    for module in ("readiness", "plc_commands", "operator_commands", "alarm_commands"):
-        told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
-        assert told - NOT_FOR_OPERATORS <= known, module
-
-
 @pytest.mark.parametrize("module", FAULTS_FROM)
 def test_every_fault_of_a_device_is_said_in_every_language(module):
     known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
@@ -191,13 +161,6 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
 @pytest.mark.parametrize(
     ("language", "english", "said"),
     [
-        ("en", "an inspection is under way", "an inspection is under way"),
-        ("de", "an inspection is under way", "eine Prüfung läuft"),
-        ("es", "reset did not come to its end within 2.5 s: an inspection is under way",
-         "reset no terminó en 2,5 s: hay una inspección en curso"),
-        ("es", "Lot B-7 cannot begin: an inspection is under way. No recipe is active: choose one by its number (1).",
-         "El lote B-7 no puede empezar: hay una inspección en curso. No hay receta activa: elija una (1)."),
-        ("es", "No recipe is active: choose one by its number (1, 2).", "No hay receta activa: elija una (1, 2)."),
         ("es", "The area at 3.0 mm of closing is at least 61.2 mm²; the limit is 45 mm²: it is over the limit.",
          "El área a 3,0 mm de cierre es de al menos 61,2 mm²; el límite es 45 mm²: está por encima del límite."),
         ("de", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for a strawberry of 48 mm is 117.4 mm².",
@@ -210,6 +173,32 @@ def test_every_sentence_to_translate_is_one_that_the_station_says():
 )  # fmt: skip
 def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
     assert Locale(language).sentence(english) == said
+
+
+@pytest.mark.parametrize(
+    ("language", "message", "said"),
+    [
+        ("en", commands.BUSY(), "an inspection is under way: wait for its end"),
+        ("de", commands.BUSY(), "eine Prüfung läuft: ihr Ende abwarten"),
+        ("es", commands.TOO_SLOW(command="reset", limit_s=2.5, activity=commands.BUSY_CALL_OFF()),
+         "reset no terminó en 2,5 s: hay una inspección en curso: cancélela primero"),
+        ("es", lots.REFUSED(lot="B-7", why=recipes.GONE(recipe="blueberry", number=2)),
+         "El lote B-7 no puede empezar: la receta blueberry con el número de PLC 2 ya no está en vigor; "  # noqa: ISC004
+         "elija de nuevo."),
+        ("de", outbox.WAITING(destination="mqtt", number=1, age_s=9.0), "mqtt: 1 Eintrag wartet, seit 9 s"),
+        ("de", outbox.WAITING(destination="mqtt", number=2, age_s=9.0), "mqtt: 2 Einträge warten, seit 9 s"),
+    ],
+)  # fmt: skip
+def test_a_message_is_said_in_the_language_of_the_page(language, message, said):
+    assert Locale(language).sentence(message) == said
+
+
+@pytest.mark.parametrize("language", LANGUAGES[1:])
+def test_every_alarm_and_state_is_said_in_every_language(language):
+    told = translations(language)
+    for row in ALARMS.values():
+        assert {row.cause.id, row.consequence.id, row.action.id} <= told.keys()
+    assert {facts.reason.id for facts in STATES.values()} - {"text.sentences"} <= told.keys()
 
 
 @pytest.mark.parametrize(
