@@ -42,7 +42,8 @@ def compared(tree):
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             pattern = isinstance(node.func.value, ast.Name) and node.func.value.id == "re" and any(map(says, node.args))
-            if pattern or (node.func.attr in TEXT_METHODS and says(node.func.value)):
+            of_bytes = any(isinstance(each, ast.Constant) and isinstance(each.value, bytes) for each in node.args)
+            if pattern or (node.func.attr in TEXT_METHODS and says(node.func.value) and not of_bytes):
                 yield ast.unparse(node)
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
