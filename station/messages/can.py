@@ -95,27 +95,27 @@ REFUSED = define(
     "can.refused",
     "{node} refused {access}: {error}; compare its firmware with the data sheet that the station ships",
     node=Nested(),
-    access=Name(),
+    access=Nested(),
     error=Name(),
 )
 NO_ANSWER = define(
     "can.no_answer",
     "{node} did not answer {access}; check its power and cable, and that there is no second master",
     node=Nested(),
-    access=Name(),
+    access=Nested(),
 )
 NONSENSE = define(
     "can.nonsense",
     "{node} answered {access} with nonsense: {error}; compare its firmware with the data sheet that the station ships",
     node=Nested(),
-    access=Name(),
+    access=Nested(),
     error=Name(),
 )
 FAILED_MEANWHILE = define(
     "can.failed_meanwhile",
     "the bus failed during {access} of {node}: {error}; check the interface",
     node=Nested(),
-    access=Name(),
+    access=Nested(),
     error=Name(),
 )
 STATE_REFUSED = define(
