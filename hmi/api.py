@@ -8,6 +8,8 @@ from fastapi import APIRouter, Depends, HTTPException, Path, Query
 from hmi.access import HmiNow
 from hmi.api_access import changer, reader
 from hmi.api_model import (
+    AlarmAnswer,
+    AlarmAnswers,
     ApiMessage,
     Error,
     HealthAnswer,
@@ -25,7 +27,7 @@ from hmi.api_model import (
 )
 from hmi.roles import Right
 from station.channel.messages import RefusedError
-from station.channel.panel import Actor
+from station.channel.panel import Actor, AlarmList, ListAlarms
 from station.channel.panel_maintenance_queries import GetHealth, Health
 from station.channel.panel_queries import (
     EndLot,
@@ -77,6 +79,13 @@ async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
         parts=[Part.of(part) for part in reply.parts],
         versions=reply.versions,
     )
+
+
+@router.get("/alarms", tags=["health"])
+async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
+    """Alarms that are not in their normal state."""
+    reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=DEADLINE_S)
+    return AlarmAnswers(alarms=[AlarmAnswer.of(alarm) for alarm in reply.alarms])
 
 
 @router.get("/inspections", tags=["results"])

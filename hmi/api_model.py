@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from station.channel.panel import ListedAlarm
 from station.channel.panel_maintenance_queries import PartHealth
 from station.channel.panel_queries import InspectionRow, InspectionView, LotView
 from station.messages.message import Message
@@ -21,12 +22,6 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Error(Model):
-    """The reason of a refused request."""
-
-    detail: str = Field(description="One sentence, with what to do.")
-
-
 class ApiMessage(Model):
     """What the station says, as data."""
 
@@ -40,6 +35,13 @@ class ApiMessage(Model):
     def of(cls, message: Message) -> "ApiMessage":
         """Convert the station's message."""
         return cls(id=message.id, parameters=message.parameters, text=str(message))
+
+
+class Error(Model):
+    """The reason of a refused request."""
+
+    detail: str = Field(description="One sentence, with what to do; in the language of the request.")
+    message: ApiMessage | None = Field(default=None, description="The station's own, where it refused.")
 
 
 class Part(Model):
@@ -77,6 +79,43 @@ class HealthAnswer(Model):
     simulated: bool
     parts: list[Part]
     versions: dict[str, str]
+
+
+class AlarmAnswer(Model):
+    """One alarm that is not in its normal state."""
+
+    alarm: str = Field(description="Its id, as docs/alarms.md names it; stays.")
+    number: int = Field(description="The PLC's error code.")
+    priority: Literal["critical", "high", "medium", "low"]
+    state: str
+    active: bool = Field(description="Its cause is there, or it is latched, and it is not shelved.")
+    since: datetime
+    cause: ApiMessage
+    consequence: ApiMessage
+    action: ApiMessage
+    detail: ApiMessage | None = Field(description="What was seen when it was last raised.")
+
+    @classmethod
+    def of(cls, alarm: ListedAlarm) -> "AlarmAnswer":
+        """Convert the station's answer."""
+        return cls(
+            alarm=alarm.alarm,
+            number=alarm.number,
+            priority=alarm.priority,
+            state=alarm.state,
+            active=alarm.active,
+            since=moment(alarm.since_utc_ms),
+            cause=ApiMessage.of(alarm.cause),
+            consequence=ApiMessage.of(alarm.consequence),
+            action=ApiMessage.of(alarm.action),
+            detail=alarm.detail and ApiMessage.of(alarm.detail),
+        )
+
+
+class AlarmAnswers(Model):
+    """Most urgent first; shelved ones are included."""
+
+    alarms: list[AlarmAnswer]
 
 
 class InspectionSummary(Model):

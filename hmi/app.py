@@ -14,6 +14,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hmi.access import locale_of
+from hmi.api_model import ApiMessage, Error
 from hmi.assets import Assets
 from hmi.context import Hmi
 from hmi.gateway import Gateway, actor_of
@@ -28,6 +29,7 @@ from hmi.sessions import Sessions
 from hmi.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
+from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 
@@ -126,16 +128,18 @@ async def _bad_form(request: Request, error: Exception) -> Response:
 
 async def _away(request: Request, error: Exception) -> Response:
     """Answer that the station refused or did not answer, and state the result of an order where it is known."""
+    assert isinstance(error, ChannelError)  # noqa: S101 (what it is registered for)
     if isinstance(error, DeadlineError):
-        return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), str(error))
-    return _problem_answer(request, 409, locale_of(request).text("problem.refused"), str(error))
+        return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), error.message)
+    return _problem_answer(request, 409, locale_of(request).text("problem.refused"), error.message)
 
 
 async def _broken(request: Request, _: Exception) -> Response:
     return _problem_answer(request, 500, locale_of(request).text("problem.broken"))
 
 
-def _problem_answer(request: Request, status: int, text: str, detail: str = "") -> Response:
+def _problem_answer(request: Request, status: int, text: str, detail: Message | None = None) -> Response:
     if request.url.path.startswith("/api/"):
-        return JSONResponse({"detail": f"{text} {detail}".strip()}, status)
+        told = Error(detail=f"{text} {detail or ''}".strip(), message=detail and ApiMessage.of(detail))
+        return JSONResponse(told.model_dump(mode="json", exclude_none=True), status)
     return show(request, "problem.html.j2", status=status, text=text, detail=detail)

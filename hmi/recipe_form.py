@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any, NamedTuple
 
+from station.messages.message import Message
 from station.settings.recipe_model import Recipe
 from station.settings.schema import branches, expectation, find, resolved, schema_of
 
@@ -25,8 +26,8 @@ class Field(NamedTuple):
     title: str
     description: str
     unit: str
-    expected: str
-    """As text: `a number from 0.1 to 10 mm`."""
+    expected: Message
+    """As `a number from 0.1 to 10 mm`."""
     kind: str
     """`number`, `text`, `choice`, `list` or `switch`."""
     choices: tuple[str, ...]

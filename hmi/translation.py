@@ -5,7 +5,6 @@ Of the pages' texts in `hmi/texts` the catalogues are in the folder `pages`, bes
 
 import gettext
 import io
-import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from decimal import Decimal
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from string import Formatter
 
 import babel
 from babel.dates import format_date
@@ -31,36 +29,7 @@ FOLDER = Path(__file__).with_name("locale")
 SOURCE: Language = "en"
 PAGES = "pages"
 _THIN_SPACE = "\u202f"
-_NUMBER = re.compile(r"(?<![\w.])([0-9]+)\.([0-9]+)(?![\w.])")
 NO_VALUE = "–"  # noqa: RUF001 (for a value that was not measured)
-
-
-@cache
-def catalogue(language: Language) -> Mapping[str, str]:
-    """Return the sentences of the station that are no messages yet, by their keys."""
-    found: dict[str, str] = {}
-    for file in sorted((FOLDER / language).glob("*.json")):
-        found |= json.loads(file.read_text(encoding="utf-8"))
-    return found
-
-
-@cache
-def sentence_patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """Return the station's own sentences, `sentence.*` of the English catalogue, as patterns; the most specific first.
-
-    A device's fault, `sentence.fault_of_*`, encloses an observation and a remedy: these patterns come first.
-    """
-    texts = {key: text for key, text in catalogue(SOURCE).items() if key.startswith("sentence.")}
-    parts = {key: list(Formatter().parse(text)) for key, text in texts.items()}
-    patterns = {
-        key: "".join(re.escape(literal) + (f"(?P<{name}>.*?)" if name else "") for literal, name, _, _ in pieces)
-        for key, pieces in parts.items()
-    }
-    order = sorted(
-        parts,
-        key=lambda key: (not key.startswith("sentence.fault_of_"), -sum(len(literal) for literal, *_ in parts[key])),
-    )
-    return tuple((key, re.compile(patterns[key], re.DOTALL)) for key in order)
 
 
 @cache
@@ -178,38 +147,19 @@ class Locale:
         if key in texts():
             return self.text(key)
         known = page_translations(self.language).get(key)
-        return catalogue(self.language).get(key, english) if known is None else known[0]
+        return english if known is None else known[0]
 
-    def sentence(self, english: str | Message | None) -> str:
-        """Write a message in this language; in English, and marked as that, where it has no translation.
+    def sentence(self, said: Message | str | None) -> str:
+        """Write a message in this language. Words that are not the station's are marked as English on other pages.
 
         Args:
-            english: a message, None for an empty text; as long as some rooms send sentences, also one of those.
+            said: a message, or words of a library, an operating system or a record of before there were messages;
+                None for an empty text.
         """
-        if english is None:
-            return ""
-        if isinstance(english, Message):
-            if english.id != VERBATIM.id:
-                return renderer(self.language).sentence(english)
-            english = str(english)
-        if self.language == SOURCE:
-            return english
-        found = self._translated(english)
-        return Markup('<span lang="en">{}</span>').format(english) if found is None and english else found or ""
-
-    def _translated(self, english: str) -> str | None:
-        for key, pattern in sentence_patterns():
-            text = catalogue(self.language).get(key)
-            if text is not None and (found := pattern.fullmatch(english)) is not None:
-                return text.format(**{name: self._value(value) for name, value in found.groupdict().items()})
-        return None
-
-    def _value(self, text: str) -> str:
-        """Translate a part of a sentence: a number, another sentence, or a name."""
-        lead = text.removesuffix(" ")
-        if (found := self._translated(lead)) is not None:
-            return found + text[len(lead) :]
-        return _NUMBER.sub(rf"\1{get_decimal_symbol(self.language)}\2", text)
+        if isinstance(said, Message) and said.id != VERBATIM.id:
+            return renderer(self.language).sentence(said)
+        words = "" if said is None else str(said)
+        return Markup('<span lang="en">{}</span>').format(words) if words and self.language != SOURCE else words
 
     def number(self, value: float | None, digits: int = 0) -> str:
         """Format a number with the language's decimal sign and a thin space between thousands.

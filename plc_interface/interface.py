@@ -23,7 +23,7 @@ from plc_interface.register_map import BY_NAME
 from plc_interface.register_values import formatted_registers
 from plc_interface.station_link import StationLink, now
 from station.channel.line import Line, LineFault
-from station.messages.message import verbatim
+from station.messages.message import Message
 from station.settings.plc import HandshakeSettings
 
 _CONTROL = BY_NAME["control"]
@@ -164,8 +164,8 @@ class Interface:
         self._timer = None if due_s is None else self._loop.call_at(due_s, lambda: self.feed(ev.Tick(now())))
 
 
-def _journal_fault(trouble: str) -> tuple[LineFault, ...]:
-    return (LineFault(part="journal", what=verbatim(trouble)),) if trouble else ()
+def _journal_fault(trouble: Message | None) -> tuple[LineFault, ...]:
+    return () if trouble is None else (LineFault(part="journal", what=trouble),)
 
 
 def _ipv4(peer: Peer | None) -> int:

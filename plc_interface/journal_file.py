@@ -11,6 +11,8 @@ from pydantic import ValidationError
 
 from plc_interface.handshake.journal import Journal
 from station.errors import BadInputError, StationError
+from station.messages import line as messages
+from station.messages.message import Message
 
 log = logging.getLogger(__name__)
 
@@ -30,23 +32,18 @@ class JournalFile:
         self._folder = folder
         self._path = folder / "journal.json"
         self._new = folder / "journal.new"
-        self.trouble = ""
-        """Error of the last write; empty for none."""
+        self.trouble: Message | None = None
+        """Error of the last write."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / "lock").open("w")
         except OSError as error:
-            raise StationError(
-                f"the PLC interface cannot keep its journal in {folder}: {error.strerror}; give this user the right to "
-                "write there, or set home to another folder"
-            ) from error
+            raise StationError(messages.JOURNAL_NOT_KEPT(folder=str(folder), error=str(error.strerror))) from error
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             self._lock.close()
-            raise BadInputError(
-                f"another PLC interface runs in {folder}: stop it, or give this one a home folder of its own"
-            ) from error
+            raise BadInputError(messages.ANOTHER_INTERFACE(folder=str(folder))) from error
 
     def read(self) -> Journal:
         """Return the last journal; an empty one if there is none, or none that can be read."""
@@ -80,15 +77,12 @@ class JournalFile:
                     os.fsync(file.fileno())
             self._new.replace(self._path)
         except OSError as error:
-            trouble = (
-                f"the journal {self._path} cannot be written: {error.strerror}; until it can, a restart of the PLC "
-                "interface may lose results"
-            )
+            trouble = messages.JOURNAL_NOT_WRITTEN(file=str(self._path), error=str(error.strerror))
             if trouble != self.trouble:
                 log.error("%s", trouble)  # noqa: TRY400 (the disk is at fault, not the code)
             self.trouble = trouble
         else:
-            self.trouble = ""
+            self.trouble = None
 
     def close(self) -> None:
         """Release the lock. Idempotent."""

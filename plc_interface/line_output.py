@@ -18,7 +18,7 @@ from plc_interface.can.errors import (
 from plc_interface.can.line_io import LineIo
 from plc_interface.pending_rejects_file import PendingRejectFile
 from station.channel.line import LineFault, Outcome
-from station.messages.message import verbatim
+from station.messages import can as messages
 from station.settings.can import CanSettings
 
 REJECTS_LANE = 1
@@ -167,11 +167,7 @@ class RejectGate:
         count = self._io.encoder_count()
         if count is None or ahead(count.value, at_count) <= self._distance:
             return False
-        error = RejectRefusedError(
-            sequence,
-            f"count {at_count} lies further ahead than the way from the nest to the gate, the belt is at "
-            f"{count.value}: the encoder was set anew, or not known at the trigger; look at the fruit",
-        )
+        error = RejectRefusedError(sequence, messages.COUNT_TOO_FAR(at_count=at_count, now_count=count.value))
         log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
         self._io.give_up(error)
         return True
@@ -190,8 +186,8 @@ class RejectGate:
     def faults(self) -> tuple[LineFault, ...]:
         """Return the faults of the bus, its nodes and recent reject actuations."""
         return (
-            *(LineFault(part="can", what=verbatim(fault)) for fault in self._io.bus_faults),
-            *(LineFault(part="reject", what=verbatim(fault)) for fault in self._io.reject_faults),
+            *(LineFault(part="can", what=fault) for fault in self._io.bus_faults),
+            *(LineFault(part="reject", what=fault) for fault in self._io.reject_faults),
         )
 
     @property

@@ -234,7 +234,7 @@ async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     try:
         reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
     except ChannelError as error:
-        return {"live_image": None, "why": str(error), "histograms": (), "place": ""}
+        return {"live_image": None, "why": error.message, "histograms": (), "place": ""}
     place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
     _FRAMES[place] = reply.picture
     while len(_FRAMES) > _KEPT_FRAMES:

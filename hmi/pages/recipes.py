@@ -45,6 +45,7 @@ from station.channel.panel_recipe_queries import (
     StartWhatIf,
     SubmitRecipe,
 )
+from station.messages.message import Message
 
 router = APIRouter(prefix="/recipes")
 ENTRY = Entry("recipes", "/recipes")
@@ -122,7 +123,7 @@ async def save(
         query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
         await hmi.gateway.request(query, RecipeRow, deadline_s=DEADLINE_S)
     except RefusedError as error:
-        return await _form(request, hmi, locale, reply, typed, str(error), reason)
+        return await _form(request, hmi, locale, reply, typed, error.message, reason)
     return go_to(f"/recipes/{name}")
 
 
@@ -230,7 +231,7 @@ async def _form(
     locale: Locale,
     reply: RecipeView,
     typed: Mapping[str, str],
-    wrong: str,
+    wrong: str | Message,
     reason: str = "",
 ) -> Response:
     made, sign = groups(reply.values), locale.decimal_sign

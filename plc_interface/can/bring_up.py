@@ -15,6 +15,8 @@ from canopen.pdo.base import PdoMap
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from plc_interface.can.errors import BringUpError
+from station.messages import can as messages
+from station.messages.message import Definition, Message
 from station.settings.can import ENCODER_EDS, GATE_EDS, CanSettings
 
 _BEHAVIOUR = 0xFFFF_0000
@@ -27,8 +29,8 @@ class Node(NamedTuple):
 
     remote: canopen.RemoteNode
     number: int
-    name: str
-    """With the node id, for sentences."""
+    name: Message
+    """With the node id."""
     setting: str
     """The setting that holds its node id."""
 
@@ -43,26 +45,25 @@ class Pdo(NamedTuple):
 
 def make_gate(network: canopen.Network, settings: CanSettings) -> Node:
     """Make the reject gate's node on this network; replaces an earlier one."""
-    return _make(network, settings, "gate_node", "the reject gate", str(GATE_EDS))
+    return _make(network, settings, "gate_node", messages.GATE, str(GATE_EDS))
 
 
 def make_encoder(network: canopen.Network, settings: CanSettings) -> Node:
     """Make the line encoder's node on this network; replaces an earlier one."""
-    return _make(network, settings, "encoder_node", "the line encoder", str(ENCODER_EDS))
+    return _make(network, settings, "encoder_node", messages.ENCODER, str(ENCODER_EDS))
 
 
-def _make(network: canopen.Network, settings: CanSettings, setting: str, name: str, eds: str) -> Node:
+def _make(network: canopen.Network, settings: CanSettings, setting: str, name: Definition, eds: str) -> Node:
     number = getattr(settings, setting)
     remote = network.add_node(number, eds)
     remote.sdo.RESPONSE_TIMEOUT = settings.answer_timeout_s
-    return Node(remote, number, f"{name} (node {number})", f"can.{setting}")
+    return Node(remote, number, name(node=number), f"can.{setting}")
 
 
-def no_heartbeat(node: Node, settings: CanSettings) -> str:
+def no_heartbeat(node: Node, settings: CanSettings) -> Message:
     """Describe a node without heartbeat."""
-    return (
-        f"no heartbeat of {node.name} on {settings.interface} {settings.channel}; look at its power, cable, bit rate "
-        f"and node id ({node.setting})"
+    return messages.NO_HEARTBEAT(
+        node=node.name, interface=settings.interface, channel=settings.channel, setting=node.setting
     )
 
 
@@ -76,16 +77,21 @@ def verify_identity(node: Node) -> str:
         BringUpError: it is another device, or does not answer.
     """
     for index, subindex, mask, what in (
-        (0x1000, 0, 0xFFFF_FFFF, "device type"),
-        (0x1018, 1, 0xFFFF_FFFF, "vendor"),
-        (0x1018, 2, 0xFFFF_FFFF, "product"),
-        (0x1018, 3, _BEHAVIOUR, "revision"),
+        (0x1000, 0, 0xFFFF_FFFF, messages.DEVICE_TYPE),
+        (0x1018, 1, 0xFFFF_FFFF, messages.VENDOR),
+        (0x1018, 2, 0xFFFF_FFFF, messages.PRODUCT),
+        (0x1018, 3, _BEHAVIOUR, messages.REVISION),
     ):
         found, wanted = _get(node, index, subindex), _default(node, index, subindex)
         if found & mask != wanted & mask:
             raise BringUpError(
-                f"{node.name} is another device: its {what} is 0x{found:08X}, expected 0x{wanted:08X}; connect the "
-                f"right one, or set its node id and {node.setting} to the same number"
+                messages.ANOTHER_DEVICE(
+                    node=node.name,
+                    what=what(),
+                    found=f"0x{found:08X}",
+                    expected=f"0x{wanted:08X}",
+                    setting=node.setting,
+                )
             )
     revision = _get(node, 0x1018, 3)
     return f"{node.remote.object_dictionary.device_information.product_name} {revision >> 16}.{revision & 0xFFFF}"
@@ -143,28 +149,36 @@ def encoder_pdos(node: Node, settings: CanSettings) -> dict[str, Pdo]:
     return {"TPDO 1": Pdo(node.remote.tpdo[1], 0x180 + node.number, _ms(settings.encoder_period_s))}
 
 
-def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> str:
-    """Describe the first PDO whose mapping differs from the required one; empty if all agree.
+class ForeignMapping(NamedTuple):
+    """A PDO whose mapping differs from the required one."""
+
+    pdo: str
+    found: str
+    expected: str
+
+
+def foreign_mapping(node: Node, pdos: dict[str, Pdo]) -> ForeignMapping | None:
+    """Return the first PDO whose mapping differs from the required one; None if all agree.
 
     Raises:
         BringUpError: it does not answer.
     """
     for name, pdo in pdos.items():
         wanted = _wanted(pdo)
-        with _sdo_access(node, f"for the mapping of its {name}"):
+        with _sdo_access(node, messages.READING_MAPPING(pdo=name)):
             pdo.map.read()
         if _layout(pdo.map) != wanted:
-            return f"{name} is {_layout(pdo.map)}, expected {wanted}"
-    return ""
+            return ForeignMapping(name, _layout(pdo.map), wanted)
+    return None
 
 
 def _write_pdos(node: Node, pdos: dict[str, Pdo]) -> None:
     for name, pdo in pdos.items():
         _wanted(pdo)
-        with _sdo_access(node, f"to take the mapping of its {name}"):
+        with _sdo_access(node, messages.WRITING_MAPPING(pdo=name)):
             pdo.map.save()
-    if foreign := foreign_mapping(node, pdos):
-        raise BringUpError(f"{node.name} took its PDO mapping and holds another: {foreign}; {_OTHER_NODE}")
+    if (foreign := foreign_mapping(node, pdos)) is not None:
+        raise BringUpError(messages.ANOTHER_MAPPING(node=node.name, **foreign._asdict()))
 
 
 def _wanted(pdo: Pdo) -> str:
@@ -180,25 +194,18 @@ def _layout(pdo: PdoMap) -> str:
     return f"[{carried}] at 0x{pdo.cob_id or 0:03X}{on}, type {pdo.trans_type}, timer {pdo.event_timer} ms"
 
 
-_OTHER_NODE = "compare its firmware with the data sheet that the station ships"
-
-
 @contextmanager
-def _sdo_access(node: Node, what: str) -> Iterator[None]:
+def _sdo_access(node: Node, access: Message) -> Iterator[None]:
     try:
         yield
     except SdoAbortedError as error:
-        raise BringUpError(f"{node.name} was asked {what} and refused: {error}; {_OTHER_NODE}") from error
+        raise BringUpError(messages.REFUSED(node=node.name, access=access, error=str(error))) from error
     except SdoCommunicationError as error:
-        raise BringUpError(
-            f"{node.name} was asked {what} and did not answer; look at its power and cable, and for a second master"
-        ) from error
+        raise BringUpError(messages.NO_ANSWER(node=node.name, access=access)) from error
     except (struct.error, ObjectDictionaryError) as error:
-        raise BringUpError(f"{node.name} was asked {what} and answered nonsense: {error}; {_OTHER_NODE}") from error
+        raise BringUpError(messages.NONSENSE(node=node.name, access=access, error=str(error))) from error
     except (can.CanError, OSError, RuntimeError) as error:
-        raise BringUpError(
-            f"{node.name} was asked {what}, and the bus failed: {error}; look at the interface"
-        ) from error
+        raise BringUpError(messages.FAILED_MEANWHILE(node=node.name, access=access, error=str(error))) from error
 
 
 def _variable(node: Node, index: int, subindex: int) -> Any:
@@ -212,17 +219,19 @@ def _default(node: Node, index: int, subindex: int) -> int:
 
 def _get(node: Node, index: int, subindex: int) -> int:
     variable = _variable(node, index, subindex)
-    with _sdo_access(node, f"for its {variable.name}"):
+    with _sdo_access(node, messages.READING(object=variable.name)):
         return variable.raw
 
 
 def _put(node: Node, index: int, subindex: int, value: int) -> None:
     variable = _variable(node, index, subindex)
-    with _sdo_access(node, f"to set its {variable.name} to 0x{value:X}"):
+    with _sdo_access(node, messages.WRITING(object=variable.name, value=f"0x{value:X}")):
         variable.raw = value
     stored = _get(node, index, subindex)
     if stored != value:
-        raise BringUpError(f"{node.name} was told {variable.name} 0x{value:X} and holds 0x{stored:X}; {_OTHER_NODE}")
+        raise BringUpError(
+            messages.ANOTHER_VALUE(node=node.name, object=variable.name, written=f"0x{value:X}", read=f"0x{stored:X}")
+        )
 
 
 def read_position(node: Node) -> int:

@@ -10,6 +10,7 @@ import click
 from plc_interface.can import bring_up
 from plc_interface.can.errors import BringUpError, LineIoError
 from plc_interface.can.link import CanLink, described
+from station.messages.message import Message
 from station.settings.can import CanSettings
 from station.settings.configuration import load_configuration
 
@@ -32,7 +33,7 @@ def check_can(config: Path | None) -> None:
         return
     counters: Counter[str] = Counter()
     link = CanLink(settings, counters)
-    faulty: list[str] = []
+    faulty: list[Message] = []
     try:
         click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
         for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
@@ -47,7 +48,7 @@ def check_can(config: Path | None) -> None:
     finally:
         link.close()
     if faulty:
-        raise LineIoError(f"not usable: {', '.join(faulty)}")
+        raise LineIoError(f"not usable: {', '.join(map(str, faulty))}")
 
 
 def _check_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:

@@ -1,6 +1,8 @@
-"""Errors of the line's CAN, each one sentence with its remedy."""
+"""Errors of the line's CAN."""
 
 from station.errors import StationError
+from station.messages.can import SHOT
+from station.messages.message import Message
 
 
 class LineIoError(StationError):
@@ -30,8 +32,8 @@ class NotReadyError(LineIoError):
 class RejectError(LineIoError):
     """A reject actuation that did not happen, or whose result is unknown."""
 
-    def __init__(self, sequence: int, what: str) -> None:
-        super().__init__(f"shot {sequence}: {what}")
+    def __init__(self, sequence: int, what: Message) -> None:
+        super().__init__(SHOT(sequence=sequence, what=what))
         self.sequence = sequence
 
 

@@ -29,6 +29,8 @@ from plc_interface.can.errors import (
 )
 from plc_interface.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
 from plc_interface.can.pending_rejects import DivertEcho, Fired, Order, PendingReject, PendingRejects
+from station.messages import can as messages
+from station.messages.message import Message
 from station.settings.can import CanSettings
 
 _LONGEST_PAUSE_S = 10.0
@@ -37,7 +39,6 @@ _NODE_DEADLINE_S = 3.0
 _LANES = 8
 _OPERATIONAL, _PRE_OPERATIONAL, _STOPPED = 5, 127, 4
 _STATES = {0: "booting", _STOPPED: "stopped", _OPERATIONAL: "operational", _PRE_OPERATIONAL: "pre-operational"}
-_UNHEALTHY = "the station is not healthy, so its heartbeat is withheld and the gate keeps to its safe output"
 
 Result = TypeVar("Result")
 log = logging.getLogger(__name__)
@@ -54,11 +55,11 @@ class LineIo:
         self._settings = settings
         self._counters: Counter[str] = Counter()
         self._rejects = PendingRejects(self._counters, settings.tolerance_counts)
-        self._emergencies: dict[tuple[int, int], str] = {}
+        self._emergencies: dict[tuple[int, int], Message] = {}
         self._healthy_until_s = 0.0
         self._link: CanLink | None = None
         self._operational = False
-        self._trouble: str | None = None
+        self._trouble: Message | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._worker: ThreadPoolExecutor | None = None
 
@@ -88,29 +89,29 @@ class LineIo:
     @property
     def ready(self) -> bool:
         """True if a reject actuation can be ordered now."""
-        return not self.why_not_ready
+        return self.why_not_ready is None
 
     @property
-    def why_not_ready(self) -> str:
-        """Return the reason as one sentence with the remedy; empty if ready."""
+    def why_not_ready(self) -> Message | None:
+        """Return the reason with the remedy; None if ready."""
         if not self._tasks:
-            return "the CAN driver is not started"
+            return messages.NOT_STARTED()
         if not self._healthy:
-            return _UNHEALTHY
+            return messages.UNHEALTHY()
         if not self._operational:
-            return self._trouble or "the CAN bus is being brought up"
+            return self._trouble or messages.COMING_UP()
         if self.encoder_count() is None:
-            return "the encoder's count is not known; look at the encoder's power and cable"
-        return next(iter(self._emergencies.values()), "")
+            return messages.NO_COUNT()
+        return next(iter(self._emergencies.values()), None)
 
     @property
-    def bus_faults(self) -> tuple[str, ...]:
+    def bus_faults(self) -> tuple[Message, ...]:
         """Return the faults of the bus and its nodes."""
         trouble = (self._trouble,) if self._trouble else ()
         return (*trouble, *self._emergencies.values())
 
     @property
-    def reject_faults(self) -> tuple[str, ...]:
+    def reject_faults(self) -> tuple[Message, ...]:
         """Return the failed reject actuations since the last acknowledgement."""
         return tuple(self._rejects.faults)
 
@@ -160,21 +161,15 @@ class LineIo:
             EchoMissingError, EchoWrongError, RejectLostError: the gate's action, if any, is not the ordered one.
         """
         if not 1 <= sequence < RANGE or not 1 <= lane <= _LANES or not 0 <= at_count < RANGE:
-            raise RejectRefusedError(
-                sequence,
-                f"expected a sequence from 1 to {RANGE - 1}, a lane from 1 to {_LANES} and a count from 0 to "
-                f"{RANGE - 1}, found {sequence}, {lane} and {at_count}",
-            )
+            found = {"sequence": str(sequence), "lane": str(lane), "at_count": str(at_count)}
+            raise RejectRefusedError(sequence, messages.ORDER_MALFORMED(most=str(RANGE - 1), lanes=_LANES, **found))
         link, now = self._link, self.encoder_count()
-        if not self.ready or link is None or now is None:
-            raise NotReadyError(f"shot {sequence} was not ordered: {self.why_not_ready}")
+        if (why_not := self.why_not_ready) is not None or link is None or now is None:
+            why = messages.NOT_ORDERED(why=why_not or messages.NO_COUNT())
+            raise NotReadyError(messages.SHOT(sequence=sequence, what=why))
         with self._rejects.under_way(Order(sequence, lane, at_count)) as pending:
             if ahead(now.value, at_count) <= 0:
-                raise LateRejectError(
-                    sequence,
-                    f"count {at_count} is past, the belt is at {now.value}; nothing was ordered and the fruit went by: "
-                    "shorten the inspection, or raise the distance from the nest to the gate",
-                )
+                raise LateRejectError(sequence, messages.COUNT_PAST(at_count=at_count, now_count=now.value))
             began_s = time.monotonic()
             self._counters["shots_ordered"] += 1
             link.send(
@@ -195,9 +190,7 @@ class LineIo:
         except TimeoutError:
             self._counters["echoes_missing"] += 1
             raise EchoMissingError(
-                pending.order.sequence,
-                f"the gate did not confirm the order within {self._settings.echo_deadline_s:g} s; look at the gate, "
-                "and take the fruit for not diverted",
+                pending.order.sequence, messages.NOT_CONFIRMED(limit_s=self._settings.echo_deadline_s)
             ) from None
 
     async def _fired(self, pending: PendingReject, began_s: float) -> Report:
@@ -212,9 +205,9 @@ class LineIo:
             if passed_s is None and count and ahead(count.value, at) <= 0:
                 passed_s = now_s
             if passed_s and now_s - passed_s > self._settings.echo_deadline_s:
-                what = f"the belt is past count {at} and the gate did not report; look at the gate and at the fruit"
+                what = messages.NOT_REPORTED(at_count=at)
             elif now_s - began_s > self._settings.shot_deadline_s:
-                what = f"the belt did not reach count {at} within {self._settings.shot_deadline_s:g} s; is it running?"
+                what = messages.BELT_SLOW(at_count=at, limit_s=self._settings.shot_deadline_s)
             else:
                 continue
             self._counters["echoes_missing"] += 1
@@ -245,17 +238,17 @@ class LineIo:
                 self._trouble, pause_s = None, self._settings.retry_s
                 continue
             except NodeLostError as error:
-                self._failed("nodes_lost", str(error))
+                self._failed("nodes_lost", error.message)
                 pause_s = self._settings.retry_s
             except LineIoError as error:
-                self._failed("bring_up_failures", str(error))
+                self._failed("bring_up_failures", error.message)
             except Exception:
                 log.exception("the CAN driver failed")
-                self._failed("bring_up_failures", "the CAN driver failed; its log tells why")
+                self._failed("bring_up_failures", messages.DRIVER_FAILED())
             await asyncio.sleep(pause_s)
             pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
 
-    def _failed(self, counter: str, why: str) -> None:
+    def _failed(self, counter: str, why: Message) -> None:
         self._counters[counter] += 1
         if why != self._trouble:
             log.warning("%s", why)
@@ -274,7 +267,7 @@ class LineIo:
             lambda report: loop.call_soon_threadsafe(self._rejects.on_report, report),
             lambda emergency: loop.call_soon_threadsafe(self._on_emergency, emergency),
         )
-        self._link, why = link, "the driver was stopped"
+        self._link, why = link, messages.DRIVER_STOPPED()
         self._emergencies.clear()
         try:
             await self._bring_up(link)
@@ -282,7 +275,7 @@ class LineIo:
             self._counters["bring_ups"] += 1
             await self._watch(link)
         except LineIoError as error:
-            why = str(error)
+            why = error.message
             raise
         finally:
             self._operational, self._link = False, None
@@ -313,44 +306,41 @@ class LineIo:
         try:
             node.remote.nmt.state = name
         except Exception as error:
-            raise InterfaceError(f"the bus failed: {error}; look at the interface") from error
+            raise InterfaceError(messages.BUS_FAILED(error=str(error))) from error
 
         def obeyed() -> bool:
             beat = link.beats[node.number]
             return beat.state == state and beat.at_s > sent_s
 
-        why = f"{node.name} did not become {_STATES[state]} when told so; look at its state, and for a second master"
+        why = messages.STATE_REFUSED(node=node.name, state=_STATES[state])
         await self._until(link, obeyed, why)
 
     def _alive(self, link: CanLink, node: int) -> bool:
         beat = link.beats.get(node)
         return beat is not None and time.monotonic() - beat.at_s < self._settings.heartbeat_lost_s
 
-    async def _until(self, link: CanLink, condition: Callable[[], bool], why: str) -> None:
+    async def _until(self, link: CanLink, condition: Callable[[], bool], why: Message) -> None:
         deadline_s = time.monotonic() + max(_NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
         while not condition():
             link.check()
             if not self._healthy:
-                raise _HealthEndedError(_UNHEALTHY)
+                raise _HealthEndedError(messages.UNHEALTHY())
             if time.monotonic() > deadline_s:
                 raise BringUpError(why)
             await asyncio.sleep(_POLL_S)
 
     async def _watch(self, link: CanLink) -> None:
-        names = {self._settings.gate_node: "the reject gate", self._settings.encoder_node: "the line encoder"}
         while self._healthy:
             link.check()
-            for node, name in names.items():
+            for node in (self._settings.gate_node, self._settings.encoder_node):
                 if not self._alive(link, node):
-                    raise NodeLostError(f"{name} (node {node}) has fallen silent; look at its power and cable")
+                    raise NodeLostError(messages.SILENT(node=self._name(node)))
                 state = link.beats[node].state
                 if state != _OPERATIONAL:
-                    raise NodeLostError(
-                        f"{name} (node {node}) is {_STATES.get(state, f'in state {state}')} without being told so: it "
-                        "was restarted, or lost the station's heartbeat; it is brought up again"
-                    )
+                    told = _STATES.get(state, str(state))
+                    raise NodeLostError(messages.STATE_CHANGED(node=self._name(node), state=told))
             await asyncio.sleep(_POLL_S)
-        raise _HealthEndedError(_UNHEALTHY)
+        raise _HealthEndedError(messages.UNHEALTHY())
 
     def _on_emergency(self, emergency: Emergency) -> None:
         node, code, register = emergency
@@ -358,8 +348,10 @@ class LineIo:
             self._emergencies = {key: text for key, text in self._emergencies.items() if key[0] != node}
             return
         self._counters["emergencies"] += 1
-        name = "the reject gate" if node == self._settings.gate_node else "the line encoder"
-        self._emergencies[node, code] = f"{name} (node {node}): {described_emergency(code, register)}"
+        self._emergencies[node, code] = described_emergency(self._name(node), code, register)
+
+    def _name(self, node: int) -> Message:
+        return (messages.GATE if node == self._settings.gate_node else messages.ENCODER)(node=node)
 
     def _in_worker(self, work: Callable[[], Result]) -> Awaitable[Result]:
         """Run a blocking function in the one worker thread."""

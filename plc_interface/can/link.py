@@ -16,6 +16,8 @@ import can
 import canopen
 
 from plc_interface.can.errors import BusOffError, InterfaceError
+from station.messages import can as messages
+from station.messages.message import Definition, Message
 from station.settings.can import CanSettings
 
 _RECEIVE_S = 0.1
@@ -80,14 +82,15 @@ def open_bus(settings: CanSettings) -> can.BusABC:
         return can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **options)
     except (can.CanError, OSError) as error:
         raise InterfaceError(
-            f"{described(settings)} cannot be opened: {_why(error)}; {_remedy(settings, error)}"
+            messages.NOT_OPENED(bus=described(settings), error=_why(error), remedy=_remedy(settings, error))
         ) from error
 
 
-def described(settings: CanSettings) -> str:
+def described(settings: CanSettings) -> Message:
     """Describe the interface."""
-    port = f" port {settings.port}" if settings.interface == "udp_multicast" else ""
-    return f"the CAN interface {settings.interface} {settings.channel}{port}"
+    if settings.interface == "udp_multicast":
+        return messages.INTERFACE_PORT(interface=settings.interface, channel=settings.channel, port=settings.port)
+    return messages.INTERFACE(interface=settings.interface, channel=settings.channel)
 
 
 def _why(error: BaseException) -> str:
@@ -95,15 +98,12 @@ def _why(error: BaseException) -> str:
     return (cause.strerror if isinstance(cause, OSError) else None) or str(cause)
 
 
-def _remedy(settings: CanSettings, error: Exception) -> str:
+def _remedy(settings: CanSettings, error: Exception) -> Message:
     if settings.interface == "udp_multicast":
-        return "this machine needs a network route for multicast: choose another can.channel, or add a route"
+        return messages.DO_ROUTE()
     if isinstance(error, OSError) and error.errno in _NO_CAN:
-        return "this machine's kernel has no CAN: load the modules can and can_raw, or set can.interface"
-    return (
-        "look for it with: ip link show type can; bring it up with: "
-        f"ip link set {settings.channel} up type can bitrate {settings.bitrate} restart-ms 100"
-    )
+        return messages.DO_KERNEL()
+    return messages.DO_BRING_UP(channel=settings.channel, bitrate=str(settings.bitrate))
 
 
 class CanLink:
@@ -153,7 +153,7 @@ class CanLink:
         if self._failure:
             raise self._failure
         if not self._thread.is_alive():
-            raise InterfaceError(f"{described(self._settings)} is deaf: the receiving thread has ended; it is reopened")
+            raise InterfaceError(messages.DEAF(bus=described(self._settings)))
 
     def send(self, can_id: int, data: bytes) -> None:
         """Send one frame.
@@ -166,13 +166,11 @@ class CanLink:
             InterfaceError: the bus is closed or does not accept it.
         """
         if self._ended.is_set():
-            raise InterfaceError(f"{described(self._settings)} is closed")
+            raise InterfaceError(messages.CLOSED(bus=described(self._settings)))
         try:
             self.network.send_message(can_id, data)
         except (can.CanError, OSError, RuntimeError) as error:
-            raise InterfaceError(
-                f"{described(self._settings)} does not send: {_why(error)}; {_remedy(self._settings, error)}"
-            ) from error
+            raise InterfaceError(self._failed(messages.NOT_SENDING, error)) from error
 
     def abort(self) -> None:
         """Stop receiving and sending, so that a thread that waits for a node ends soon."""
@@ -193,8 +191,7 @@ class CanLink:
                 self._counters["receive_errors"] += 1
                 failures += 1
                 if failures >= _MOST_FAILURES:
-                    why = f"{described(self._settings)} does not receive: {_why(error)}; "
-                    self._failure = InterfaceError(why + _remedy(self._settings, error))
+                    self._failure = InterfaceError(self._failed(messages.NOT_RECEIVING, error))
                     return
                 self._ended.wait(_FAILURE_PAUSE_S)
                 continue
@@ -202,14 +199,14 @@ class CanLink:
             if message is not None:
                 self._take(message)
 
+    def _failed(self, what: Definition, error: Exception) -> Message:
+        return what(bus=described(self._settings), error=_why(error), remedy=_remedy(self._settings, error))
+
     def _take(self, message: can.Message) -> None:
         if message.is_error_frame:
             if message.arbitration_id & _BUS_OFF:
                 self._counters["bus_off"] += 1
-                self._failure = BusOffError(
-                    f"{described(self._settings)} is bus-off after too many errors; "
-                    "look at cable, termination and bit rate; it is reopened by itself"
-                )
+                self._failure = BusOffError(messages.BUS_OFF(bus=described(self._settings)))
             return
         if message.is_remote_frame:
             return

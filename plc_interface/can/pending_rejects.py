@@ -16,6 +16,8 @@ from plc_interface.can.errors import (
     RejectRefusedError,
 )
 from plc_interface.can.link import Report
+from station.messages import can as messages
+from station.messages.message import Message
 
 _REMEMBERED = 64
 _KEPT_FAULTS = 8
@@ -81,24 +83,15 @@ class PendingReject:
             case Fired.FIRED:
                 off = ahead(at, report.encoder_count)
                 if abs(off) > self._tolerance_counts:
-                    raise EchoWrongError(
-                        sequence,
-                        f"the gate fired {abs(off)} counts {'after' if off > 0 else 'before'} count {at}; "
-                        "look at the encoder and at can.tolerance_counts",
-                    )
+                    fired = messages.FIRED_LATE if off > 0 else messages.FIRED_EARLY
+                    raise EchoWrongError(sequence, fired(counts=abs(off), at_count=at))
                 return report
             case Fired.LATE:
-                raise LateRejectError(
-                    sequence,
-                    f"count {at} was past when the gate got the order, at {report.encoder_count}; "
-                    "the fruit went by: raise can.distance_counts or shorten the inspection",
-                )
+                raise LateRejectError(sequence, messages.ORDER_LATE(at_count=at, now_count=report.encoder_count))
             case Fired.FULL:
-                raise RejectRefusedError(sequence, "the gate has no place left for an order; slow the line down")
+                raise RejectRefusedError(sequence, messages.GATE_FULL())
             case _:
-                raise RejectRefusedError(
-                    sequence, f"the gate does not take lane {self.order.lane} (answer {report.fired}); look at the lane"
-                )
+                raise RejectRefusedError(sequence, messages.LANE_REFUSED(lane=self.order.lane, answer=report.fired))
 
 
 class PendingRejects:
@@ -109,8 +102,8 @@ class PendingRejects:
         self._tolerance_counts = tolerance_counts
         self._pending: dict[int, PendingReject] = {}
         self._ended: deque[int] = deque(maxlen=_REMEMBERED)
-        self.faults: deque[str] = deque(maxlen=_KEPT_FAULTS)
-        """Failed reject actuations since the last acknowledgement, one sentence each."""
+        self.faults: deque[Message] = deque(maxlen=_KEPT_FAULTS)
+        """Failed reject actuations since the last acknowledgement."""
 
     @contextmanager
     def under_way(self, order: Order) -> Iterator[PendingReject]:
@@ -120,7 +113,7 @@ class PendingRejects:
             RejectRefusedError: an order with this sequence is pending.
         """
         if order.on_wire in self._pending:
-            raise RejectRefusedError(order.sequence, "it is ordered already; give each shot a sequence of its own")
+            raise RejectRefusedError(order.sequence, messages.ORDERED_TWICE())
         pending = self._pending[order.on_wire] = PendingReject(order, self._tolerance_counts)
         try:
             yield pending
@@ -134,7 +127,7 @@ class PendingRejects:
     def blame(self, error: RejectError) -> None:
         """Count a failed reject actuation, and store it as a fault."""
         self._counters["shots_failed"] += 1
-        self.faults.append(str(error))
+        self.faults.append(error.message)
 
     def on_report(self, report: Report) -> None:
         """Assign a report of the gate to its order."""
@@ -144,14 +137,10 @@ class PendingRejects:
             self._counters["echoes_late"] += 1
         else:
             self._counters["echoes_unknown"] += 1
-            self.faults.append(
-                f"the gate reports shot {report.sequence}, which was not ordered; look for a second master on the bus"
-            )
+            self.faults.append(messages.UNORDERED_REPORT(sequence=report.sequence))
 
-    def lose(self, why: str) -> None:
+    def lose(self, why: Message) -> None:
         """End all orders: the gate is lost, and its actions are unknown."""
         for pending in self._pending.values():
-            lost = RejectLostError(
-                pending.order.sequence, f"the gate was lost before it reported ({why}); look at the fruit"
-            )
+            lost = RejectLostError(pending.order.sequence, messages.GATE_LOST(why=why))
             pending.reports.put_nowait(lost)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from plc_interface.handshake.journal import Journal
 from station.channel.line import CommandName, Outcome
+from station.messages.message import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ class ClearFaults:
 class Log:
     """Write one line into the log."""
 
-    text: str
+    text: Message | str
     warning: bool = True
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum
 from typing import Any, NamedTuple
 
 from plc_interface.handshake.events import Inputs, Moment
@@ -10,22 +10,27 @@ from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
 from plc_interface.register_map import QUEUE_PLACES
 from station.channel.line import Outcome, Refusal, StationState
+from station.messages import line as messages
+from station.messages.message import Message
 
 
-class Fault(StrEnum):
-    """A fault of the line, as one sentence with the remedy; latched until clear_error."""
+class Fault(Enum):
+    """A fault of the line, by its message; latched until clear_error."""
 
-    PLC_SILENT = "the PLC's heartbeat stood still: check the PLC, then give enable anew"
-    WRITER_LOST = "the writing PLC's connection was lost: connect, then give enable anew"
-    TRIGGER_NOT_RESET = "the PLC did not take its trigger bit back: drop it after trigger_acknowledged"
-    ACKNOWLEDGE_NOT_RESET = "the PLC did not take its acknowledge bit back: drop it when result_valid falls"
-    EXECUTE_NOT_RESET = "the PLC did not take its execute bit back: drop it after command_done or command_failed"
-    LATCH_NOT_RESET = "the PLC did not take its latch bit back: drop it after lot_latched"
-    WRONG_ACKNOWLEDGEMENT = (
-        "the PLC acknowledged another sequence than the one shown: read result_sequence, and check the word order"
-    )
-    BAD_LOT = "the lot id is not printable ASCII, so that it was not latched: write it anew"
-    COMMAND_BUSY = "the PLC gave a command while another was carried out: wait for command_done or command_failed"
+    PLC_SILENT = messages.PLC_SILENT
+    WRITER_LOST = messages.WRITER_LOST
+    TRIGGER_NOT_RESET = messages.TRIGGER_NOT_RESET
+    ACKNOWLEDGE_NOT_RESET = messages.ACKNOWLEDGE_NOT_RESET
+    EXECUTE_NOT_RESET = messages.EXECUTE_NOT_RESET
+    LATCH_NOT_RESET = messages.LATCH_NOT_RESET
+    WRONG_ACKNOWLEDGEMENT = messages.WRONG_ACKNOWLEDGEMENT
+    BAD_LOT = messages.BAD_LOT
+    COMMAND_BUSY = messages.COMMAND_BUSY
+
+    @property
+    def message(self) -> Message:
+        """Return what is wrong, with the remedy."""
+        return self.value()
 
 
 class Size(NamedTuple):

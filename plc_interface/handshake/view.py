@@ -8,7 +8,6 @@ from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
 from plc_interface.register_map import BY_NAME
 from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
-from station.messages.message import verbatim
 
 Value = int | float | str | None
 
@@ -36,7 +35,7 @@ def line(state: State, counters: Mapping[str, int], faults: tuple[LineFault, ...
         enabled=state.arming is Arming.ARMED,
         waiting=len(state.queue),
         counters={**state.counters, **counters},
-        faults=(*(LineFault(part="handshake", what=verbatim(fault.value)) for fault in state.faults), *faults),
+        faults=(*(LineFault(part="handshake", what=fault.message) for fault in state.faults), *faults),
     )
 
 

@@ -10,6 +10,7 @@ from plc_interface.handshake.events import Event, Moment
 from plc_interface.handshake.modes import Mode, Signal
 from plc_interface.handshake.state import NO_SIZE, Fault, Size, State
 from station.channel.line import Outcome
+from station.messages.message import Message
 from station.settings.plc import HandshakeSettings
 
 
@@ -42,11 +43,11 @@ class Work:
     def fault(self, fault: Fault) -> None:
         """Count, log and latch a handshake fault."""
         self.count("count_communication")
-        self.log(fault.value)
+        self.log(fault.message)
         if fault not in self.state.faults:
             self.state.faults = (*self.state.faults, fault)
 
-    def log(self, text: str, *, warning: bool = True) -> None:
+    def log(self, text: Message | str, *, warning: bool = True) -> None:
         """Write one line into the log."""
         self.actions.append(Log(text, warning))
 

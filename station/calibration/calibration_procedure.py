@@ -14,13 +14,15 @@ from math import hypot
 from typing import NamedTuple
 
 from station.calibration import figures, gel
-from station.calibration.checks import ROUNDEST, calibration_checks
+from station.calibration.checks import ROUNDEST, calibration_checks, failed_check
 from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
 from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
 from station.calibration.rig import OnProgress, Place, Progress, Rig, Unit
-from station.errors import StationError
+from station.errors import BadInputError, StationError
+from station.messages import calibration as messages
+from station.messages.message import Definition, Message
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
 from station.vision.contact import Image
@@ -32,14 +34,6 @@ NOISE_FRAMES = 30
 _PLACES_CLOSING_MM = 2.0
 """Deep enough for a good centre, shallow enough to stay inside the field also away from the middle."""
 _LEAST_WAY_MM = 2.0
-
-TEXTS = {
-    "untouched": "the untouched gel",
-    "press": "the ball, step by step",
-    "onset": "where the contact begins",
-    "place": "the ball at another place",
-    "judge": "the result",
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +96,7 @@ class CalibrationProcedure:
         self._pressed: list[Step] = []
         self._checks: tuple[Check, ...] = ()
         if any(hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < _LEAST_WAY_MM for a, b in combinations(self._places, 2)):
-            raise ValueError(f"expected places at least {_LEAST_WAY_MM:g} mm apart, the first is 0,0")
+            raise BadInputError(messages.PLACES_TOO_NEAR(least_mm=_LEAST_WAY_MM))
 
     @property
     def evidence(self) -> Evidence:
@@ -122,7 +116,7 @@ class CalibrationProcedure:
             await self._let_go()
             raise
         await self._rig.release()
-        self._say("judge", 1, 1, "")
+        self._say(messages.STEP_JUDGE, 1, 1)
         return await asyncio.to_thread(self._judge, measured)
 
     async def _let_go(self) -> None:
@@ -132,20 +126,23 @@ class CalibrationProcedure:
             log.warning("the jaws could not be opened: %s", error)
 
     async def _measure(self) -> _Measured:
-        self._say("untouched", 1, 1, f"{NOISE_FRAMES} frames, nothing may touch the gel")
+        self._say(messages.STEP_UNTOUCHED, 1, 1, messages.FRAMES(number=NOISE_FRAMES))
         frames = await self._press.take_reference(NOISE_FRAMES)
         reference = self._press.reference
         assert reference is not None  # noqa: S101 (taken just now)
         findings = await asyncio.to_thread(gel.examine, reference, None, self._settings.least_light)
         if findings:
-            raise RefusedError(*(f"{finding.sentence}: {gel.REMEDIES[finding.ill]}" for finding in findings))
+            raise RefusedError(
+                *(messages.FAULT_AND_REMEDY(fault=each.message, remedy=gel.REMEDIES[each.ill]()) for each in findings)
+            )
         if max(await asyncio.to_thread(lambda: figures.pixel_noise(frames).mean(axis=(0, 1)))) == 0:
-            raise RefusedError("the frames do not differ at all: a live sensor's do; see `station devices check`")
+            raise RefusedError(messages.FRAMES_EQUAL())
         untouched = [await self._press.measure([frame]) for frame in frames[:: max(1, len(frames) // 6)]]
         steps = await self._press_through()
         first = next(step for step in steps if step.contact.is_firm)
         before = [step for step in steps if step.width_mm > first.width_mm]
-        self._say("onset", 1, 1, f"between {before[-1].width_mm:.1f} and {first.width_mm:.1f} mm")
+        between = messages.ONSET_BETWEEN(wider_mm=before[-1].width_mm, narrower_mm=first.width_mm)
+        self._say(messages.STEP_ONSET, 1, 1, between)
         onset_mm = await self._press.fine_onset(before[-1].width_mm, first.width_mm)
         noise = await asyncio.to_thread(figures.noise, frames, [*untouched, *(step.contact for step in before)])
         return _Measured(reference, frames, steps, onset_mm, noise, await self._at_places(onset_mm))
@@ -158,20 +155,14 @@ class CalibrationProcedure:
             step = await self._press.step(start_mm - number * plan.step_mm)
             steps.append(step)
             self._pressed.append(step)
-            area = f"{step.contact.area_px} px" if step.contact.found else "no contact"
-            self._say("press", number + 1, plan.number + 1, f"{step.width_mm:.2f} mm: {area}")
+            self._say(messages.STEP_PRESS, number + 1, plan.number + 1, step.message)
             if number == 0 and step.contact.is_firm:
                 met_mm = self._settings.ball_mm + self._settings.holder_mm
                 raise RefusedError(
-                    f"something touches the gel at the start, {step.width_mm:.1f} mm, and a "
-                    f"{self._settings.ball_mm:g} mm ball is met at {met_mm:.1f} mm: take it out, look for the "
-                    "right ball and what holds it"
+                    messages.TOUCHED_AT_START(width_mm=step.width_mm, ball_mm=self._settings.ball_mm, met_mm=met_mm)
                 )
         if not any(step.contact.is_firm for step in steps):
-            raise RefusedError(
-                f"nothing touched the gel down to {steps[-1].width_mm:.1f} mm: is the ball between the fingers? "
-                "A smaller one is never met"
-            )
+            raise RefusedError(messages.NOTHING_TOUCHED(width_mm=steps[-1].width_mm))
         return steps
 
     async def _at_places(self, onset_mm: float) -> list[PlacePoint]:
@@ -186,12 +177,9 @@ class CalibrationProcedure:
             step = await self._press.step(onset_mm - _PLACES_CLOSING_MM)
             self._pressed.append(step)
             contact = step.contact
-            where = f"place {number + 1}, {place.x_mm:g},{place.y_mm:g} mm"
+            where = messages.PLACE(number=number + 1, x_mm=place.x_mm, y_mm=place.y_mm)
             if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
-                raise RefusedError(
-                    f"{where}: at {step.width_mm:.1f} mm no whole contact is seen: lay the ball nearer to the "
-                    "gel's middle, as high as before"
-                )
+                raise RefusedError(messages.PLACE_UNSEEN(place=where, width_mm=step.width_mm))
             x_px, y_px = contact.centroid_px
             found.append(
                 PlacePoint(
@@ -203,7 +191,8 @@ class CalibrationProcedure:
                     area_px=contact.area_px,
                 )
             )
-            self._say("place", number + 1, len(self._places), f"{where}: at {x_px:.0f}, {y_px:.0f} px")
+            seen = messages.PLACE_SEEN(place=where, x_px=x_px, y_px=y_px)
+            self._say(messages.STEP_PLACE, number + 1, len(self._places), seen)
         return found
 
     def _judge(self, measured: _Measured) -> Draft:
@@ -240,8 +229,8 @@ class CalibrationProcedure:
             checks=checks,
         )
         if bad := [check for check in checks if not check.passed]:
-            raise RefusedError(*(f"{one.name}: {one.found}, expected {one.expected}: {one.remedy}" for one in bad))
+            raise RefusedError(*(failed_check(one) for one in bad))
         return Draft(calibration, reference, tuple(steps))
 
-    def _say(self, what: str, number: int, of: int, detail: str) -> None:
-        self._on_progress(Progress(number, of, TEXTS[what], detail))
+    def _say(self, title: Definition, number: int, of: int, detail: Message | None = None) -> None:
+        self._on_progress(Progress(number, of, title(), detail))

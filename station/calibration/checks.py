@@ -7,6 +7,8 @@ from station.calibration import figures
 from station.calibration.figures import QUIET_GATE, MeasuredScale
 from station.calibration.model import Calibration, Check, Levels, Noise, PressPoint
 from station.calibration.press import Step
+from station.messages import calibration as messages
+from station.messages.message import Message, verbatim
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
 from station.vision.scale import TYPICAL_UNCERTAINTY
@@ -45,49 +47,48 @@ def calibration_checks(
     fall = figures.falls(curve)
     round_ = max((figures.roundness(step.contact) for step in touched), default=0.0)
     confidence = min((point.confidence or 0.0 for point in curve), default=0.0)
-    another_ball = "another ball or holder, or the gripper's zero is off: look at the ball, then at "
     checks = [
         Check(
             name="ball",
             passed=abs(onset_mm - met_mm) <= settings.ball_tolerance_mm,
-            found=f"contact begins at {onset_mm:.2f} mm",
-            expected=f"{met_mm:.1f} ± {settings.ball_tolerance_mm:g} mm",
-            remedy=another_ball + "gripper.calibration.finger_offset_mm",
+            found=messages.CONTACT_BEGINS(width_mm=onset_mm),
+            expected=messages.WIDTH_EXPECTED(width_mm=met_mm, tolerance_mm=settings.ball_tolerance_mm),
+            remedy=messages.DO_BALL(),
         ),
         Check(
             name="round",
             passed=0 < round_ <= ROUNDEST,
-            found=f"the contact's axes differ by {round_ - 1:.0%}",
-            expected=f"a ball's, at most {ROUNDEST - 1:.0%}",
-            remedy="lay the rubber ball in, upright between the fingers, and nothing else",
+            found=messages.AXES_DIFFER(percent=100 * (round_ - 1)),
+            expected=messages.AXES_EXPECTED(percent=100 * (ROUNDEST - 1)),
+            remedy=messages.DO_ROUND(),
         ),
         Check(
             name="steps",
             passed=len(curve) >= _LEAST_STEPS,
-            found=f"{len(curve)} steps show a whole contact",
-            expected=f"at least {_LEAST_STEPS}",
-            remedy="lay the rubber ball in the gel's middle, and nothing else",
+            found=messages.STEPS_WHOLE(number=len(curve)),
+            expected=messages.AT_LEAST(value=_LEAST_STEPS),
+            remedy=messages.DO_STEPS(),
         ),
         Check(
             name="rising",
             passed=fall is None,
-            found="the area rises at every step" if fall is None else _fallen(*fall),
-            expected="an area that rises step by step",
-            remedy="clean gel and ball, see that the ball does not slip or roll, and try again",
+            found=messages.AREA_RISES() if fall is None else _fallen(*fall),
+            expected=messages.RISE_EXPECTED(),
+            remedy=messages.DO_RISING(),
         ),
         Check(
             name="confidence",
             passed=confidence >= _LEAST_CONFIDENCE,
-            found=f"{confidence:.2f} at the worst step",
-            expected=f"at least {_LEAST_CONFIDENCE:g}",
-            remedy="clean gel and lens, keep outside light off, and try again",
+            found=messages.WORST_CONFIDENCE(value=confidence),
+            expected=messages.AT_LEAST(value=_LEAST_CONFIDENCE),
+            remedy=messages.DO_CONFIDENCE(),
         ),
         Check(
             name="noise",
             passed=noise.gate_factor <= _MOST_GATE_FACTOR,
-            found=f"with nothing touching the gate reaches {noise.gate:.2f}",
-            expected=f"at most {QUIET_GATE * _MOST_GATE_FACTOR:.2f}",
-            remedy="keep outside light off, check the sensor's cable and light, and try again",
+            found=messages.GATE_REACHED(value=noise.gate),
+            expected=messages.AT_MOST(value=QUIET_GATE * _MOST_GATE_FACTOR),
+            remedy=messages.DO_NOISE(),
         ),
     ]
     if scale is not None:
@@ -96,9 +97,9 @@ def calibration_checks(
             Check(
                 name="scale",
                 passed=low <= scale.mm_per_px <= high and scale.uncertainty < TYPICAL_UNCERTAINTY,
-                found=f"{scale.mm_per_px:.5f} mm/px ± {scale.uncertainty:.1%}",
-                expected=f"{low:g} to {high:g} mm/px, known better than without a measurement",
-                remedy="lay the ball at exactly the places that were asked for, and try again",
+                found=messages.SCALE_FOUND(scale_mm=scale.mm_per_px, percent=100 * scale.uncertainty),
+                expected=messages.SCALE_EXPECTED(least_mm=low, most_mm=high),
+                remedy=messages.DO_SCALE(),
             )
         )
     return checks
@@ -124,38 +125,76 @@ def verification_checks(
     fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
     shift_mm = None if onset_mm is None else onset_mm - calibration.onset_mm
-    look = "look at the ball and how it lies, and at the gel; if both are as they were, calibrate"
     return [
         Check(
             name="onset",
             passed=shift_mm is not None and abs(shift_mm) <= settings.onset_tolerance_mm,
-            found="nothing was touched" if onset_mm is None else f"contact begins at {onset_mm:.2f} mm",
-            expected=f"{calibration.onset_mm:.2f} ± {settings.onset_tolerance_mm:g} mm",
-            remedy="is it the ball of the calibration, in its holder? Then the gripper's zero has moved: calibrate",
+            found=messages.NOTHING_TOUCHED_NOW() if onset_mm is None else messages.CONTACT_BEGINS(width_mm=onset_mm),
+            expected=messages.ONSET_EXPECTED(width_mm=calibration.onset_mm, tolerance_mm=settings.onset_tolerance_mm),
+            remedy=messages.DO_ONSET(),
         ),
         Check(
             name="area",
             passed=area is not None and abs(area - 1.0) <= settings.area_tolerance,
-            found="no area" if area is None else f"{area:.1%} of the calibration's area",
-            expected=f"{1 - settings.area_tolerance:.0%} to {1 + settings.area_tolerance:.0%}",
-            remedy=look,
+            found=messages.NO_AREA() if area is None else messages.AREA_RATIO(percent=100 * area),
+            expected=messages.RATIO_EXPECTED(
+                least_percent=100 * (1 - settings.area_tolerance), most_percent=100 * (1 + settings.area_tolerance)
+            ),
+            remedy=messages.DO_AREA(),
         ),
         Check(
             name="rising",
             passed=fall is None and area is not None,
-            found=_fallen(*fall) if fall else "the area rises at every step" if area is not None else "no area",
-            expected="an area that rises step by step",
-            remedy="clean gel and ball, see that the ball does not slip or roll, and try again",
+            found=_fallen(*fall) if fall else messages.NO_AREA() if area is None else messages.AREA_RISES(),
+            expected=messages.RISE_EXPECTED(),
+            remedy=messages.DO_RISING(),
         ),
         Check(
             name="noise",
             passed=noise <= settings.most_noise,
-            found=f"{noise:.1f} times the noise of the calibration",
-            expected=f"at most {settings.most_noise:g} times",
-            remedy="keep outside light off, check the sensor's cable and light",
+            found=messages.NOISE_RATIO(ratio=noise),
+            expected=messages.NOISE_EXPECTED(ratio=settings.most_noise),
+            remedy=messages.DO_NOISE_NOW(),
         ),
     ]
 
 
-def _fallen(one: PressPoint, other: PressPoint) -> str:
-    return f"from {one.width_mm:.1f} to {other.width_mm:.1f} mm the area goes from {one.area_px} to {other.area_px} px"
+def check_name(name: str) -> Message:
+    """Return a check's name as a message.
+
+    Args:
+        name: as `Check.name`; that of a check which this version does not have is shown as it is.
+    """
+    known = _NAMES.get(name)
+    return verbatim(name) if known is None else known()
+
+
+def failed_check(check: Check) -> Message:
+    """Return what a failed check found, with the remedy."""
+    return messages.CHECK_FAILED(
+        check=check_name(check.name), found=check.found, expected=check.expected, remedy=check.remedy
+    )
+
+
+_NAMES = {
+    "ball": messages.CHECK_BALL,
+    "round": messages.CHECK_ROUND,
+    "steps": messages.CHECK_STEPS,
+    "rising": messages.CHECK_RISING,
+    "confidence": messages.CHECK_CONFIDENCE,
+    "noise": messages.CHECK_NOISE,
+    "scale": messages.CHECK_SCALE,
+    "onset": messages.CHECK_ONSET,
+    "area": messages.CHECK_AREA,
+    "tear": messages.CHECK_TEAR,
+    "dirt": messages.CHECK_DIRT,
+    "led": messages.CHECK_LED,
+    "fog": messages.CHECK_FOG,
+    "wear": messages.CHECK_WEAR,
+}
+
+
+def _fallen(one: PressPoint, other: PressPoint) -> Message:
+    return messages.AREA_FALLS(
+        wider_mm=one.width_mm, narrower_mm=other.width_mm, before_px=one.area_px, after_px=other.area_px
+    )

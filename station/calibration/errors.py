@@ -1,6 +1,8 @@
 """Calibration errors."""
 
 from station.errors import BadInputError, StationError
+from station.messages.calibration import REFUSED
+from station.messages.message import Message
 
 
 class CalibrationError(StationError):
@@ -11,11 +13,11 @@ class RefusedError(CalibrationError):
     """The result is no valid calibration; the one before stays in force.
 
     Args:
-        reasons: in sentences, each with the remedy.
+        reasons: each with the remedy.
     """
 
-    def __init__(self, *reasons: str) -> None:
-        super().__init__(f"no calibration is stored: {'; '.join(reasons)}")
+    def __init__(self, *reasons: Message) -> None:
+        super().__init__(REFUSED(reasons=reasons))
         self.reasons = reasons
 
 

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from station.calibration.model import Levels
+from station.messages import calibration as messages
+from station.messages.message import Message
 from station.vision.contact import Image, Mask
 
 _LONG_SIDE_PX = 640
@@ -27,7 +29,7 @@ _MOST_BLEMISHED = 0.006
 _TEAR_LENGTH, _TEAR_SLENDERNESS = 0.5, 10.0
 """A tear's diagonal over the image's width, and over its own mean width; real blemishes reach 0.2 and 6."""
 _DEAD_LED = 1 / 3
-_LED_COLOURS = ("blue", "green", "red")
+_LED_COLOURS = (messages.BLUE, messages.GREEN, messages.RED)
 _MARK = (0, 0, 255)
 
 
@@ -42,20 +44,20 @@ class GelFault(StrEnum):
 
 
 REMEDIES = {
-    GelFault.TEAR: "change the gel, then calibrate",
-    GelFault.DIRT: "wipe the gel with a soft cloth and alcohol, then try again",
-    GelFault.LED: "check the sensor's cable and light settings; a dead LED asks for another sensor, then calibrate",
-    GelFault.FOG: "clean the sensor's lens and gel, then try again",
-    GelFault.WEAR: "change the gel, then calibrate",
+    GelFault.TEAR: messages.DO_CHANGE_GEL,
+    GelFault.DIRT: messages.DO_WIPE,
+    GelFault.LED: messages.DO_LED,
+    GelFault.FOG: messages.DO_CLEAN,
+    GelFault.WEAR: messages.DO_CHANGE_GEL,
 }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """One fault, as a sentence and a picture."""
+    """One fault with a picture of it."""
 
     ill: GelFault
-    sentence: str
+    message: Message
     picture: Image
 
 
@@ -71,8 +73,8 @@ def examine(image: Image, golden: Image | None, least_light: float) -> list[Find
     if lost:
         return lost
     if golden is not None and (fog := sharpness(image) / sharpness(golden)) < least_light:
-        text = f"the untouched gel shows {fog:.0%} of the detail it had: fogged or smeared"
-        return [Finding(GelFault.FOG, text, side_by_side(golden, image))]
+        fogged = messages.FOGGED(percent=100 * fog)
+        return [Finding(GelFault.FOG, fogged, side_by_side(golden, image))]
     return _blemishes(image, golden)
 
 
@@ -123,9 +125,10 @@ def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[
     lost = [(share, colour) for share, colour in shares if share < limit]
     if not lost:
         return []
-    words = ", ".join(f"{colour} {share:.0%}" for share, colour in lost)
-    what = "is dead or not connected" if min(lost)[0] < _DEAD_LED else "has grown dim"
-    text = f"light of {words} of {'the other colours' if golden is None else 'what it was'}: an LED {what}"
+    colours = [colour(percent=100 * share) for share, colour in lost]
+    dead = min(share for share, _ in lost) < _DEAD_LED
+    of_before = messages.LED_DEAD if dead else messages.LED_DIM
+    text = (messages.LED_DEAD_OF_OTHERS if golden is None else of_before)(colours=colours)
     return [Finding(GelFault.LED, text, image if golden is None else side_by_side(golden, image))]
 
 
@@ -134,13 +137,12 @@ def _blemishes(image: Image, golden: Image | None) -> list[Finding]:
     found, torn = _regions(image, golden, scale)
     findings: list[Finding] = []
     if torn.any():
-        text = "a long thin line runs across the gel: it is torn or cut"
-        findings.append(Finding(GelFault.TEAR, text, _marked(image, torn)))
+        findings.append(Finding(GelFault.TEAR, messages.TORN(), _marked(image, torn)))
     share = float(np.mean(found > 0))
     if share > (_MOST_BLEMISHED if golden is None else 0.0):
         number = cv2.connectedComponents(found)[0] - 1
-        what = "places" if golden is None else "new places"
-        text = f"{number} {what} on the gel, {share:.1%} of the field, look like dirt or damage"
+        blemished = messages.BLEMISHED if golden is None else messages.NEWLY_BLEMISHED
+        text = blemished(number=number, percent=100 * share)
         findings.append(Finding(GelFault.DIRT, text, _marked(image, found)))
     return findings
 

@@ -3,7 +3,10 @@
 from datetime import UTC, datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from station.messages import calibration as messages
+from station.messages.message import Message, verbatim
 
 Serial = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 """A unit's serial number; it names a folder."""
@@ -12,6 +15,8 @@ Stamp = Annotated[str, Field(pattern=r"^\d{8}T\d{6}Z$")]
 Levels = tuple[float, float, float]
 """Grey levels of blue, green and red."""
 Positive = Annotated[float, Field(gt=0.0)]
+Text = Annotated[Message, BeforeValidator(lambda value: verbatim(value) if isinstance(value, str) else value)]
+"""A message; in records of versions before messages a sentence."""
 
 
 class Stored(BaseModel):
@@ -25,9 +30,9 @@ class Check(Stored):
 
     name: str
     passed: bool
-    found: str
-    expected: str
-    remedy: str = ""
+    found: Text
+    expected: Text
+    remedy: Text
     """Remedy if it has not passed."""
     picture: str | None = None
     """The file beside the record that shows it."""
@@ -83,7 +88,8 @@ class Noise(Stored):
 class Calibration(Stored):
     """One unit's calibration."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[1, 2] = 2
+    """1: with sentences in the place of messages."""
     id: Stamp
     serial: Serial
     unit: str
@@ -123,16 +129,17 @@ class Calibration(Stored):
         """Return the relative uncertainty of an area in mm²."""
         return 2 * self.scale_uncertainty
 
-    def summary(self) -> str:
+    def summary(self) -> Message:
         """Describe it in one line, for records and reports."""
-        how = "measured" if self.scale_measured else "usual"
-        return f"{self.id}: {self.mm_per_px:.5f} mm/px ± {self.scale_uncertainty:.1%}, {how}"
+        summary = messages.SUMMARY_MEASURED if self.scale_measured else messages.SUMMARY_USUAL
+        return summary(calibration=self.id, scale_mm=self.mm_per_px, percent=100 * self.scale_uncertainty)
 
 
 class Verification(Stored):
     """One verification of a unit against its calibration."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[1, 2] = 2
+    """1: with sentences in the place of messages."""
     id: Stamp
     serial: Serial
     calibration: Stamp
@@ -158,13 +165,14 @@ class Verification(Stored):
 class Refusal(Stored):
     """Measurements that are no valid calibration."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[1, 2] = 2
+    """1: with sentences in the place of messages."""
     id: Stamp
     serial: Serial
     unit: str
     operator: str
-    reasons: tuple[str, ...]
-    """In sentences, each with the remedy."""
+    reasons: tuple[Text, ...]
+    """Each with the remedy."""
     checks: tuple[Check, ...]
     """Empty if the run ended before the checks."""
     curve: tuple[PressPoint, ...]

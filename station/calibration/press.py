@@ -10,6 +10,8 @@ import numpy as np
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
 from station.calibration.rig import Pressed, Rig
+from station.messages import calibration as messages
+from station.messages.message import Message
 from station.settings.recipe import Recipe
 from station.vision.contact import Contact, Flag, Image, Method
 from station.vision.methods import make_method, median_image
@@ -32,6 +34,13 @@ class Step:
     """The frames' mean."""
     contact: Contact
     contrast_levels: float
+
+    @property
+    def message(self) -> Message:
+        """Return the width with the contact's area."""
+        if not self.contact.found:
+            return messages.NO_CONTACT_AT(width_mm=self.width_mm)
+        return messages.AREA_AT(width_mm=self.width_mm, area_px=self.contact.area_px)
 
     @property
     def point(self) -> PressPoint:

@@ -56,7 +56,7 @@ def verification_files(verified: VerificationResult, calibration: Calibration) -
         verdict=verification.passed,
         facts=[
             ("Unit", calibration.unit),
-            ("Calibration", calibration.summary()),
+            ("Calibration", str(calibration.summary())),
             ("Operator", verification.operator or "not told"),
             ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
         ],
@@ -83,7 +83,7 @@ def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
             ("Unit", refusal.unit),
             ("Operator", refusal.operator or "not told"),
             ("Made", f"{refusal.made_at:%Y-%m-%d %H:%M:%S} UTC"),
-            *(("Refused", reason) for reason in refusal.reasons),
+            *(("Refused", str(reason)) for reason in refusal.reasons),
         ],
         checks=[(check, None) for check in refusal.checks],
         plots=[],

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+from station.messages.message import Message
 from station.vision.contact import Image
 
 
@@ -63,8 +64,8 @@ class Progress(NamedTuple):
     number: int
     """Of this stage, from 1."""
     of: int
-    title: str
-    detail: str
+    title: Message
+    detail: Message | None
 
 
 OnProgress = Callable[[Progress], None]

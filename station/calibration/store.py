@@ -18,6 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
 from station.calibration.model import Calibration, Refusal, Serial, Stamp, Stored, Verification
+from station.messages import calibration as messages
 from station.vision.contact import Image
 
 CALIBRATIONS, VERIFICATIONS, REFUSALS = "calibrations", "verifications", "refused_calibrations"
@@ -114,7 +115,7 @@ class CalibrationStore:
             for calibration in self.calibrations(one):
                 if calibration.id == name:
                     return calibration
-        raise UnknownCalibrationError(f"there is no calibration {name!r}; see `station calibrate list`")
+        raise UnknownCalibrationError(messages.UNKNOWN(name=repr(name)))
 
     def _add(self, kind: str, serial: str, name: str, record: Stored, files: Mapping[str, bytes]) -> Path:
         folder = self._home / kind / _SERIAL.validate_python(serial)
@@ -133,10 +134,7 @@ class CalibrationStore:
         except OSError as error:
             if unfinished is not None:
                 shutil.rmtree(unfinished, ignore_errors=True)
-            raise CalibrationError(
-                f"{folder / name}: cannot be stored: {error.strerror}; free space there, or make it writable, and "
-                "do it again: nothing was kept"
-            ) from error
+            raise CalibrationError(messages.NOT_STORED(folder=str(folder / name), error=str(error.strerror))) from error
         return folder / name
 
     def _all(self, kind: str, serial: str, model: type[RecordT]):  # noqa: ANN202 (an iterator of the model)
@@ -160,7 +158,7 @@ def press_name(number: int) -> str:
 def _picture(path: Path) -> Image:
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
-        raise CalibrationError(f"{path}: the calibration's picture cannot be read; calibrate again")
+        raise CalibrationError(messages.PICTURE_UNREADABLE(file=str(path)))
     return np.asarray(picture, np.uint8)
 
 

@@ -14,6 +14,7 @@ from station.calibration.press import BallPress, Step
 from station.calibration.rig import OnProgress, Progress, Rig
 from station.calibration.store import press_name
 from station.errors import StationError
+from station.messages import calibration as messages
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
 from station.vision.contact import Image
@@ -24,11 +25,11 @@ _NOISE_FRAMES = 9
 _EVERY = 2
 """One of so many widths of the calibration is pressed."""
 _SOUND = {
-    GelFault.TEAR: "no tear is seen",
-    GelFault.DIRT: "no dirt is seen",
-    GelFault.LED: "every LED is as bright as it was",
-    GelFault.FOG: "gel and lens are clear",
-    GelFault.WEAR: "the gel answers as strongly as it did",
+    GelFault.TEAR: messages.NO_TEAR,
+    GelFault.DIRT: messages.NO_DIRT,
+    GelFault.LED: messages.LEDS_BRIGHT,
+    GelFault.FOG: messages.NO_FOG,
+    GelFault.WEAR: messages.NOT_WORN,
 }
 
 
@@ -85,7 +86,7 @@ class VerificationProcedure:
         return verified
 
     async def _run(self) -> VerificationResult:
-        self._on_progress(Progress(1, 1, "the untouched gel", f"{_NOISE_FRAMES} frames, nothing may touch the gel"))
+        self._on_progress(Progress(1, 1, messages.STEP_UNTOUCHED(), messages.FRAMES(number=_NOISE_FRAMES)))
         frames = await self._press.take_reference(_NOISE_FRAMES)
         reference = self._press.reference
         assert reference is not None  # noqa: S101 (taken just now)
@@ -121,15 +122,13 @@ class VerificationProcedure:
         steps: list[Step] = []
         for number, width_mm in enumerate(widths, start=1):
             steps.append(await self._press.step(width_mm))
-            area = f"{steps[-1].contact.area_px} px" if steps[-1].contact.found else "no contact"
-            detail = f"{steps[-1].width_mm:.2f} mm: {area}"
-            self._on_progress(Progress(number, len(widths), "the ball, step by step", detail))
+            self._on_progress(Progress(number, len(widths), messages.STEP_PRESS(), steps[-1].message))
         touched = next((step for step in steps if step.contact.is_firm), None)
         if touched is None or touched is steps[0]:
             return steps, None if touched is None else touched.width_mm
         before = max(step.width_mm for step in steps if step.width_mm > touched.width_mm)
         from_mm = min(before, self._calibration.onset_mm + 2 * self._settings.onset_tolerance_mm)
-        self._on_progress(Progress(1, 1, "where the contact begins", f"from {from_mm:.1f} mm"))
+        self._on_progress(Progress(1, 1, messages.STEP_ONSET(), messages.ONSET_FROM(width_mm=from_mm)))
         return steps, await self._press.fine_onset(max(from_mm, touched.width_mm), touched.width_mm)
 
     def _worn(self, steps: list[Step]) -> list[Finding]:
@@ -137,10 +136,10 @@ class VerificationProcedure:
         ratio = figures.contrast_ratio([step.point for step in touched], self._calibration.curve)
         if ratio is None or ratio >= self._settings.least_contrast:
             return []
-        text = f"the ball changes the picture {ratio:.0%} as much as at the calibration: the coating is worn"
+        worn = messages.WORN(percent=100 * ratio)
         now = touched[len(touched) // 2]
         widths = [abs(point.width_mm - now.width_mm) for point in self._calibration.curve]
-        return [Finding(GelFault.WEAR, text, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
+        return [Finding(GelFault.WEAR, worn, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
 
     @staticmethod
     def _health(ill: GelFault, findings: list[Finding]) -> Check:
@@ -148,9 +147,9 @@ class VerificationProcedure:
         return Check(
             name=ill,
             passed=found is None,
-            found=_SOUND[ill] if found is None else found.sentence,
-            expected="as at the calibration",
-            remedy=REMEDIES[ill],
+            found=_SOUND[ill]() if found is None else found.message,
+            expected=messages.AS_BEFORE(),
+            remedy=REMEDIES[ill](),
             picture=None if found is None else f"{ill}.png",
         )
 

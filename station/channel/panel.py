@@ -51,9 +51,9 @@ class ListedAlarm(ChannelMessage):
     since_utc_ms: int = Field(ge=0)
     raised: int = Field(ge=0)
     """Number of activations; more than one for a chattering alarm."""
-    cause: str
-    consequence: str
-    action: str
+    cause: Message
+    consequence: Message
+    action: Message
     document: str
     """Its document, as `docs/alarms.md#disk-low`."""
     shelved_until_utc_ms: int | None

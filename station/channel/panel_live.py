@@ -286,6 +286,7 @@ class AlarmChange(ChannelMessage):
 
     utc_ms: int
     id: str
+    cause: Message
     change: str
     detail: Message | None
 

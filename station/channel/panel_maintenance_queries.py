@@ -130,11 +130,11 @@ class GetCalibration(ChannelMessage):
 class CheckView(ChannelMessage):
     """One check of a calibration or verification."""
 
-    name: str
+    name: Message
     passed: bool
-    found: str
-    expected: str
-    remedy: str
+    found: Message
+    expected: Message
+    remedy: Message
 
 
 class CalibrationView(ChannelMessage):
@@ -144,7 +144,8 @@ class CalibrationView(ChannelMessage):
     id: str
     made_utc_ms: int
     operator: str
-    words: str
+    words: Message | None
+    """Its result in one line."""
     passed: bool
     checks: tuple[CheckView, ...]
     pictures: tuple[str, ...]
@@ -156,8 +157,8 @@ class RunStep(ChannelMessage):
 
     number: int
     of: int
-    title: str
-    detail: str
+    title: Message
+    detail: Message | None
 
 
 class CalibrationRunView(ChannelMessage):
@@ -178,8 +179,8 @@ class CalibrationState(ChannelMessage):
     """State of the sensor's calibration."""
 
     serial: str
-    in_use: str
-    """The scale as text."""
+    in_use: Message
+    """The scale."""
     calibration: CalibrationView | None
     verification: CalibrationView | None
     age_s: float | None

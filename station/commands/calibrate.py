@@ -97,19 +97,9 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
     async def run() -> Draft:
         cancelled_by_signals()
         async with open_rig(site, bench=bench, yes=yes) as (ball_bench, unit, recipe):
-            try:
-                procedure = CalibrationProcedure(
-                    ball_bench,
-                    unit,
-                    recipe,
-                    site.calibration,
-                    places,
-                    operator,
-                    version("fruit-station"),
-                    show,
-                )
-            except ValueError as error:
-                raise BadInputError(f"--place: {error}") from error
+            procedure = CalibrationProcedure(
+                ball_bench, unit, recipe, site.calibration, places, operator, version("fruit-station"), show
+            )
             try:
                 return await procedure.run()
             except RefusedError as refused:

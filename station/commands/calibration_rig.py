@@ -112,4 +112,4 @@ def cancelled_by_signals() -> None:
 def show(progress: Progress) -> None:
     """Print a procedure's progress."""
     count = f"{progress.number:2}/{progress.of}" if progress.of > 1 else ""
-    click.echo(f"{progress.title:28}{count:8}{progress.detail}".rstrip())
+    click.echo(f"{progress.title!s:28}{count:8}{progress.detail or ''}".rstrip())

@@ -6,6 +6,7 @@ from station.errors import BadInputError
 from station.inspection.cycle import Event
 from station.inspection.second_press import FREED_BY_MM
 from station.inspection.states import State
+from station.messages.operation import INSPECTION_TOO_LONG as TOO_LONG
 from station.settings.recipe_model import Recipe
 
 PHASE_MARGIN, INSPECTION_MARGIN = 3.0, 1.5
@@ -140,10 +141,7 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
         + pace.record_s
     )
     if inspection_s > LONGEST_S:
-        raise BadInputError(
-            f"recipe {recipe.name}: an inspection may take {inspection_s:.0f} s here, expected at most "
-            f"{LONGEST_S:g} s; take fewer steps, a shorter settle time or fewer frames"
-        )
+        raise BadInputError(TOO_LONG(recipe=recipe.name, needed_s=inspection_s, limit_s=LONGEST_S))
     phases_s = {state: GRACE_S + PHASE_MARGIN * expected_s.get(state, 0.0) for state in FAULT_OF}
     return Deadlines(phases_s, inspection_s)
 

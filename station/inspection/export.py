@@ -94,7 +94,7 @@ def alarms_document() -> str:
         _table(
             ("number", "alarm", "priority", "cause"),
             (
-                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value, row.cause)
+                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value, str(row.cause))
                 for alarm, row in ALARMS.items()
             ),
         ),
@@ -118,7 +118,7 @@ def _state(state: State) -> tuple[str, ...]:
     facts = STATES[state]
     trigger = "accepted" if facts.refusal is None else f"refused: `{facts.refusal}`"
     packml = "unknown" if facts.packml is None else facts.packml.value.upper()
-    return f"`{state}`", packml, trigger, facts.sentence, "yes" if facts.may_exit else ""
+    return f"`{state}`", packml, trigger, str(facts.reason), "yes" if facts.may_exit else ""
 
 
 def _transitions() -> Iterable[str]:
@@ -155,7 +155,12 @@ def _alarm(alarm: AlarmId) -> Iterable[str]:
     provoked = ", ".join(f"{device} `{fault}`" for device, fault in row.provoked_by)
     yield _table(
         ("", ""),
-        (("cause", row.cause), ("consequence", row.consequence), ("action", row.action), ("provoked by", provoked)),
+        (
+            ("cause", str(row.cause)),
+            ("consequence", str(row.consequence)),
+            ("action", str(row.action)),
+            ("provoked by", provoked),
+        ),
     )
 
 

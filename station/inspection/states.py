@@ -3,6 +3,8 @@
 from enum import StrEnum
 from typing import NamedTuple
 
+from station.messages import states as texts
+from station.messages.message import Definition, Message, joined
 from station.vocabulary import PackmlState, Refusal
 
 
@@ -62,107 +64,101 @@ class StateFacts(NamedTuple):
     """None while it is unknown."""
     refusal: Refusal | None
     """Why a trigger is not accepted; None where it is."""
-    sentence: str
+    text: Definition
     """What is going on, and where a trigger is not accepted what ends it."""
     needs_person: bool = False
     """Nothing but a person's confirmation leads on."""
     may_exit: bool = False
     """The process may end here: no inspection is under way."""
 
+    @property
+    def activity(self) -> Message:
+        """What is going on."""
+        return self.text()
 
-_BUSY = "Wait until the station is ready again."
+    @property
+    def reason(self) -> Message:
+        """The same for whoever waits: during an inspection also that it has to end."""
+        return joined((self.activity, texts.WAIT())) if self.refusal is Refusal.BUSY else self.activity
 
 
-def _inspecting(what: str, packml: PackmlState = PackmlState.EXECUTE) -> StateFacts:
-    return StateFacts(packml, Refusal.BUSY, f"{what} {_BUSY}")
+def _inspecting(text: Definition, packml: PackmlState = PackmlState.EXECUTE) -> StateFacts:
+    return StateFacts(packml, Refusal.BUSY, text)
 
 
-def _preparing(what: str, packml: PackmlState) -> StateFacts:
-    return StateFacts(packml, Refusal.NOT_READY, what)
+def _preparing(text: Definition, packml: PackmlState) -> StateFacts:
+    return StateFacts(packml, Refusal.NOT_READY, text)
 
 
 STATES: dict[State, StateFacts] = {
     State.UNKNOWN: StateFacts(
         None,
         Refusal.NOT_READY,
-        "The state of devices and fruit is not known yet; it goes on once every device answers: see the alarms.",
+        texts.UNKNOWN,
         may_exit=True,
     ),
-    State.CLEARING: _preparing(
-        "What was left open is closed with NO_RESULT and made durable; wait a moment.", PackmlState.CLEARING
-    ),
-    State.OPENING_TO_CLEAR: _preparing("The jaws open; wait a moment.", PackmlState.CLEARING),
+    State.CLEARING: _preparing(texts.CLEARING, PackmlState.CLEARING),
+    State.OPENING_TO_CLEAR: _preparing(texts.OPENING_TO_CLEAR, PackmlState.CLEARING),
     State.STOPPED: StateFacts(
         PackmlState.STOPPED,
         Refusal.NOT_READY,
-        "The station is stopped; reset it by the PLC's command or at the panel.",
+        texts.STOPPED,
         may_exit=True,
     ),
-    State.RESETTING: _preparing("The jaws open before the arm goes home; wait a moment.", PackmlState.RESETTING),
-    State.HOMING: _preparing("The arm goes home; wait a moment.", PackmlState.RESETTING),
-    State.CHECKING: _preparing("Every device's health is looked at; wait a moment.", PackmlState.RESETTING),
-    State.IDLE: StateFacts(PackmlState.IDLE, None, "Ready for a trigger.", may_exit=True),
-    State.ACCEPTING: _inspecting("A trigger is made durable.", PackmlState.STARTING),
-    State.REFERENCE: _inspecting("The jaws are checked to be open, so that nothing touches the gel."),
-    State.APPROACHING: _inspecting("The arm goes to the fruit; the reference is taken on the way."),
-    State.CLOSING_TO_ONSET: _inspecting("The jaws close until the gel is touched."),
-    State.MOVING: _inspecting("The jaws close by a step."),
-    State.SETTLING: _inspecting("The fruit settles."),
-    State.CAPTURING: _inspecting("Images of the step are taken."),
-    State.MOVING_MEASURING: _inspecting("The jaws close by a step."),
-    State.SETTLING_MEASURING: _inspecting("The fruit settles."),
-    State.CAPTURING_MEASURING: _inspecting("Images of the step are taken."),
-    State.AWAITING_MEASURE: _inspecting("The jaws wait for the measurement of the step before."),
-    State.AWAITING_MEASURE_LAST: _inspecting("All images are taken; the last but one is measured."),
-    State.MEASURING_LAST: _inspecting("All images are taken; the last is measured."),
-    State.JUDGING: _inspecting("The curve is judged."),
-    State.OPENING_AGAIN: _inspecting("The jaws open, to close on the fruit once more."),
-    State.CENTRING: _inspecting("The arm goes to where the contact will be in the field's middle."),
-    State.RECORDING_ACCEPT: _inspecting("PASS is made durable."),
-    State.RECORDING_REJECT: _inspecting("FAIL or NO_RESULT is made durable."),
-    State.RECORDING_RELEASE: _inspecting("NO_RESULT is made durable."),
-    State.PLACING_ACCEPT: _inspecting("The fruit goes where good fruit goes."),
-    State.PLACING_REJECT: _inspecting("The fruit goes where rejected fruit goes."),
-    State.RELEASING: _inspecting("The jaws open and leave the fruit where it is."),
-    State.RETREATING: _inspecting("The arm leaves the nest.", PackmlState.COMPLETING),
-    State.RETREATING_READY: StateFacts(
-        PackmlState.COMPLETING, None, "The arm leaves the nest; the next trigger is accepted already."
-    ),
-    State.RETREATING_ACCEPTING: _inspecting(
-        "A trigger is made durable while the arm leaves the nest.", PackmlState.STARTING
-    ),
-    State.RETREATING_ACCEPTED: _inspecting("The next inspection begins once the arm has left the nest."),
-    State.RECORDING_HELD: _inspecting("A device failed; NO_RESULT is made durable.", PackmlState.HOLDING),
-    State.OPENING_HELD: _preparing("A device failed; the jaws open if they can.", PackmlState.HOLDING),
-    State.OPENING_UNRECORDED: _preparing("The outcome could not be made durable; the jaws open.", PackmlState.HOLDING),
-    State.HOMING_UNRECORDED: _preparing(
-        "The outcome could not be made durable; the arm goes home.", PackmlState.HOLDING
-    ),
+    State.RESETTING: _preparing(texts.RESETTING, PackmlState.RESETTING),
+    State.HOMING: _preparing(texts.HOMING, PackmlState.RESETTING),
+    State.CHECKING: _preparing(texts.CHECKING, PackmlState.RESETTING),
+    State.IDLE: StateFacts(PackmlState.IDLE, None, texts.IDLE, may_exit=True),
+    State.ACCEPTING: _inspecting(texts.ACCEPTING, PackmlState.STARTING),
+    State.REFERENCE: _inspecting(texts.REFERENCE),
+    State.APPROACHING: _inspecting(texts.APPROACHING),
+    State.CLOSING_TO_ONSET: _inspecting(texts.CLOSING_TO_ONSET),
+    State.MOVING: _inspecting(texts.MOVING),
+    State.SETTLING: _inspecting(texts.SETTLING),
+    State.CAPTURING: _inspecting(texts.CAPTURING),
+    State.MOVING_MEASURING: _inspecting(texts.MOVING_MEASURING),
+    State.SETTLING_MEASURING: _inspecting(texts.SETTLING_MEASURING),
+    State.CAPTURING_MEASURING: _inspecting(texts.CAPTURING_MEASURING),
+    State.AWAITING_MEASURE: _inspecting(texts.AWAITING_MEASURE),
+    State.AWAITING_MEASURE_LAST: _inspecting(texts.AWAITING_MEASURE_LAST),
+    State.MEASURING_LAST: _inspecting(texts.MEASURING_LAST),
+    State.JUDGING: _inspecting(texts.JUDGING),
+    State.OPENING_AGAIN: _inspecting(texts.OPENING_AGAIN),
+    State.CENTRING: _inspecting(texts.CENTRING),
+    State.RECORDING_ACCEPT: _inspecting(texts.RECORDING_ACCEPT),
+    State.RECORDING_REJECT: _inspecting(texts.RECORDING_REJECT),
+    State.RECORDING_RELEASE: _inspecting(texts.RECORDING_RELEASE),
+    State.PLACING_ACCEPT: _inspecting(texts.PLACING_ACCEPT),
+    State.PLACING_REJECT: _inspecting(texts.PLACING_REJECT),
+    State.RELEASING: _inspecting(texts.RELEASING),
+    State.RETREATING: _inspecting(texts.RETREATING, PackmlState.COMPLETING),
+    State.RETREATING_READY: StateFacts(PackmlState.COMPLETING, None, texts.RETREATING_READY),
+    State.RETREATING_ACCEPTING: _inspecting(texts.RETREATING_ACCEPTING, PackmlState.STARTING),
+    State.RETREATING_ACCEPTED: _inspecting(texts.RETREATING_ACCEPTED),
+    State.RECORDING_HELD: _inspecting(texts.RECORDING_HELD, PackmlState.HOLDING),
+    State.OPENING_HELD: _preparing(texts.OPENING_HELD, PackmlState.HOLDING),
+    State.OPENING_UNRECORDED: _preparing(texts.OPENING_UNRECORDED, PackmlState.HOLDING),
+    State.HOMING_UNRECORDED: _preparing(texts.HOMING_UNRECORDED, PackmlState.HOLDING),
     State.HELD: StateFacts(
         PackmlState.HELD,
         Refusal.NOT_READY,
-        "Something that an inspection needs is away: do what its alarm says. The station goes on by itself once it "
-        "is back.",
+        texts.HELD,
         may_exit=True,
     ),
     State.CARRIED: StateFacts(
         PackmlState.HELD,
         Refusal.NOT_READY,
-        "A judged fruit may still be between the jaws: take it out, mend what the alarms say, then confirm at the "
-        "panel.",
+        texts.CARRIED,
         needs_person=True,
         may_exit=True,
     ),
-    State.RECORDING_LATCHED: _inspecting("A safety stop stands; NO_RESULT is made durable.", PackmlState.ABORTING),
+    State.RECORDING_LATCHED: _inspecting(texts.RECORDING_LATCHED, PackmlState.ABORTING),
     State.LATCHED: StateFacts(
         PackmlState.ABORTED,
         Refusal.NOT_READY,
-        "A safety stop stands: make the cell safe, mend its cause, take out what is between the jaws, then confirm "
-        "at the panel.",
+        texts.LATCHED,
         needs_person=True,
         may_exit=True,
     ),
-    State.RECOVERING: _preparing(
-        "The arm is brought back after a person's confirmation; wait a moment.", PackmlState.CLEARING
-    ),
+    State.RECOVERING: _preparing(texts.RECOVERING, PackmlState.CLEARING),
 }

@@ -19,6 +19,14 @@ class Message(BaseModel):
     def __str__(self) -> str:
         return ENGLISH.sentence(self)
 
+    def ids(self) -> Iterator[str]:
+        """Yield the id, and the ids of the messages that it encloses."""
+        yield self.id
+        for value in self.parameters.values():
+            for each in value if isinstance(value, tuple) else (value,):
+                if isinstance(each, Message):
+                    yield from each.ids()
+
     def __hash__(self) -> int:
         return hash((self.id, tuple(self.parameters.items())))
 
@@ -200,7 +208,9 @@ class Renderer:
 
 
 def _english_number(value: float, digits: int | None) -> str:
-    return f"{value:g}" if digits is None else f"{value:.{digits}f}"
+    if digits is not None:
+        return f"{value:.{digits}f}"
+    return str(value) if isinstance(value, int) else f"{value:g}"
 
 
 ENGLISH = Renderer(lambda known, count: known.plural if known.plural and count != 1 else known.english, _english_number)

@@ -3,7 +3,8 @@
 import time
 from pathlib import Path
 
-from station.messages.message import Message, joined, verbatim
+from station.messages import outbox as messages
+from station.messages.message import Message, joined
 from station.outbox.status import DestinationStatus, outbox_folder, read_status
 from station.settings.outbox import OutboxSettings
 
@@ -28,15 +29,18 @@ class OutboxMonitor:
         if status is not None:  # the status of an earlier start does not count
             silent_s = min(silent_s, now_s - status.utc_ms / 1000)
         if silent_s > LOST_S:
-            return verbatim(f"the outbox's process has not been heard for {silent_s:.0f} s")
+            return messages.SILENT(age_s=silent_s)
         told = {} if status is None or now_s - status.utc_ms / 1000 > LOST_S else status.destinations
-        late = [verbatim(text) for name, each in told.items() if (text := self._of(name, each, now_s))]
+        late = [found for name, each in told.items() if (found := self._late(name, each, now_s)) is not None]
         return joined(late) if late else None
 
-    def _of(self, name: str, each: DestinationStatus, now_s: float) -> str:
+    def _late(self, name: str, each: DestinationStatus, now_s: float) -> Message | None:
         since_utc_ms = each.away_since_utc_ms if each.waiting is None else each.oldest_utc_ms
         age_s = 0.0 if since_utc_ms is None else now_s - since_utc_ms / 1000
         if age_s <= self._settings.alarm_after_s and (each.waiting or 0) <= self._settings.alarm_after_rows:
-            return ""
-        waiting = "it is not known how many entries wait" if each.waiting is None else f"{each.waiting} entries wait"
-        return f"{name}: {waiting}, for {age_s:.0f} s" + (f": {each.error}" if each.error else "")
+            return None
+        if each.waiting is None:
+            late = messages.WAITING_UNKNOWN(destination=name, age_s=age_s)
+        else:
+            late = messages.WAITING(destination=name, number=each.waiting, age_s=age_s)
+        return messages.LATE_BECAUSE(late=late, error=each.error) if each.error else late

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from station.messages import recipes as messages
+from station.messages.message import Message
 from station.settings.problems import Path, dotted
 from station.settings.recipe_model import Recipe
 
@@ -25,9 +27,10 @@ def differences(old: Recipe, new: Recipe) -> tuple[Difference, ...]:
     return tuple(_walk(old.model_dump(mode="json"), new.model_dump(mode="json"), ()))
 
 
-def format_differences(old: Recipe, new: Recipe) -> str:
-    """Format the differences for a message."""
-    return "; ".join(map(str, differences(old, new))) or "no value differs"
+def described_differences(old: Recipe, new: Recipe) -> Message:
+    """Return the differences as a message."""
+    changes = [messages.CHANGE(path=each.path, old=str(each.old), new=str(each.new)) for each in differences(old, new)]
+    return messages.CHANGES(changes=changes) if changes else messages.NO_CHANGE()
 
 
 def _walk(old: Any, new: Any, path: Path) -> Iterator[Difference]:

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from station.errors import BadInputError
-from station.recipe_store.difference import format_differences
+from station.messages import recipes as messages
+from station.recipe_store.difference import described_differences
 from station.recipe_store.files import locked, read_folder, write_back
 from station.recipe_store.history import Person
 from station.recipe_store.recipe_state import RecipeState, ValidFile
@@ -80,16 +81,11 @@ class RecipeEditor:
             if file is None:
                 path = self._sites() / f"{recipe.name}.yaml"
                 if path.exists():
-                    raise RecipeStoreError(
-                        f"{path}: there is a file of that name which is no good recipe; mend it first"
-                    )
+                    raise RecipeStoreError(messages.FILE_IN_THE_WAY(file=str(path)))
                 self._put(ValidFile(path, "", recipe), body, recipe, "recipe.imported", person)
             else:
                 if not base:
-                    raise BadInputError(
-                        f"recipe {recipe.name}: expected what it is based on: export it first, or give the content "
-                        "hash that `station recipes list` shows"
-                    )
+                    raise BadInputError(messages.NO_BASE(recipe=recipe.name))
                 self._check_base(file, base)
                 self._put(file, body, recipe, "recipe.imported", person)
         return self._store.state(recipe.name)
@@ -110,7 +106,7 @@ class RecipeEditor:
         elif now is not None:
             text = now.text
         else:
-            raise BadInputError(f"recipe {name}: there is no good file of it; give one of its revisions")
+            raise BadInputError(messages.NO_GOOD_FILE(recipe=name))
         base = "" if now is None else f"# base: sha256 {content_sha256(now.recipe)}\n"
         return base + _BASE.sub("", text, count=1)
 
@@ -130,7 +126,7 @@ class RecipeEditor:
             approved = next((each for each in history if each.status is Status.APPROVED), None)
             wanted = approved if revision is None else self._store.revision(name, revision)
             if wanted is None:
-                raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --revision")
+                raise BadInputError(messages.NONE_APPROVED(recipe=name))
             good = {file.recipe.name: file for file in read_folder(self._sites()).found}
             path = good[name].path if name in good else self._sites() / f"{name}.yaml"
             self._put(ValidFile(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
@@ -166,13 +162,11 @@ class RecipeEditor:
         if not base or (len(base) >= _SHORTEST_BASE and now.startswith(base.lower())):
             return
         seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
-        changed = (
-            f": {format_differences(seen[-1].recipe, file.recipe)}" if seen and len(base) >= _SHORTEST_BASE else ""
-        )
-        raise ConflictError(
-            f"recipe {file.recipe.name}: it was changed since {base[:12]} was looked at, to {now[:12]}{changed}; "
-            "look at it as it is now and make the change again"
-        )
+        told = {"recipe": file.recipe.name, "base": base[:12], "now": now[:12]}
+        if seen and len(base) >= _SHORTEST_BASE:
+            changes = described_differences(seen[-1].recipe, file.recipe)
+            raise ConflictError(messages.CHANGED_SINCE_IN(**told, changes=changes))
+        raise ConflictError(messages.CHANGED_SINCE(**told))
 
     def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:
         """Write a file and its audit entry: the entry first, so that no change is made without one."""
@@ -187,8 +181,5 @@ class RecipeEditor:
 
     def _sites(self) -> Path:
         if self._folder is None or self._folder.resolve() == shipped_folder().resolve():
-            raise RecipeStoreError(
-                "the recipes shipped are the software's own: copy them into a folder of the site's, name it as "
-                "recipes_folder in station.yaml, and edit them there"
-            )
+            raise RecipeStoreError(messages.SHIPPED())
         return self._folder

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from station.messages import recipes as messages
 from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
 from station.records.high_water_mark import sync_folder
@@ -76,7 +77,7 @@ def locked(home: Path) -> Iterator[None]:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     except BlockingIOError as error:
-        raise RecipeStoreError("somebody else changes a recipe at this moment; try again") from error
+        raise RecipeStoreError(messages.SOMEBODY_ELSE()) from error
     finally:
         os.close(descriptor)
 
@@ -125,7 +126,4 @@ def _write(path: Path, data: bytes, mode: int) -> None:
 
 
 def _unwritable(path: Path, error: OSError) -> RecipeStoreError:
-    return RecipeStoreError(
-        f"{path}: cannot be written: {(error.strerror or str(error)).lower()}; it is as it was. Free space, or make it "
-        "writable for this user"
-    )
+    return RecipeStoreError(messages.NOT_WRITABLE(file=str(path), error=error.strerror or str(error)))

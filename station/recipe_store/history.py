@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, func, insert, select, update
 
-from station.recipe_store.difference import format_differences
-from station.recipe_store.revision import ConflictError, Origin, RecipeStoreError, Revision, Status
+from station.messages import recipes as messages
+from station.recipe_store.difference import described_differences
+from station.recipe_store.revision import STATUS, ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
 from station.records.schema import recipe_revisions
 from station.records.write_requests import utc_ms
@@ -49,16 +50,15 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
     known = read_revisions(connection, recipe.name)
     approved, draft = _with(known, Status.APPROVED), _with(known, Status.DRAFT)
     if approved is not None and approved.recipe == recipe:
-        raise RecipeStoreError(
-            f"recipe {recipe.name}: the file is what revision {approved.revision} says, which is approved already; "
-            "change it first"
-        )
+        raise RecipeStoreError(messages.SAME(recipe=recipe.name, revision=approved.revision))
     if draft is not None and draft.recipe == recipe and draft.author == person.who:
         return draft
     if draft is not None and draft.author != person.who:
+        changes = described_differences(draft.recipe, recipe)
         raise ConflictError(
-            f"recipe {recipe.name}: revision {draft.revision} of {draft.author} waits for approval, and differs from "
-            f"this one in {format_differences(draft.recipe, recipe)}; let it be approved or retired first"
+            messages.ANOTHER_WAITS_DIFFERS(
+                recipe=recipe.name, revision=draft.revision, author=draft.author, changes=changes
+            )
         )
     if draft is not None:
         _retire(connection, draft, person, f"replaced by its author's next draft: {person.reason}")
@@ -82,19 +82,21 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         RecipeStoreError: it is no draft any more, or the approver's own, or its PLC number is another recipe's.
         ConflictError: the file was changed since the draft was submitted.
     """
-    place = f"recipe {wanted.name}, revision {wanted.revision}"
+    place = {"recipe": wanted.name, "revision": wanted.revision}
     known = read_revisions(connection, wanted.name)
     draft = next((each for each in known if each.revision == wanted.revision), None)
     if draft is None or draft.status is not Status.DRAFT:
-        raise ConflictError(f"{place}: it is {'gone' if draft is None else draft.status}, and only a draft is approved")
+        status = messages.MISSING() if draft is None else STATUS[draft.status]()
+        raise ConflictError(messages.NOT_WAITING(**place, status=status))
     if draft.author.casefold().split() == person.who.casefold().split():
-        raise RecipeStoreError(f"{place}: {draft.author} is its author; another person has to approve it")
+        raise RecipeStoreError(messages.OWN(**place, author=draft.author))
     if file != draft.recipe:
-        what = "cannot be read" if file is None else f"says otherwise: {format_differences(draft.recipe, file)}"
-        raise ConflictError(f"{place}: the recipe's file {what}; submit the file again, or put it back with revert")
+        if file is None:
+            raise ConflictError(messages.FILE_UNREADABLE(**place))
+        raise ConflictError(messages.FILE_DIFFERS(**place, changes=described_differences(draft.recipe, file)))
     for other in read_revisions(connection):
         if other.status is Status.APPROVED and other.name != draft.name and other.number == draft.number:
-            raise RecipeStoreError(f"{place}: its PLC number {draft.number} is that of the approved {other.name}")
+            raise RecipeStoreError(messages.NUMBER_TAKEN(**place, number=draft.number, other=other.name))
     before = _with(known, Status.APPROVED)
     if before is not None:
         _retire(connection, before, person, f"revision {draft.revision} took its place: {person.reason}", told=False)
@@ -106,7 +108,7 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         approved_utc_ms=utc_ms(),
     )
     _update(connection, made)
-    changes = format_differences(before.recipe, draft.recipe) if before else "the first revision"
+    changes = str(described_differences(before.recipe, draft.recipe)) if before else "the first revision"
     old = None if before is None else _audited(before)
     _note(connection, person, "recipe.approved", made, old, {**_audited(made), "changes": changes})
     return made
@@ -125,7 +127,7 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
     """
     now = next(each for each in read_revisions(connection, wanted.name) if each.revision == wanted.revision)
     if now.status is Status.RETIRED:
-        raise RecipeStoreError(f"recipe {now.name}, revision {now.revision}: it is retired already")
+        raise RecipeStoreError(messages.RETIRED_ALREADY(recipe=now.name, revision=now.revision))
     return _retire(connection, now, person, person.reason)
 
 
@@ -192,7 +194,7 @@ def _insert(connection: Connection, made: Revision) -> None:
         select(func.max(recipe_revisions.c.revision)).where(recipe_revisions.c.name == made.name)
     )
     if latest is not None and latest >= made.revision:
-        raise ConflictError(f"recipe {made.name}: revision {latest} was recorded meanwhile; look at it first")
+        raise ConflictError(messages.RECORDED_MEANWHILE(recipe=made.name, revision=latest))
     connection.execute(insert(recipe_revisions).values(asdict(made)))
 
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from station.recipe_store.difference import format_differences
+from station.messages import recipes as messages
+from station.messages.message import Message, message_of, verbatim
+from station.recipe_store.difference import described_differences
 from station.recipe_store.revision import Revision, Status
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe_model import Recipe
@@ -51,8 +53,8 @@ class RecipeState:
     """None if it is invalid or missing."""
     submitted: Revision | None
     """The draft that waits for approval, whatever the file's state."""
-    note: str
-    """Information or instruction for a person, one sentence; empty if the file is the approved revision."""
+    note: Message | None
+    """Information or instruction for a person; None if the file is the approved revision."""
 
 
 def recipe_states(
@@ -82,18 +84,17 @@ def _recipe_state(
 ) -> RecipeState:
     submitted = next((each for each in reversed(history) if each.status is Status.DRAFT), None)
     approved = next((each for each in reversed(history) if each.status is Status.APPROVED), None)
-    control, note = None, ""
+    control, note = None, None
     if approved is not None:
         try:
             control = Control(approved.recipe, approved.revision)
         except SettingsError as error:
-            note = f"recipe {name}: its approved revision {approved.revision} is not taken any more: {error}"
+            note = messages.NOT_ACCEPTED(recipe=name, revision=approved.revision, why=message_of(error))
     if file is None:
         state = FileState.BROKEN if broken else FileState.MISSING
-        told = "; ".join(map(str, broken)) or f"recipe {name}: its file is gone"
-        note = note or f"{told}; {_goes_on(control)}: mend it, or `station recipes revert {name}`"
+        note = note or _no_file_note(name, broken, control)
         if state is FileState.MISSING and control is None:
-            note = ""
+            note = None
     elif control is not None and file.recipe == control.recipe:
         state = FileState.APPROVED
     else:
@@ -102,14 +103,22 @@ def _recipe_state(
     return RecipeState(name, control, state, file, submitted, note)
 
 
-def _draft_note(name: str, file: ValidFile, control: Control | None, submitted: Revision | None) -> str:
-    changed = "" if control is None else f" ({format_differences(control.recipe, file.recipe)})"
+def _no_file_note(name: str, broken: Sequence[Problem], control: Control | None) -> Message:
+    if not broken:
+        return messages.FILE_GONE(recipe=name, stays=_in_force(control))
+    problems = [verbatim(str(each)) for each in broken]
+    return messages.FILE_BROKEN(problems=problems, stays=_in_force(control), recipe=name)
+
+
+def _draft_note(name: str, file: ValidFile, control: Control | None, submitted: Revision | None) -> Message:
+    todo = messages.DO_SUBMIT(recipe=name)
     if submitted is not None and submitted.recipe == file.recipe:
-        todo = f"revision {submitted.revision} of {submitted.author} waits for another person: station recipes approve"
-    else:
-        todo = f"station recipes submit {name}, or revert it"
-    return f"recipe {name}: {file.path.name} is an unapproved draft{changed}; {_goes_on(control)}; {todo}"
+        todo = messages.DO_APPROVE(revision=submitted.revision, author=submitted.author)
+    told = {"recipe": name, "file": file.path.name, "stays": _in_force(control), "todo": todo}
+    if control is None:
+        return messages.FILE_IS_DRAFT(**told)
+    return messages.FILE_IS_CHANGED(**told, changes=described_differences(control.recipe, file.recipe))
 
 
-def _goes_on(control: Control | None) -> str:
-    return "none is in force" if control is None else f"revision {control.revision} stays in force"
+def _in_force(control: Control | None) -> Message:
+    return messages.NONE_IN_FORCE() if control is None else messages.STAYS(revision=control.revision)

@@ -5,6 +5,7 @@ from enum import StrEnum
 from functools import lru_cache
 
 from station.errors import StationError
+from station.messages import recipes as messages
 from station.settings.recipe_form import parse_recipe
 from station.settings.recipe_model import Recipe
 
@@ -25,6 +26,14 @@ class Status(StrEnum):
     APPROVED = "approved"
     """In force for inspections; at most one per recipe."""
     RETIRED = "retired"
+
+
+STATUS = {
+    Status.DRAFT: messages.DRAFT,
+    Status.APPROVED: messages.APPROVED,
+    Status.RETIRED: messages.RETIRED,
+}
+"""Names of the statuses."""
 
 
 class Origin(StrEnum):

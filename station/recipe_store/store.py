@@ -8,6 +8,8 @@ from pathlib import Path
 from sqlalchemy import Connection
 
 from station.errors import BadInputError
+from station.messages import recipes as messages
+from station.messages.message import Message, verbatim
 from station.recipe_store.files import Folder, locked, read_folder
 from station.recipe_store.history import Person, approve, read_revisions, retire, store_approved, submit
 from station.recipe_store.recipe_state import RecipeState, ValidFile, recipe_states
@@ -34,7 +36,7 @@ class RecipeStore:
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder, self._records = home, folder, records_folder(home)
 
-    def read(self) -> tuple[tuple[RecipeState, ...], tuple[str, ...]]:
+    def read(self) -> tuple[tuple[RecipeState, ...], tuple[Message, ...]]:
         """Return the state of each recipe, and the errors of the files and their folder.
 
         Raises:
@@ -44,7 +46,8 @@ class RecipeStore:
             folder = read_folder(self._folder)
         except SettingsError as error:
             folder = Folder((), {"": list(error.problems)}, error.problems)
-        return recipe_states(folder.found, folder.broken, self.history()), tuple(map(str, folder.problems))
+        problems = tuple(verbatim(str(each)) for each in folder.problems)
+        return recipe_states(folder.found, folder.broken, self.history()), problems
 
     def signature(self) -> Hashable:
         """Return a value that differs whenever a file or the history has changed."""
@@ -130,7 +133,7 @@ class RecipeStore:
             standing = self.state(name)
             wanted = standing.submitted if revision is None else self.revision(name, revision)
             if wanted is None:
-                raise BadInputError(f"recipe {name}: no draft waits for approval; submit one first")
+                raise BadInputError(messages.NO_DRAFT(recipe=name))
             file = None if standing.file is None else standing.file.recipe
             with direct_transaction(self._records) as connection:
                 return approve(connection, wanted, file, person)
@@ -154,7 +157,7 @@ class RecipeStore:
             else:
                 approved = [each for each in history if each.status is Status.APPROVED]
                 if not approved:
-                    raise BadInputError(f"recipe {name}: none of its revisions is approved; name one to retire")
+                    raise BadInputError(messages.NONE_APPROVED(recipe=name))
                 wanted = approved[0]
             with direct_transaction(self._records) as connection:
                 return retire(connection, wanted, person)
@@ -170,7 +173,7 @@ class RecipeStore:
             if standing.name == name:
                 return standing
         known = ", ".join(standing.name for standing in every)
-        raise BadInputError(f"recipe {shortened(name)}: expected one of {known}")
+        raise BadInputError(messages.UNKNOWN(recipe=shortened(name), known=known))
 
     def revision(self, name: str, revision: int) -> Revision:
         """Return one revision.
@@ -182,8 +185,10 @@ class RecipeStore:
         for each in history:
             if each.revision == revision:
                 return each
-        known = ", ".join(str(each.revision) for each in history) or "none yet"
-        raise BadInputError(f"recipe {shortened(name)}: revision {revision}: expected one of {known}")
+        known = ", ".join(str(each.revision) for each in history)
+        if not known:
+            raise BadInputError(messages.NO_REVISION(recipe=shortened(name), revision=revision))
+        raise BadInputError(messages.UNKNOWN_REVISION(recipe=shortened(name), revision=revision, known=known))
 
     def valid_file(self, name: str) -> ValidFile:
         """Return a recipe's valid file.
@@ -193,7 +198,7 @@ class RecipeStore:
         """
         standing = self.state(name)
         if standing.file is None:
-            raise BadInputError(f"recipe {name}: {standing.note or 'its file is gone'}")
+            raise BadInputError(standing.note or messages.NO_GOOD_FILE(recipe=name))
         return standing.file
 
     def _to_ship(self, found: list[ValidFile], history: list[Revision]) -> list[ValidFile]:
@@ -219,10 +224,7 @@ class RecipeStore:
     def _started(self) -> None:
         """Adopt the existing recipes before a person's first change, unless that change is the adoption."""
         if not self._is_started():
-            raise RecipeStoreError(
-                "the recipes' history has not begun: `station recipes adopt`, or the station's first start, takes up "
-                "what is there"
-            )
+            raise RecipeStoreError(messages.HISTORY_NOT_BEGUN())
 
 
 def _has_started(connection: Connection) -> bool:

@@ -5,9 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from station.calibration.checks import check_name
 from station.calibration.model import Calibration, Verification
 from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
-from station.messages.message import Message, verbatim
+from station.messages import calibration as messages
+from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.vision.scale import TYPICAL_STANDARD_UNCERTAINTY
 
@@ -18,8 +20,8 @@ class CalibrationInUse(NamedTuple):
     """Scale that a fruit is measured by."""
 
     mm_per_px: float
-    words: str
-    """For the fruit's record."""
+    words: Message
+    """For the fruit's record and the pages."""
     scale_uncertainty: float
     """Relative standard uncertainty of `mm_per_px`."""
 
@@ -62,12 +64,12 @@ class ActiveCalibration:
         """Return the scale that areas are reported in, and its source."""
         calibration = self.calibration
         if calibration is None:
-            allowed = "" if self._required else "; inspecting is allowed by service.uncalibrated"
-            words = f"none: {self._usual_mm_per_px:g} mm/px, by the configuration{allowed}"
+            none = messages.NONE if self._required else messages.NONE_ALLOWED
+            words = none(scale_mm=self._usual_mm_per_px)
             return CalibrationInUse(self._usual_mm_per_px, words, TYPICAL_STANDARD_UNCERTAINTY)
         measured = calibration.scale_measured
         scale = calibration.mm_per_px if measured else self._usual_mm_per_px
-        words = f"{calibration.summary()}, in use {scale:g} mm/px"
+        words = messages.IN_USE(summary=calibration.summary(), scale_mm=scale)
         return CalibrationInUse(
             scale, words, calibration.scale_uncertainty / 2 if measured else TYPICAL_STANDARD_UNCERTAINTY
         )
@@ -95,21 +97,17 @@ class ActiveCalibration:
         """Return why inspections are refused, with the remedy; None if all that is required was done."""
         limit_h, calibration = self._settings.verify_every_h, self.calibration
         if calibration is None and (self._required or limit_h is not None):
-            return verbatim(
-                "The sensor is not calibrated: calibrate it with the ball on the page Maintenance in manual mode, "
-                "or by `station calibrate` with the station stopped."
-            )
+            return messages.REQUIRED()
         if limit_h is None:
             return None
         verified, age_s = self._verification, self.figures.verification_age_s
-        how = "on the page Maintenance in manual mode, or by `station verify` with the station stopped."
+        how = messages.HOW_TO_VERIFY()
         if verified is None or age_s is None:
-            return verbatim(f"The calibration was never verified, and it is demanded: verify it with the ball; {how}")
+            return messages.NEVER_VERIFIED(how=how)
         if not verified.passed:
-            return verbatim(f"The last verification failed: mend what its page names, then verify again; {how}")
+            return messages.VERIFICATION_FAILED(how=how)
         if age_s > limit_h * _HOUR_S:
-            old = f"{age_s / _HOUR_S:.1f} h old, at most {limit_h:g} h are allowed"
-            return verbatim(f"The last verification is {old}: verify with the ball; {how}")
+            return messages.VERIFICATION_OLD(age_h=age_s / _HOUR_S, limit_h=limit_h, how=how)
         return None
 
     def alarm_detail(self) -> Message | None:
@@ -117,15 +115,13 @@ class ActiveCalibration:
         calibration, verified = self.calibration, self._verification
         if calibration is None:
             needed = self._required and self._serial()
-            return verbatim("the sensor is not calibrated: calibrate it first") if needed else None
+            return messages.MISSING() if needed else None
         age_days = (self.figures.age_s or 0.0) / _DAY_S
         if age_days > self._settings.oldest_days:
-            return verbatim(
-                f"the calibration is {age_days:.0f} days old, at most {self._settings.oldest_days:g} are allowed"
-            )
+            return messages.OLD(age_days=age_days, limit_days=self._settings.oldest_days)
         if verified is not None and not verified.passed:
-            failed = ", ".join(check.name for check in verified.checks if not check.passed)
-            return verbatim(f"the last verification, {verified.id}, failed: {failed}")
+            failed = [check_name(check.name) for check in verified.checks if not check.passed]
+            return messages.CHECKS_FAILED(verification=verified.id, checks=failed)
         return None
 
     def _refresh(self) -> None:

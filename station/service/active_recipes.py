@@ -11,8 +11,9 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from station.errors import StationError
-from station.messages.message import Message, verbatim
-from station.recipe_store.difference import format_differences
+from station.messages import recipes as messages
+from station.messages.message import Message, message_of
+from station.recipe_store.difference import described_differences
 from station.recipe_store.recipe_state import Control, FileState, RecipeState
 from station.recipe_store.revision import RecipeStoreError
 from station.recipe_store.store import RecipeStore
@@ -94,16 +95,14 @@ class ActiveRecipes:
         try:
             states, broken = self._store.read()
         except RecordsError as error:
-            states, broken = (), (f"the recipes in force are those kept in {_CONTROLS}: {error}",)
+            states, broken = (), (messages.STORED_ONES(folder=_CONTROLS, why=message_of(error)),)
         controls = {each.name: each.control for each in states if each.control is not None}
         if not begun and not controls:
-            self.problems = tuple(map(verbatim, broken))
+            self.problems = broken
             self._take(stored.values())
             return
         self._audit_files(states)
-        self.problems = tuple(
-            dict.fromkeys([*map(verbatim, broken), *(verbatim(each.note) for each in states if each.note)])
-        )
+        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in states if each.note is not None)]))
         gone = {each.name for each in states if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
         self._store_controls(controls)
@@ -130,12 +129,10 @@ class ActiveRecipes:
             return found
         moved = next((c.recipe.plc_number for c in self._controls.values() if c.recipe.name == name), None)
         if moved is not None:
-            what = f"recipe {name} has the PLC's number {moved} now, and no longer {number}"
-        elif found is not None:
-            what = f"the PLC's number {number} is {found.recipe.name} now, and no longer {name}"
-        else:
-            what = f"recipe {name} with the PLC's number {number} is no longer in force"
-        raise RecipeStoreError(f"{what}; choose a recipe again")
+            raise RecipeStoreError(messages.MOVED(recipe=name, now=moved, before=number))
+        if found is not None:
+            raise RecipeStoreError(messages.ANOTHER(number=number, now=found.recipe.name, before=name))
+        raise RecipeStoreError(messages.GONE(recipe=name, number=number))
 
     def restored(self) -> RestoredRecipe | None:
         """Return the recipe of the previous start; None if nothing is in force in its place.
@@ -190,10 +187,12 @@ class ActiveRecipes:
             self._noticed.add((state.name, sha256))
             if file is not None and submitted is not None and submitted.recipe == file.recipe:
                 continue
-            changes = format_differences(control.recipe, file.recipe) if control and file else str(state.file_state)
+            changes = str(state.file_state)
+            if control and file:
+                changes = str(described_differences(control.recipe, file.recipe))
             told = {"state": str(state.file_state), "sha256": sha256, "changes": changes}
             entry = AuditEntry(
-                STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", state.note[:900], None, told
+                STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", str(state.note or "")[:900], None, told
             )
             self.noticed.append(entry)
 

@@ -16,7 +16,8 @@ from station.channel.server import Handlers
 from station.errors import BadInputError
 from station.inspection.alarm_table import ALARMS, AlarmId, anchor
 from station.inspection.alarms import ACTIVE, LONGEST_SHELVED_S, SHELVES, Alarm, AlarmState
-from station.messages.message import verbatim
+from station.messages import alarm_commands as messages
+from station.messages.message import Message
 from station.records.audit import AuditEntry, validate_entry
 from station.service.alarm_manager import AlarmManager
 from station.service.audit_logger import AuditLogger, alarm_entry
@@ -52,7 +53,7 @@ class AlarmCommands:
         """
         alarm, entry = self._checked(request, "acknowledged")
         if self._alarms.alarms.get(alarm).state is AlarmState.NORMAL:
-            return _refused(f"alarm {alarm} does not stand")
+            return _refused(messages.NORMAL(alarm=alarm))
         return self._done(self._alarms.acknowledge(alarm), entry)
 
     async def shelve(self, request: ShelveAlarm) -> CommandDone:
@@ -65,14 +66,14 @@ class AlarmCommands:
         alarm, entry = self._checked(request, "shelved", request.reason)
         known = self._alarms.alarms.get(alarm)
         if not request.reason.strip():
-            return _refused("a reason is needed: whoever looks at the alarms next has to know why it is hidden")
+            return _refused(messages.REASON_NEEDED())
         if request.for_s > LONGEST_SHELVED_S:
-            return _refused(f"shelved for {request.for_s:g} s: at most {LONGEST_SHELVED_S:g} s, a shift, are possible")
+            return _refused(messages.TOO_LONG(asked_s=request.for_s, limit_s=LONGEST_SHELVED_S))
         if ALARMS[alarm].latched:
-            return _refused(f"alarm {alarm} stands until a person has reset it; it is never hidden")
+            return _refused(messages.LATCHED(alarm=alarm))
         if known.shelved_until_s is not None:
             until = datetime.fromtimestamp(known.shelved_until_s, UTC).strftime("%H:%M UTC")
-            return _refused(f"alarm {alarm} is shelved until {until} by {known.shelved_by or 'nobody known'} already")
+            return _refused(messages.SHELVED_ALREADY(alarm=alarm, until=until, who=known.shelved_by or "?"))
         return self._done(self._alarms.shelve(alarm, request.for_s, request.who, request.reason), entry)
 
     async def unshelve(self, request: UnshelveAlarm) -> CommandDone:
@@ -88,7 +89,7 @@ class AlarmCommands:
     def _checked(self, request: AlarmAction, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
         """Return the alarm and its audit entry, which is validated before anything changes."""
         if request.alarm not in set(AlarmId):
-            raise BadInputError(f"alarm {request.alarm!r}: expected an id of docs/alarms.md, as {AlarmId.DISK_LOW}")
+            raise BadInputError(messages.UNKNOWN(alarm=repr(request.alarm), example=AlarmId.DISK_LOW))
         entry = alarm_entry(request.who, request.role, change, request.alarm, reason)
         validate_entry(entry)
         return AlarmId(request.alarm), entry
@@ -99,8 +100,8 @@ class AlarmCommands:
         return CommandDone(done=True, why=None)
 
 
-def _refused(why: str) -> CommandDone:
-    return CommandDone(done=False, why=verbatim(why))
+def _refused(why: Message) -> CommandDone:
+    return CommandDone(done=False, why=why)
 
 
 def _listed(alarm: Alarm) -> ListedAlarm:

@@ -17,7 +17,8 @@ from station.devices.gripper.errors import (
 from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.alarms import CAUSED, Alarms
-from station.messages.message import Message, message_in, message_of, text_of, verbatim
+from station.messages import alarm_commands as messages
+from station.messages.message import Message, message_in, message_of, text_of
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
@@ -163,7 +164,7 @@ class AlarmManager:
         Returns:
             Whether that changed anything.
         """
-        detail = verbatim(f"for {for_s:.0f} s by {by}: {reason}")
+        detail = messages.SHELVED(duration_s=for_s, who=by, reason=reason)
         return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
 
     def unshelve(self, alarm: AlarmId) -> bool:

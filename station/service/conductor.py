@@ -12,7 +12,8 @@ from station.devices.gripper.errors import GripperEmergencyStopError, GripperErr
 from station.errors import StationError
 from station.inspection.cycle import START, Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
-from station.messages.message import Message, message_of, verbatim
+from station.messages import operation as messages
+from station.messages.message import Message, message_of
 from station.records.errors import RecordsError
 from station.service.grip import FramesError
 
@@ -206,7 +207,7 @@ class Conductor:
             work = self._performer.perform(action, because)
         except Exception as error:  # a bug in one action must end in an outcome, not in silence
             log.exception("action %s", action)
-            self.post(Event.INTERNAL_FAULT, message_of(error))
+            self.post(Event.INTERNAL_FAULT, messages.INTERNAL_FAULT(words=f"{type(error).__name__}: {error}"))
             return
         if work is not None:
             task = asyncio.create_task(self._end_with_event(action, work), name=f"action {action}")
@@ -223,7 +224,7 @@ class Conductor:
                 log.exception("action %s", action)
         except Exception as error:  # as above
             log.exception("action %s", action)
-            event, why = Event.INTERNAL_FAULT, verbatim(f"{type(error).__name__}: {error}")
+            event, why = Event.INTERNAL_FAULT, messages.INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
         if event is not None:
             self._events.put_nowait(Happened(event, why, me))
         elif me is not None:

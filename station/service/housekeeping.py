@@ -10,7 +10,8 @@ from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event
 from station.inspection.states import State
-from station.messages.message import Message, joined, message_of, verbatim
+from station.messages import operation as messages
+from station.messages.message import Message, joined, message_of
 from station.records.errors import RecordsError
 from station.service.active_calibration import ActiveCalibration
 from station.service.active_recipes import ActiveRecipes
@@ -162,16 +163,14 @@ class Housekeeping:
         free_mb = service.registry.records.status().free_bytes / _MB
         alarms.update(
             AlarmId.DISK_LOW,
-            verbatim(f"{free_mb:.0f} MB are free, {self._reserve_mb} MB are the reserve")
-            if free_mb < 2 * self._reserve_mb
-            else None,
+            messages.DISK_LOW(free_mb=free_mb, reserve_mb=self._reserve_mb) if free_mb < 2 * self._reserve_mb else None,
         )
         alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
         problems = self._recipes.problems
         alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
         alarms.update(
             AlarmId.NO_RECIPE,
-            None if service.active is not None else verbatim("No recipe was ever chosen, or it is gone."),
+            None if service.active is not None else messages.NEVER_CHOSEN(),
         )
         alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
         alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
@@ -188,11 +187,9 @@ class Housekeeping:
             self._restarts_counted[name] = program.total
             lately = program.within(_MANY_WITHIN_S)
             if program.given_up:
-                many.append(verbatim(f"the process {name} ended again and again and is not started any more"))
+                many.append(messages.PROCESS_GIVEN_UP(process=name))
             elif lately >= _MANY_RESTARTS:
-                many.append(
-                    verbatim(f"the process {name} was started again {lately} times within {_MANY_WITHIN_S:g} s")
-                )
+                many.append(messages.PROCESS_RESTARTED(process=name, times=lately, within_s=_MANY_WITHIN_S))
         self._service.alarms.update(AlarmId.PROCESS_RESTARTS, joined(many) if many else None)
 
     def _check_clock(self) -> None:
@@ -200,7 +197,8 @@ class Housekeeping:
         offset_s = time.time() - time.monotonic()
         if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
             step_s = offset_s - self._clock_offset_s
-            alarms.raise_(AlarmId.CLOCK_STEPPED, verbatim(f"the machine's clock was set by {step_s:+.0f} s"))
+            step = messages.CLOCK_FORWARD if step_s > 0 else messages.CLOCK_BACK
+            alarms.raise_(AlarmId.CLOCK_STEPPED, step(step_s=abs(step_s)))
         else:
             alarms.clear(AlarmId.CLOCK_STEPPED)
         self._clock_offset_s = offset_s

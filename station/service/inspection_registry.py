@@ -8,7 +8,7 @@ from dataclasses import replace
 from station.channel.line import Open, Outcome
 from station.inspection.cycle import Event
 from station.logs import inspecting
-from station.messages.message import verbatim
+from station.messages import operation as messages
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.service.device_manager import DeviceManager
@@ -109,7 +109,7 @@ class InspectionRegistry:
             while (now := self.running) is not None:
                 now.outcome_name = "NO_RESULT"
                 if not now.interruptions:
-                    now.interrupt(Reason.RECORDS_FAULT, verbatim("the outcome could not be made durable in time"))
+                    now.interrupt(Reason.RECORDS_FAULT, messages.NOT_STORED_IN_TIME())
                 await self.conclude(now)
                 self.deliver(now)
         return Event.UNFINISHED_CLOSED

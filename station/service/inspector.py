@@ -16,7 +16,8 @@ from station.inspection.cycle import REASONS, Event
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import early_stop, judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
-from station.messages.message import Message, message_of, verbatim
+from station.messages import operation as messages
+from station.messages.message import Message, message_of
 from station.records.model import Image
 from station.service.active_calibration import ActiveCalibration
 from station.service.alarm_manager import AlarmManager
@@ -100,10 +101,7 @@ class Inspector:
         if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
             now.interrupt(
                 Reason.REFERENCE_BAD,
-                verbatim(
-                    f"the jaws stand at {opened.width_mm:.1f} mm and not open: something may touch the gel; look at "
-                    "them"
-                ),
+                messages.JAWS_NOT_OPEN(width_mm=opened.width_mm),
             )
             return Event.REFERENCE_BAD
         self._devices.monitors[GRIPPER].report_success()
@@ -152,8 +150,8 @@ class Inspector:
         for alarm in ALARMS:
             self._alarms.clear(alarm)
         drift, most = looks.drift_levels, self._settings.reference.most_drift_levels
-        halfway = f"the light differs from the golden reference's by {drift:.0f} grey levels; {most:g} are too many"
-        self._alarms.update(AlarmId.REFERENCE_DRIFTING, verbatim(halfway) if drift > most / 2 else None)
+        halfway = messages.LIGHT_DRIFTS(drift_levels=drift, limit_levels=most)
+        self._alarms.update(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else None)
         self._metrics.reference(0.0, drift)
         now.measures["reference_drift_levels"] = round(drift, 2)
         now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
@@ -326,10 +324,7 @@ class Inspector:
         if age_s > self._settings.reference.oldest_s:
             now.interrupt(
                 Reason.REFERENCE_BAD,
-                verbatim(
-                    f"the reference was {age_s:.0f} s old at the last step, at most "
-                    f"{self._settings.reference.oldest_s:g} s are allowed"
-                ),
+                messages.REFERENCE_OLD(age_s=age_s, limit_s=self._settings.reference.oldest_s),
             )
         recipe = now.active.recipe
         now.verdict = judge(now.press(), recipe)

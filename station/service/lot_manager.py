@@ -4,6 +4,8 @@ import asyncio
 import logging
 
 from station.errors import StationError
+from station.messages import lots as messages
+from station.messages.message import Message, message_of
 from station.records.audit import STATION, AuditEntry
 from station.service.active_recipes import ActiveRecipe, ActiveRecipes
 from station.service.audit_logger import PLC, AuditLogger
@@ -29,7 +31,7 @@ class LotManager:
         """The lot that a person started at the panel, for fruit without a lot of the PLC."""
         self.plc_names = False
         """Whether the PLC named a lot with its last trigger."""
-        self.mismatch = ""
+        self.mismatch: Message | None = None
         """Reason why the last lot could not begin: number, name and content of the recipe do not match."""
 
     def restore(self) -> None:
@@ -44,7 +46,7 @@ class LotManager:
         Returns:
             Whether the choice is stored for a restart.
         """
-        self.mismatch = ""
+        self.mismatch = None
         self._service.active = active
         return self._recipes.store_active(active, self.lot)
 
@@ -82,14 +84,15 @@ class LotManager:
                 now = self._recipes.current(active)
                 self._service.pacing.expected(now.recipe)
             except StationError as error:
-                self.mismatch = f"Lot {lot or 'without a name'} cannot begin: {error}."
+                why = message_of(error)
+                self.mismatch = messages.REFUSED(lot=lot, why=why) if lot else messages.NAMELESS_REFUSED(why=why)
                 self._service.active, self.lot = None, None
                 log.warning("%s", self.mismatch)
                 self._audit.log(
                     AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _audited(active), {"why": str(error)})
                 )
                 return False
-            before, self.lot, self.mismatch = self.lot, lot, ""
+            before, self.lot, self.mismatch = self.lot, lot, None
             self._service.active = now
             if now.snapshot != active.snapshot:
                 log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)

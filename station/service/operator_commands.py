@@ -12,7 +12,9 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.errors import StationError
 from station.inspection.cycle import UNJUDGED, WAITING
 from station.inspection.states import State
-from station.messages.message import Message, message_of, verbatim
+from station.messages import commands as messages
+from station.messages import lots
+from station.messages.message import Message, message_of
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
@@ -142,7 +144,7 @@ class OperatorCommands:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
         if order in _COMMANDS:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
-                return verbatim(f"{order}: {argument!r} is no number")
+                return messages.NO_NUMBER(command=order, argument=argument)
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
             return (await self._plc_commands.execute(command, by)).why
         match order:
@@ -161,13 +163,13 @@ class OperatorCommands:
         for standing in self.recoveries:
             if standing == what:
                 return (await self._plc_commands.recover(Recover(what=standing), by)).why
-        return verbatim("there is nothing to recover from any more")
+        return messages.NOTHING_TO_RECOVER()
 
     async def _start_lot(self, name: str, grower: str) -> Message | None:
         if self._lots.plc_names:
-            return verbatim("the line's PLC names the lots")
+            return lots.PLC_NAMES()
         if not name.strip() or len(name) > LONGEST_LOT or not (name.isascii() and name.isprintable()):
-            return verbatim(f"{name!r} is no lot's name: 1 to {LONGEST_LOT} letters, digits and signs")
+            return lots.BAD_NAME(name=name, longest=LONGEST_LOT)
         if grower:
             try:
                 await self._records.change(lambda connection: start_lot(connection, name, grower))
@@ -179,7 +181,7 @@ class OperatorCommands:
     async def _end_lot(self) -> Message | None:
         name = self._lots.named
         if not name:
-            return verbatim("no lot was started at the panel")
+            return lots.NONE()
         with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
         self._lots.set_lot("")

@@ -4,7 +4,7 @@ from collections import deque
 
 from station.channel.line import Outcome
 from station.inspection.alarm_table import AlarmId
-from station.messages.message import verbatim
+from station.messages import operation as messages
 from station.service.alarm_manager import AlarmManager
 from station.vocabulary import OutcomeName
 
@@ -28,11 +28,9 @@ class OutcomeMonitor:
         self._last.append(outcome.outcome)
         last = list(self._last)
         unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
-        self._alarms.update(
-            AlarmId.MANY_NO_RESULT, verbatim(f"the last {_MANY} fruit could not be judged") if unjudged else None
-        )
+        self._alarms.update(AlarmId.MANY_NO_RESULT, messages.MANY_UNJUDGED(number=_MANY) if unjudged else None)
         failed = last.count("FAIL")
         many = failed > _LAST / 2
         self._alarms.update(
-            AlarmId.REJECT_RATE, verbatim(f"{failed} of the last {len(last)} fruit failed") if many else None
+            AlarmId.REJECT_RATE, messages.MANY_FAILED(failed=failed, number=len(last)) if many else None
         )

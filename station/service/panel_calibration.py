@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from station.calibration.calibration_procedure import CalibrationProcedure, Draft
+from station.calibration.checks import check_name, failed_check
 from station.calibration.model import Calibration, Verification
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
@@ -30,7 +31,9 @@ from station.channel.panel_maintenance_queries import (
 from station.channel.panel_queries import Picture
 from station.channel.server import Handler
 from station.errors import BadInputError, StationError
-from station.messages.message import Message, joined, message_of, verbatim
+from station.messages import calibration as messages
+from station.messages.maintenance import UNDER_WAY
+from station.messages.message import Message, joined, message_of
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
 from station.service.active_calibration import ActiveCalibration
@@ -45,7 +48,7 @@ from station.settings.recipe import find_recipe
 ANSWERED_S = 600.0
 """Longest wait for a person to lay the ball."""
 _PICTURES = ("area.png", "field.png")
-_NAMES = {"calibration": "a calibration", "verification": "a verification"}
+_NAMES = {"calibration": messages.A_CALIBRATION, "verification": messages.A_VERIFICATION}
 
 
 @dataclass(slots=True)
@@ -149,11 +152,13 @@ class PanelCalibration:
             if calibration is not None and request.kind == "verification":
                 record = self._store.last_verification(calibration)
             if record is None:
-                raise BadInputError(f"there is no {request.kind} of this sensor yet")
+                raise BadInputError(messages.NO_PLOT())
             try:
                 return Picture(media_type="image/png", data=(self._store.folder(record) / request.name).read_bytes())
             except OSError as error:
-                raise BadInputError(f"{request.name} of {request.kind} {record.id}: {error.strerror}") from error
+                raise BadInputError(
+                    messages.PLOT_UNREADABLE(file=f"{record.id}/{request.name}", error=str(error.strerror))
+                ) from error
 
         return await self._worker.do(read)
 
@@ -163,7 +168,7 @@ class PanelCalibration:
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "begun")
-        self._plc_commands.kept_manual = _NAMES[request.kind]
+        self._plc_commands.kept_manual = _NAMES[request.kind]()
         self._devices.use(by_inspection=True)
         run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
         return _run_view(run)
@@ -172,7 +177,7 @@ class PanelCalibration:
         """Continue after the ball was laid."""
         run = self._run
         if run is None or run.state != "waiting":
-            raise BadInputError("nothing waits for the ball at this moment; look at the run again")
+            raise BadInputError(messages.NOT_WAITING())
         run.state, run.request = "running", None
         run.laid.set()
         return _run_view(run)
@@ -181,7 +186,7 @@ class PanelCalibration:
         """Cancel the run."""
         run = self._run
         if run is None:
-            raise BadInputError("nothing was begun with the ball; begin it first")
+            raise BadInputError(messages.NOT_BEGUN())
         if run.open:
             self._note(request.actor, "called_off")
             await self.close()
@@ -189,16 +194,16 @@ class PanelCalibration:
 
     def _why_not(self, serial: str) -> Message | None:
         if self._run is not None and self._run.open:
-            return verbatim(f"{_NAMES[self._run.kind]} is under way: let it end, or call it off.")
+            return UNDER_WAY(activity=_NAMES[self._run.kind]())
         if not serial:
-            return verbatim("This camera is no sensor that could be calibrated.")
+            return messages.NO_SENSOR()
         return self._refusal()
 
     async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:
         try:
             result = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
         except asyncio.CancelledError:
-            run.state, run.result = "ended", verbatim("called off: nothing was stored")
+            run.state, run.result = "ended", messages.CALLED_OFF()
             raise
         except (StationError, ValueError) as error:
             run.state, run.result = "failed", message_of(error)
@@ -208,7 +213,7 @@ class PanelCalibration:
             run.state, run.result = ("passed", None) if result is None else ("failed", result)
         finally:
             run.request = None
-            self._plc_commands.kept_manual = ""
+            self._plc_commands.kept_manual = None
             self._devices.use(by_inspection=False)
 
     async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
@@ -236,7 +241,7 @@ class PanelCalibration:
     async def _verify(self, run: _Run) -> Message | None:
         calibration = self._calibrated.calibration
         if calibration is None:
-            raise BadInputError("the sensor is not calibrated: calibrate it first")
+            raise BadInputError(messages.MISSING())
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
         golden, presses = await self._worker.do(
             lambda: (self._store.golden(calibration), self._store.presses(calibration))
@@ -260,22 +265,19 @@ class PanelCalibration:
         await self._records.change(
             lambda connection: (append_audit(connection, entry), self._store.add_verification(made, files))
         )
-        failed = [verbatim(f"{check.name}: {check.found}: {check.remedy}") for check in made.checks if not check.passed]
+        failed = [failed_check(check) for check in made.checks if not check.passed]
         return joined(failed) if failed else None
 
     async def _lay(self, run: _Run, place: Place) -> None:
         """Request the ball from the person, and wait until it is in place."""
         run.laid.clear()
         run.state = "waiting"
-        run.request = verbatim(
-            f"Lay the ball {place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its "
-            "first place, and take your hands away."
-        )
+        run.request = messages.LAY_BALL(right_mm=place.x_mm, down_mm=place.y_mm)
         try:
             async with asyncio.timeout(ANSWERED_S):
                 await run.laid.wait()
         except TimeoutError:
-            raise StationError(f"nobody laid the ball within {ANSWERED_S / 60:g} min; begin again") from None
+            raise StationError(messages.BALL_LATE(limit_min=ANSWERED_S / 60)) from None
 
     def _unit(self) -> Unit:
         description = self._devices.cell.camera.description
@@ -298,7 +300,7 @@ class PanelCalibration:
         )
 
     def _verification_view(self, made: Verification) -> CalibrationView:
-        ratio = "" if made.area_ratio is None else f"the ball's area is {made.area_ratio:.1%} of the calibration's"
+        ratio = None if made.area_ratio is None else messages.RATIO_OF_BALL(percent=100 * made.area_ratio)
         return CalibrationView(
             serial=made.serial,
             id=made.id,
@@ -312,7 +314,7 @@ class PanelCalibration:
 
 
 def _note_step(run: _Run, progress: Progress) -> None:
-    run.steps[progress.title] = RunStep(
+    run.steps[progress.title.id] = RunStep(
         number=progress.number, of=progress.of, title=progress.title, detail=progress.detail
     )
 
@@ -325,7 +327,13 @@ def _run_view(run: _Run) -> CalibrationRunView:
 
 def _check_views(made: Calibration | Verification) -> tuple[CheckView, ...]:
     return tuple(
-        CheckView(name=check.name, passed=check.passed, found=check.found, expected=check.expected, remedy=check.remedy)
+        CheckView(
+            name=check_name(check.name),
+            passed=check.passed,
+            found=check.found,
+            expected=check.expected,
+            remedy=check.remedy,
+        )
         for check in made.checks
     )
 

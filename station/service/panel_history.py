@@ -33,6 +33,7 @@ from station.channel.panel_queries import (
 )
 from station.channel.server import Handler
 from station.errors import StationError
+from station.messages import jobs as messages
 from station.records.audit import AuditEntry
 from station.records.audit_report import read_audit
 from station.records.database import reading
@@ -247,9 +248,9 @@ def _iso(utc_ms: int) -> str:
     try:
         return datetime.fromtimestamp(utc_ms / 1000, UTC).isoformat()
     except (ValueError, OverflowError) as error:
-        raise StationError(f"{utc_ms} ms is no time of a calendar; give another one") from error
+        raise StationError(messages.NO_TIME(utc_ms=utc_ms)) from error
 
 
 def _check_text(text: str) -> None:
     if not text.isprintable():
-        raise StationError(f"{text!r} holds what cannot be printed; give a name of printable letters")
+        raise StationError(messages.UNPRINTABLE(text=repr(text)))

@@ -19,6 +19,7 @@ from typing import Literal
 
 from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobView
 from station.errors import StationError
+from station.messages import jobs as messages
 from station.messages.message import Message, verbatim
 
 FOLDER = "panel_jobs"
@@ -85,7 +86,7 @@ class PanelJobs:
             JobError: too many wait, or the disk is full.
         """
         if sum(job.open for job in self._jobs.values()) >= MOST_WAITING:
-            raise JobError(f"{MOST_WAITING} exports and replays are under way; wait for one, or call one off")
+            raise JobError(messages.TOO_MANY(number=MOST_WAITING))
         folder = self._home / FOLDER / uuid.uuid4().hex
         try:
             if not self._jobs:
@@ -93,9 +94,9 @@ class PanelJobs:
             folder.mkdir(parents=True)
             free_bytes = shutil.disk_usage(folder).free
         except OSError as error:
-            raise JobError(f"{folder.parent}: {(error.strerror or str(error)).lower()}; make it writable") from error
+            raise JobError(messages.NO_FOLDER(folder=str(folder.parent), error=error.strerror or str(error))) from error
         if free_bytes < _LEAST_FREE_BYTES:
-            raise JobError(f"{free_bytes // 1_000_000} MB are free on the disk of {folder.parent}; free space first")
+            raise JobError(messages.DISK_FULL(free_mb=free_bytes // 1_000_000, folder=str(folder.parent)))
         return folder
 
     def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobView:
@@ -146,14 +147,14 @@ class PanelJobs:
         """
         told = self.state(job_id)
         if name not in {file.name for file in told.files}:
-            raise JobError(f"there is no file {name} of this job; begin it again")
+            raise JobError(messages.NO_FILE(name=name))
         try:
             with (self._get(job_id).folder / name).open("rb") as file:
                 size_bytes = file.seek(0, os.SEEK_END)
                 file.seek(min(offset, size_bytes))
                 return Chunk(data=file.read(LARGEST_CHUNK_BYTES), size_bytes=size_bytes)
         except OSError as error:
-            raise JobError(f"{name} cannot be read: {error.strerror}; begin the job again") from error
+            raise JobError(messages.FILE_UNREADABLE(name=name, error=str(error.strerror))) from error
 
     async def end(self, job_id: str) -> JobView:
         """Cancel a job. Idempotent."""
@@ -179,9 +180,9 @@ class PanelJobs:
             job.state = "failed" if code else "done"
             job.message = verbatim(words) if words else None
         except TimeoutError:
-            job.state, job.message = "failed", verbatim(f"it was not done within {LONGEST_S / 60:g} min; ask for less")
+            job.state, job.message = "failed", messages.LATE(limit_min=LONGEST_S / 60)
         except OSError as error:
-            job.state, job.message = "failed", verbatim(f"it could not be started: {error.strerror}")
+            job.state, job.message = "failed", messages.NOT_STARTED(error=str(error.strerror))
         except asyncio.CancelledError:
             job.state = "ended"
             raise
@@ -225,7 +226,7 @@ class PanelJobs:
 
     def _get(self, job_id: str) -> Job:
         if job_id not in self._jobs:
-            raise JobError("this job is not known any more; begin it again")
+            raise JobError(messages.UNKNOWN())
         return self._jobs[job_id]
 
     def _forget(self) -> None:

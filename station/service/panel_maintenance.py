@@ -31,7 +31,9 @@ from station.channel.server import Handler
 from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
-from station.messages.message import Message, verbatim
+from station.messages import maintenance as messages
+from station.messages.commands import JOGGING
+from station.messages.message import Message
 from station.records.audit import AuditEntry
 from station.service.active_calibration import ActiveCalibration
 from station.service.audit_logger import AuditLogger
@@ -114,15 +116,15 @@ class PanelMaintenance:
         """Return why nothing may be moved by hand now, with the remedy; None if it may."""
         service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
         if service.stop_requested:
-            return verbatim("The station is told to end.")
+            return messages.ENDING()
         if facts.refusal is Refusal.BUSY:
-            return verbatim("An inspection is under way: wait for its end.")
+            return messages.BUSY()
         if mode != MANUAL:
-            return verbatim(f"The station is in mode {mode}: set manual mode, {MANUAL}, first. It takes no fruit then.")
+            return messages.SET_MANUAL(mode=mode, manual=MANUAL)
         if service.state not in _JOGGED:
-            return verbatim(facts.sentence)
-        if self._plc_commands.kept_manual and not self._moving.locked():
-            return verbatim(f"{self._plc_commands.kept_manual} is under way: let it end, or call it off.")
+            return facts.activity
+        if self._plc_commands.kept_manual is not None and not self._moving.locked():
+            return messages.UNDER_WAY(activity=self._plc_commands.kept_manual)
         return None
 
     async def health(self, _request: GetHealth) -> Health:
@@ -137,7 +139,7 @@ class PanelMaintenance:
             ready=readiness.ready,
             why=readiness.why,
             mode=self._plc_commands.mode,
-            state=verbatim(STATES[self._service.state].sentence),
+            state=STATES[self._service.state].activity,
             jog_refused=self.refusal(),
             parts=tuple(
                 PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
@@ -169,22 +171,22 @@ class PanelMaintenance:
         """
         gripper, width_mm = self._devices.cell.gripper, request.width_mm
         if (request.to == "width") != (width_mm is not None):
-            raise StationError("to jog the gripper: expected a width where it is to go to one, and none elsewhere")
+            raise StationError(messages.JOG_WIDTH())
         self._check(request.actor, "jog", request.to)
         if request.to == "stop":
             reading = await gripper.stop()
         else:
             if width_mm is not None and width_mm > gripper.max_width_mm:
-                raise StationError(f"the fingers open to {gripper.max_width_mm:.1f} mm, not to {width_mm:g} mm")
+                raise StationError(messages.JOG_TOO_WIDE(widest_mm=gripper.max_width_mm, width_mm=width_mm))
             if self._moving.locked():
-                raise NotNowError("the fingers move already: wait for them, or stop them")
+                raise NotNowError(messages.JOG_MOVING())
             async with self._moving:
-                self._plc_commands.kept_manual = "jogging"
+                self._plc_commands.kept_manual = JOGGING()
                 try:
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
                 finally:
-                    self._plc_commands.kept_manual = ""
+                    self._plc_commands.kept_manual = None
         self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
@@ -203,9 +205,9 @@ class PanelMaintenance:
         active = self._service.active
         why = None
         if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
-            why = verbatim("An inspection is under way: the image is shown as it is.")
+            why = messages.IMAGE_BUSY()
         elif request.contact and active is None:
-            why = verbatim("No recipe is active: its method measures the contact.")
+            why = messages.IMAGE_NO_RECIPE()
         segmentation = active.recipe.segmentation if request.contact and active is not None and why is None else None
         return await self._worker.do(lambda: self._live(frame, segmentation, why))
 
@@ -259,16 +261,16 @@ class PanelMaintenance:
         try:
             key = (path, path.stat().st_mtime_ns, segmentation)
         except OSError:
-            return None, verbatim("There is no golden reference yet: calibrate, or let the station inspect once.")
+            return None, messages.NO_GOLDEN()
         if self._method is None or self._method[0] != key:
             picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
             if picture is None:
-                return None, verbatim(f"The golden reference {path.name} cannot be read: calibrate again.")
+                return None, messages.GOLDEN_UNREADABLE(file=path.name)
             self._method = key, make_method([np.asarray(picture, np.uint8)], segmentation)
         try:
             return self._method[1].measure(image), None
         except ValueError:
-            return None, verbatim("The image has another size than the golden reference: calibrate again.")
+            return None, messages.GOLDEN_SIZE()
 
 
 def _outlined(image: Image, contact: Contact) -> Image:

@@ -38,12 +38,15 @@ from station.errors import BadInputError, StationError
 from station.inspection.evidence import Evidence
 from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import SizedLimits
-from station.messages.message import verbatim
+from station.messages import recipes as messages
+from station.messages.jobs import NOT_WRITTEN
+from station.messages.lots import UNPRINTABLE
+from station.messages.message import message_of
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.recipe_state import RecipeState
-from station.recipe_store.revision import ConflictError, Revision
+from station.recipe_store.revision import STATUS, ConflictError, Revision, Status
 from station.recipe_store.store import RecipeStore
 from station.records.database import plain, reading, records_folder
 from station.service.panel_jobs import PanelJobs
@@ -107,7 +110,7 @@ class PanelRecipes:
             rows = tuple(_row(standing) for standing in standings)
             return Recipes(
                 rows=rows,
-                problems=tuple(verbatim(str(each)) for each in problems),
+                problems=problems,
                 editable=self._editable,
                 folder=str(self._folder),
                 own_folder=str(self._own_folder),
@@ -154,7 +157,7 @@ class PanelRecipes:
             elif standing.control is not None:
                 old = standing.control.recipe
             else:
-                raise BadInputError(f"recipe {request.name}: none of its revisions is approved; name one")
+                raise BadInputError(messages.NONE_APPROVED(recipe=request.name))
             new = self._store.valid_file(request.name).recipe
             if request.new is not None:
                 new = _recipe(self._store.revision(request.name, request.new))
@@ -170,8 +173,7 @@ class PanelRecipes:
             waiting = self._store.state(request.name).submitted
             if waiting is not None and waiting.author != person.who:
                 raise ConflictError(
-                    f"recipe {request.name}: revision {waiting.revision} of {waiting.author} waits for approval; let "
-                    "it be approved or rejected first"
+                    messages.ANOTHER_WAITS(recipe=request.name, revision=waiting.revision, author=waiting.author)
                 )
             self._editor.edit(request.name, request.values, person, request.base)
             self._store.submit(request.name, person)
@@ -193,10 +195,11 @@ class PanelRecipes:
 
         def reject() -> None:
             status = self._store.revision(request.name, request.revision).status
-            if status != "draft":
+            if status is not Status.DRAFT:
                 raise BadInputError(
-                    f"recipe {request.name}: revision {request.revision} is {status}, and only a draft is rejected; "
-                    "look at the recipe again"
+                    messages.ONLY_DRAFT_REJECTED(
+                        recipe=request.name, revision=request.revision, status=STATUS[status]()
+                    )
                 )
             self._store.retire(request.name, _person(request.actor, request.reason), request.revision)
 
@@ -237,7 +240,7 @@ class PanelRecipes:
     async def start_whatif(self, request: StartWhatIf) -> JobView:
         """Judge stored inspections again by the recipe's file as it is now."""
         if not request.lot.isprintable():
-            raise StationError(f"the lot {request.lot!r} is no name; give one of printable letters")
+            raise StationError(UNPRINTABLE(name=repr(request.lot)))
         folder = self._jobs.folder()
         draft = folder / f"{request.name}.yaml"
 
@@ -245,7 +248,7 @@ class PanelRecipes:
             try:
                 draft.write_text(self._store.valid_file(request.name).text, encoding="utf-8")
             except OSError as error:
-                raise StationError(f"{draft}: {(error.strerror or str(error)).lower()}; free space") from error
+                raise StationError(NOT_WRITTEN(file=str(draft), error=error.strerror or str(error))) from error
 
         await self._worker.do(write)
         lot = [f"--lots={request.lot}"] if request.lot else []
@@ -273,7 +276,7 @@ def _row(standing: RecipeState) -> RecipeRow:
         waiting=waiting.revision if waiting else None,
         waiting_author=waiting.author if waiting else "",
         waiting_reason=waiting.reason if waiting else "",
-        note=verbatim(standing.note) if standing.note else None,
+        note=standing.note,
     )
 
 
@@ -304,7 +307,7 @@ def _recipe(revision: Revision) -> Recipe:
     try:
         return revision.recipe
     except SettingsError as error:
-        raise BadInputError(f"this program does not take that revision any more: {error}") from error
+        raise BadInputError(messages.REVISION_NOT_ACCEPTED(why=message_of(error))) from error
 
 
 def _changes(old: Recipe, new: Recipe) -> tuple[Change, ...]:

@@ -27,7 +27,9 @@ from station.channel.panel_live import (
     RecipeSummary,
 )
 from station.channel.server import Handlers
+from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.states import STATES
+from station.messages import operation as messages
 from station.messages.message import Message, message_in, message_of, verbatim
 from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
@@ -123,7 +125,7 @@ class PanelServer:
     def hmi_fault(self) -> Message | None:
         """Return the fault of the HMI's process; None for none, and before its first message."""
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
-        return verbatim(f"the pages' process has not asked for {age_s:.0f} s") if age_s > SILENT_S else None
+        return messages.PAGES_SILENT(age_s=age_s) if age_s > SILENT_S else None
 
     async def _state(self, _request: GetPanelState) -> PanelState:
         self._heard_s = time.monotonic()
@@ -134,7 +136,7 @@ class PanelServer:
             boot=line.boot,
             utc_ms=utc_ms(),
             state=service.state,
-            activity=verbatim(facts.sentence),
+            activity=facts.activity,
             packml_state=line.packml_state,
             mode=line.mode,
             ready=line.ready,
@@ -186,7 +188,13 @@ class PanelServer:
         rows = await self._records.alarm_log(request.most)
         return AlarmHistory(
             changes=tuple(
-                AlarmChange(utc_ms=row.utc_ms, id=row.id, change=row.change, detail=message_in(row.detail))
+                AlarmChange(
+                    utc_ms=row.utc_ms,
+                    id=row.id,
+                    cause=ALARMS[AlarmId(row.id)].cause if row.id in set(AlarmId) else verbatim(row.id),
+                    change=row.change,
+                    detail=message_in(row.detail),
+                )
                 for row in rows
             )
         )

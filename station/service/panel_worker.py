@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from station.errors import StationError
+from station.messages import jobs as messages
 
 T = TypeVar("T")
 
@@ -35,7 +36,7 @@ class PanelWorker:
             StationError: as the work raises it.
         """
         if self._waiting >= MOST_WAITING:
-            raise PanelBusyError(f"{self._waiting} questions of the pages wait already; ask again in a moment")
+            raise PanelBusyError(messages.REQUESTS_FULL(number=self._waiting))
         self._waiting += 1
         future = self._thread.submit(work)
         future.add_done_callback(lambda _: self._done())
@@ -43,7 +44,7 @@ class PanelWorker:
             async with asyncio.timeout(LONGEST_S):
                 return await asyncio.wrap_future(future)
         except TimeoutError:
-            raise PanelBusyError(f"no answer within {LONGEST_S:g} s; ask for less, or again in a moment") from None
+            raise PanelBusyError(messages.REQUEST_SLOW(limit_s=LONGEST_S)) from None
 
     def _done(self) -> None:
         self._waiting -= 1

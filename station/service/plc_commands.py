@@ -12,7 +12,9 @@ from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
-from station.messages.message import Message, message_of, verbatim
+from station.messages import commands as messages
+from station.messages import operation
+from station.messages.message import Message, message_of
 from station.service.active_recipes import ActiveRecipes
 from station.service.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
 from station.service.device_manager import DeviceManager
@@ -57,8 +59,8 @@ class PlcCommands:
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
-        self.kept_manual = ""
-        """Activity at the panel that needs the mode unchanged; empty for none."""
+        self.kept_manual: Message | None = None
+        """Activity at the panel that needs the mode unchanged."""
         self.registers_wanted = False
         """Requests the PLC interface's registers with the next beat."""
         self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
@@ -101,9 +103,9 @@ class PlcCommands:
         if self._line is None or age_s is None:
             return None
         if age_s > LINE_SILENT_S:
-            return verbatim(f"the PLC interface has not been heard for {age_s:.0f} s")
+            return operation.INTERFACE_SILENT(age_s=age_s)
         beats = self._line.plc_alive or not self._line.enabled
-        return None if beats else verbatim("the PLC's heartbeat stands still")
+        return None if beats else operation.HEARTBEAT_STILL()
 
     def update_line_alarms(self) -> None:
         """Raise and clear the alarms of the line's state."""
@@ -130,7 +132,7 @@ class PlcCommands:
                 async with asyncio.timeout(DEADLINE_S):
                     why = await self._execute(command)
             except TimeoutError:
-                why = verbatim(f"{command.command} did not come to its end within {DEADLINE_S:g} s: {self._activity()}")
+                why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())
         if why is not None:
             log.warning("%s was not done: %s", command.command, why)
         done = CommandDone(done=why is None, why=why)
@@ -169,9 +171,9 @@ class PlcCommands:
 
     def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
-            return verbatim(f"mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)")
-        if self.kept_manual and mode != self.mode:
-            return verbatim(f"{self.kept_manual} at the panel needs the mode to stay: let it end, or call it off there")
+            return messages.MODE_UNKNOWN(mode=mode)
+        if self.kept_manual is not None and mode != self.mode:
+            return messages.MODE_KEPT(activity=self.kept_manual)
         self.mode = mode
         return None
 
@@ -179,13 +181,10 @@ class PlcCommands:
         await asyncio.to_thread(self._recipes.read)
         found = self._recipes.find(number)
         if found is None:
-            known = ", ".join(map(str, self._recipes.numbers)) or "none"
-            return verbatim(
-                f"recipe {number}: expected one of {known}" + "".join(f"; {line}" for line in self._recipes.problems)
-            )
+            return self._recipe_unknown(number)
         widest_mm = self._devices.cell.gripper.max_width_mm
         if found.recipe.expected_width.smallest_mm >= widest_mm:
-            return verbatim(f"recipe {number}: its fruit are wider than the jaws open, {widest_mm:g} mm")
+            return messages.RECIPE_TOO_WIDE(number=number, widest_mm=widest_mm)
         try:
             self._service.pacing.expected(found.recipe)
         except BadInputError as error:
@@ -198,10 +197,14 @@ class PlcCommands:
         finally:
             self.recipe_changing = False
         if not kept:
-            return verbatim(
-                f"recipe {number} is active, but is forgotten at the next start: the home folder cannot be written"
-            )
+            return messages.RECIPE_NOT_STORED(number=number)
         return None
+
+    def _recipe_unknown(self, number: int) -> Message:
+        known = ", ".join(map(str, self._recipes.numbers))
+        refusal = messages.RECIPE_UNKNOWN(number=number, known=known) if known else messages.NO_RECIPES(number=number)
+        problems = self._recipes.problems
+        return messages.RECIPE_UNKNOWN_BECAUSE(refusal=refusal, problems=problems) if problems else refusal
 
     async def stop(self) -> Message | None:
         """Accept no trigger until the next reset, also over a restart; the fruit under way is inspected to its end.
@@ -213,13 +216,13 @@ class PlcCommands:
         service.stop_wanted = True
         kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
-            service.conductor.post(Event.STOP, verbatim("a person stops the station at the panel"))
+            service.conductor.post(Event.STOP, operation.STOPPED_AT_PANEL())
         reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
         if reached not in WAITING:
-            return verbatim("the station was started again meanwhile")
+            return messages.STARTED_MEANWHILE()
         if kept:
             return None
-        return verbatim("the station stands, but its next start forgets that: the home folder cannot be written")
+        return messages.STOP_NOT_STORED()
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
         """Recover the arm after a stop that a person has checked; the station continues after a reset.
@@ -228,7 +231,7 @@ class PlcCommands:
             by: name and role of who gave it.
         """
         if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
-            return CommandDone(done=False, why=verbatim("an inspection is under way"))
+            return CommandDone(done=False, why=messages.BUSY())
         log.info("a person at the cell asks for: %s", request.what)
         try:
             await self._devices.recover(request.what)
@@ -242,22 +245,19 @@ class PlcCommands:
         service = self._service
         if service.state not in UNJUDGED:
             busy = STATES[service.state].refusal is Refusal.BUSY
-            return verbatim("the inspection is already judged") if busy else None
-        service.conductor.post(Event.CALLED_OFF, verbatim("the PLC called the inspection off"))
+            return messages.JUDGED() if busy else None
+        service.conductor.post(Event.CALLED_OFF, operation.CALLED_OFF())
         await service.conductor.until(lambda state: state not in UNJUDGED)
         return None
 
     def reset_refusal(self) -> Message | None:
         """Return why a reset would do nothing now; None if it would work."""
         if self._service.stop_requested:
-            return verbatim("the station is told to end")
+            return messages.ENDING()
         if stop := self._devices.active_stop:
-            why = str(stop).removesuffix(".")
-            return verbatim(
-                f"{why}. That is a person's to confirm at the cell, with `station devices recover`, before the reset"
-            )
+            return messages.CONFIRM_STOP(stop=message_of(stop))
         busy = STATES[self._service.state].refusal is Refusal.BUSY
-        return verbatim("an inspection is under way; call it off first") if busy else None
+        return messages.BUSY_CALL_OFF() if busy else None
 
     async def _reset(self) -> Message | None:
         service, state = self._service, self._service.state
@@ -270,7 +270,7 @@ class PlcCommands:
         service.reset_wanted = True
         self._devices.confirmed_clear = True
         if state is State.LATCHED:
-            service.conductor.post(Event.PERSON_CONFIRMED, verbatim("reset"))
+            service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
         elif state is State.STOPPED:
             service.conductor.post(Event.RESET)
         else:
@@ -279,7 +279,7 @@ class PlcCommands:
             except ArmFault as fault:
                 return message_of(fault)
             if state is State.CARRIED:
-                service.conductor.post(Event.PERSON_CONFIRMED, verbatim("reset"))
+                service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
         tried_s = time.monotonic()
         reached = await service.conductor.until(
             lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
@@ -291,4 +291,4 @@ class PlcCommands:
 
     def _activity(self) -> Message:
         faults = list(self._devices.faults.values())
-        return message_of(faults[0]) if faults else verbatim(STATES[self._service.state].sentence)
+        return message_of(faults[0]) if faults else STATES[self._service.state].activity

@@ -2,7 +2,8 @@
 
 from station.channel.line import StationState
 from station.inspection.states import STATES, State
-from station.messages.message import Message, message_of, verbatim
+from station.messages import readiness as messages
+from station.messages.message import Message, joined, message_of
 from station.service.active_calibration import ActiveCalibration
 from station.service.active_recipes import ActiveRecipes
 from station.service.device_manager import DeviceManager
@@ -46,29 +47,33 @@ class Interlock:
         """Return why no trigger is accepted, for the PLC and for a person; both None if one is."""
         service, facts = self._service, STATES[self._service.state]
         if service.stop_requested:
-            return Refusal.NOT_READY, verbatim("The station is told to end; start it again.")
+            return Refusal.NOT_READY, messages.ENDING()
         if facts.refusal is not None:
-            return facts.refusal, self._trouble() or verbatim(facts.sentence)
+            return facts.refusal, self._trouble() or facts.reason
         if service.stop_wanted:
-            return Refusal.NOT_READY, verbatim("A person has stopped the station at the panel; start it there.")
+            return Refusal.NOT_READY, messages.STOPPED_BY_PERSON()
         return self._idle_refusal()
 
     def _idle_refusal(self) -> tuple[Refusal | None, Message | None]:
         service = self._service
         if stuck := self._liveness.stuck():
-            names = ", ".join(f"{name} for {age_s:.0f} s" for name, age_s in stuck.items())
-            return Refusal.NOT_READY, verbatim(f"No progress of {names}: restart the station if it stays.")
+            parts = [messages.PART_AGE(part=name, age_s=age_s) for name, age_s in stuck.items()]
+            return Refusal.NOT_READY, messages.NO_PROGRESS(parts=parts)
         if self._plc_commands.recipe_changing:
-            return Refusal.RECIPE_CHANGING, verbatim("The recipe is being changed; wait a moment.")
+            return Refusal.RECIPE_CHANGING, messages.RECIPE_CHANGING()
         if service.active is None:
-            numbers = ", ".join(map(str, self._recipes.numbers)) or "none: see `station recipes check`"
-            why = f"{self._lots.mismatch} " if self._lots.mismatch else ""
-            return Refusal.NOT_READY, verbatim(f"{why}No recipe is active: choose one by its number ({numbers}).")
+            return Refusal.NOT_READY, self._no_recipe()
         if why := self._calibrated.refusal():
             return Refusal.NOT_READY, why
         if self._plc_commands.mode != PRODUCTION:
-            return Refusal.NOT_READY, verbatim("The station is not in production mode: set mode 1.")
+            return Refusal.NOT_READY, messages.NOT_PRODUCTION()
         return None, None
+
+    def _no_recipe(self) -> Message:
+        numbers = ", ".join(map(str, self._recipes.numbers))
+        choose = messages.NO_RECIPE(numbers=numbers) if numbers else messages.NO_RECIPE_AT_ALL()
+        mismatch = self._lots.mismatch
+        return choose if mismatch is None else joined((mismatch, choose))
 
     def state(self) -> StationState:
         """Return the whole state, as the PLC interface gets it with every beat."""
@@ -104,7 +109,7 @@ class Interlock:
                 "ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
                 watch.age_s,
                 None if watch.fault is None else message_of(watch.fault),
-                None if watch.fault is None else verbatim("see the detail, and `station devices check`"),
+                None if watch.fault is None else messages.SEE_DEVICES(),
             )
             for name, watch in self._devices.monitors.items()
         ]
@@ -123,11 +128,11 @@ class Interlock:
                 "plc",
                 "unknown",
                 None,
-                verbatim("the PLC interface has not asked yet"),
-                verbatim("start it: station plc run"),
+                messages.PLC_NOT_HEARD(),
+                messages.START_PLC(),
             )
         if trouble := self._plc_commands.line_fault():
-            return Dependency("plc", "fault", age_s, trouble, verbatim("see the detail"))
+            return Dependency("plc", "fault", age_s, trouble, messages.SEE_DETAIL())
         return Dependency("plc", "ok", age_s)
 
     def _trouble(self) -> Message | None:

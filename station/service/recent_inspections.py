@@ -14,6 +14,7 @@ from station.channel.line import Outcome
 from station.channel.panel_live import Counts, CurvePointSummary, Fruit, FruitSummary, LimitView, Picture
 from station.devices.camera.interface import Image
 from station.errors import StationError
+from station.messages import jobs as messages
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
 from station.service.inspection import Inspection
@@ -141,13 +142,13 @@ class RecentInspections:
             if entry.picture is None and entry.look is not None:
                 entry.picture, entry.look = await asyncio.to_thread(_picture, entry.look), None
         if entry.picture is None:
-            raise NotRecentError(f"no picture was taken of inspection {sequence}")
+            raise NotRecentError(messages.NO_PICTURE(sequence=sequence))
         return entry.picture
 
     def _find(self, sequence: int) -> _Recent:
         entry = self._by_sequence.get(sequence)
         if entry is None:
-            raise NotRecentError(f"inspection {sequence} is not among the last {MOST_IN_FULL}: look into the history")
+            raise NotRecentError(messages.NOT_RECENT(sequence=sequence, number=MOST_IN_FULL))
         return entry
 
 
@@ -243,7 +244,7 @@ def _picture(look: ReadStep) -> Picture:
     image, mask = look()
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not done:
-        raise NotRecentError("the picture could not be encoded")
+        raise NotRecentError(messages.PICTURE_NOT_ENCODED())
     outlines, _ = cv2.findContours(np.ascontiguousarray(mask), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     outline: tuple[tuple[int, int], ...] = ()
     if outlines:

@@ -11,7 +11,8 @@ from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.states import STATES, State
-from station.messages.message import Message, message_of, verbatim
+from station.messages import operation as messages
+from station.messages.message import Message, message_of
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
@@ -115,7 +116,16 @@ class Service:
                 request.size_class,
             )
             limits = self.pacing.limits(self.active.recipe)
-            now = Inspection(trigger, self.active, limits, *self._calibrated.in_force, self._resolution_mm)
+            scale = self._calibrated.in_force
+            now = Inspection(
+                trigger,
+                self.active,
+                limits,
+                scale.mm_per_px,
+                str(scale.words),
+                scale.scale_uncertainty,
+                self._resolution_mm,
+            )
             self._pending = PendingTrigger(request, now)
             self.conductor.post(Event.TRIGGER)
             return await self._pending.answered()
@@ -137,9 +147,7 @@ class Service:
             self.on_published(outcome)
         running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
-            self.conductor.post(
-                Event.CALLED_OFF, verbatim("the PLC was given another outcome for this fruit meanwhile")
-            )
+            self.conductor.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
 
     # Actions of the cycle: see `Performer`.
 
@@ -226,7 +234,7 @@ class Service:
         self._report_late()
         if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
-            self.conductor.post(Event.STOP, verbatim("the station is told to end"))
+            self.conductor.post(Event.STOP, messages.STATION_ENDS())
 
     def device_changed(self, fault: StationError | None) -> None:
         """Handle a monitor's report that a device's state has changed.
@@ -312,8 +320,11 @@ class Service:
         found = late_now(self._now, self.state, self.conductor.in_state_s)
         if found is not None:
             self._late_in = self.state
-            what = "the inspection" if found.event is Event.LATE else self.state.value.replace("_", " ")
-            why = verbatim(f"{what} took {found.took_s:.1f} s, at most {found.allowed_s:.1f} s are allowed")
+            took = {"took_s": found.took_s, "limit_s": found.allowed_s}
+            if found.event is Event.LATE:
+                why = messages.INSPECTION_LATE(**took)
+            else:
+                why = messages.PHASE_LATE(**took, activity=STATES[self.state].activity)
             self.conductor.post(found.event, why)
 
     async def _close_refused(self) -> None:

@@ -218,7 +218,7 @@ class Station:
             async with asyncio.timeout(limit_s):
                 await service.conductor.until(lambda state: STATES[state].may_exit)
         except TimeoutError:
-            log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].sentence)
+            log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].activity)
 
     @staticmethod
     def _begin(stack: contextlib.AsyncExitStack, work: Coroutine[None, None, None], name: str) -> asyncio.Task[None]:

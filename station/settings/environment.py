@@ -79,7 +79,7 @@ def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], 
         try:
             values[leaf.path] = _value(environ[name], leaf.node, root)
         except SettingsError:
-            wanted = expectation(leaf.node, root)
+            wanted = str(expectation(leaf.node, root))
             problems.append(Problem(PLACE, name, f"expected {wanted}, got {formatted(environ[name])}"))
     return values, problems
 

@@ -91,7 +91,7 @@ def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
 def _columns(leaf: Leaf, root: Node) -> list[str]:
     """Return a field's title, accepted values, default and meaning."""
     default = f"`{json.dumps(leaf.node['default'], ensure_ascii=False)}`" if "default" in leaf.node else "required"
-    takes = "a list of the following" if _of_mappings(leaf, root) else expectation(leaf.node, root)
+    takes = "a list of the following" if _of_mappings(leaf, root) else str(expectation(leaf.node, root))
     return [leaf.node.get("title", ""), takes, default, leaf.node.get("description", "")]
 
 

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, reduce
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
+from station.messages import expectations as messages
+from station.messages.message import Definition, Message
 from station.settings.problems import Path, shortened
 
 Node = dict[str, Any]
@@ -111,82 +113,120 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
         yield from leaves(root, item, (*path[:-1], f"{path[-1]}[]"), into_lists=True)
 
 
-def expectation(node: Node, root: Node) -> str:
+def expectation(node: Node, root: Node) -> Message:
     """Describe the accepted values of a field: `a number from 0.1 to 10 mm`.
 
     Args:
         node: the field's node.
         root: the whole schema.
     """
-    words = [_alternative(branch, root) for branch in branches(node, root)]
+    kinds = dict.fromkeys(_alternative(branch, root) for branch in branches(node, root))
     nullable = any(resolved(each, root).get("type") == "null" for each in node.get("anyOf", ()))
-    return " or ".join([*dict.fromkeys(words), *(["null"] if nullable else [])])
+    described = reduce(lambda first, second: messages.EITHER(first=first, second=second), kinds)
+    return messages.OR_NULL(value=described) if nullable else described
 
 
-def _alternative(node: Node, root: Node) -> str:
+def _alternative(node: Node, root: Node) -> Message:
     """Describe one alternative."""
     if "const" in node or "enum" in node:
         choices = node.get("enum", [node.get("const")])
         known = ", ".join(each if isinstance(each, str) else json.dumps(each) for each in choices)
-        return f"one of {known}" if len(choices) > 1 else known
+        return messages.ONE_OF(choices=known) if len(choices) > 1 else messages.EXACTLY(value=known)
     match node.get("type"):
         case "integer" | "number" as kind:
-            words = ("an integer" if kind == "integer" else "a number") + bounds(node)
+            described = _number(node, _INTEGER if kind == "integer" else _NUMBER)
         case "boolean":
-            words = "true or false"
+            described = messages.SWITCH()
         case "string":
-            words = _text(node)
+            described = _text(node)
         case "array":
-            words = _list(node, root)
+            described = _list(node, root)
         case _:
-            words = f"a mapping with {', '.join(node['properties'])}" if node.get("properties") else "a mapping"
-    return words
+            names = ", ".join(node.get("properties", ()))
+            described = messages.MAPPING_WITH(names=names) if names else messages.MAPPING()
+    return described
 
 
-def _list(node: Node, root: Node) -> str:
+class _Numbers(NamedTuple):
+    """Messages of a kind of number."""
+
+    any: Definition
+    in_unit: Definition
+    between: Definition
+    conditional: Definition
+
+
+_INTEGER = _Numbers(messages.INTEGER, messages.INTEGER_IN, messages.INTEGER_BETWEEN, messages.INTEGER_IF)
+_NUMBER = _Numbers(messages.NUMBER, messages.NUMBER_IN, messages.NUMBER_BETWEEN, messages.NUMBER_IF)
+_CONDITIONS = (
+    ("minimum", messages.AT_LEAST),
+    ("exclusiveMinimum", messages.ABOVE),
+    ("maximum", messages.AT_MOST),
+    ("exclusiveMaximum", messages.BELOW),
+)
+
+
+def _number(node: Node, kind: _Numbers) -> Message:
+    """Describe a number with its bounds and unit."""
+    unit = f" {node['unit']}" if "unit" in node else ""
+    low, high = node.get("minimum"), node.get("maximum")
+    if low is not None and high is not None:
+        return kind.between(least=_whole(low), most=_whole(high), unit=unit)
+    conditions = [message(value=_whole(node[name])) for name, message in _CONDITIONS if node.get(name) is not None]
+    if conditions:
+        condition = reduce(lambda first, second: messages.BOTH(first=first, second=second), conditions)
+        return kind.conditional(condition=condition, unit=unit)
+    return kind.in_unit(unit=unit) if unit else kind.any()
+
+
+def _whole(value: float) -> float:
+    """Return an integer where the value is one, to be shown without a decimal sign."""
+    return int(value) if value == int(value) else value
+
+
+def _list(node: Node, root: Node) -> Message:
     """Describe a list; its unit is its items'."""
     inner = resolved(node.get("items") or next(iter(node.get("prefixItems", ())), {}), root)
     if "unit" in node:
         inner = {**inner, "unit": node["unit"]}
-    of = f", each {expectation(inner, root)}" if inner and "properties" not in inner else ""
-    return f"a list{_length(node, 'minItems', 'maxItems', 'item')}{of}"
+    length = _length(node.get("minItems"), node.get("maxItems"), _ITEMS)
+    described = messages.LIST() if length is None else messages.LIST_OF(length=length)
+    if not inner or "properties" in inner:
+        return described
+    return messages.EACH(list=described, item=expectation(inner, root))
 
 
-def _text(node: Node) -> str:
+def _text(node: Node) -> Message:
     """Describe a text."""
-    kind = "a path" if node.get("format") == "path" else "a text"
-    pattern = f" that matches {node['pattern']}" if "pattern" in node else ""
-    return kind + _length(node, "minLength", "maxLength", "character") + pattern
+    text = messages.PATH() if node.get("format") == "path" else messages.TEXT()
+    length = _length(node.get("minLength"), node.get("maxLength"), _CHARACTERS)
+    if length is not None:
+        text = messages.TEXT_OF(text=text, length=length)
+    return messages.MATCHING(text=text, pattern=node["pattern"]) if "pattern" in node else text
 
 
-def _length(node: Node, least: str, most: str, thing: str) -> str:
-    """Return ` of 1 to 20 items`, or nothing without a bound."""
-    low, high = node.get(least), node.get(most)
-    if low is None and high is None:
-        return ""
+class _Counted(NamedTuple):
+    """Messages of a number of things."""
+
+    exactly: Definition
+    least: Definition
+    most: Definition
+    between: Definition
+
+
+_ITEMS = _Counted(messages.ITEMS, messages.ITEMS_LEAST, messages.ITEMS_MOST, messages.ITEMS_BETWEEN)
+_CHARACTERS = _Counted(
+    messages.CHARACTERS, messages.CHARACTERS_LEAST, messages.CHARACTERS_MOST, messages.CHARACTERS_BETWEEN
+)
+
+
+def _length(low: int | None, high: int | None, things: _Counted) -> Message | None:
+    """Describe a length; None without a bound."""
+    if high is None:
+        return None if low is None else things.least(number=low)
     if low == high:
-        return f" of {low} {thing}{'s' if low != 1 else ''}"
-    span = f"at least {low}" if high is None else f"at most {high}" if not low else f"{low} to {high}"
-    return f" of {span} {thing}s"
-
-
-def bounds(node: Node) -> str:
-    """Return a number's bounds and unit with a space before them: ` from 1 to 10 mm`, ` in mm`.
-
-    Args:
-        node: a number's node.
-    """
-    unit = f" {node['unit']}" if "unit" in node else ""
-    low, above = node.get("minimum"), node.get("exclusiveMinimum")
-    high, below = node.get("maximum"), node.get("exclusiveMaximum")
-    if low is not None and high is not None:
-        return f" from {figure(low)} to {figure(high)}{unit}"
-    parts = [
-        f"{word} {figure(value)}"
-        for word, value in (("at least", low), ("above", above), ("at most", high), ("below", below))
-        if value is not None
-    ]
-    return f" {' and '.join(parts)}{unit}" if parts else f" in{unit}" if unit else ""
+        return things.exactly(number=high)
+    return things.between(least=low, most=high) if low else things.most(number=high)
 
 
 def figure(value: float) -> str:

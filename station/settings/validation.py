@@ -122,7 +122,7 @@ def _difference(details: ErrorDetails, path: Where, root: Node, cause: object) -
     if details["type"] == "extra_forbidden":
         return _unknown(str(path[-1]), names(root, path[:-1]))
     node = find(root, path)
-    wanted = expectation(node, root) if node else details["msg"]
+    wanted = str(expectation(node, root)) if node else details["msg"]
     if details["type"] == "missing" and not isinstance(details["input"], list):
         return f"expected {wanted}, got nothing"
     if cause is not None:

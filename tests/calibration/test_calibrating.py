@@ -15,6 +15,7 @@ from station.calibration.gate import gated
 from station.calibration.model import PlacePoint, Refusal
 from station.calibration.report import refusal_files
 from station.calibration.rig import Unit
+from station.errors import BadInputError
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
@@ -105,7 +106,7 @@ def test_a_refusal_keeps_every_picture_and_check_and_is_never_used(drawn_ball, s
     assert len(list(folder.glob("press_*.png"))) == len(evidence.steps) == 14
     assert (folder / "reference.png").exists()
     page = (folder / "report.html").read_text()
-    assert all(html.escape(reason).replace("&#x27;", "&#39;") in page for reason in refused.value.reasons)
+    assert all(html.escape(str(reason)).replace("&#x27;", "&#39;") in page for reason in refused.value.reasons)
     assert any(not check.passed for check in refusal.checks)
     assert Refusal.model_validate_json((folder / "refusal.json").read_bytes()) == refusal
     assert store.current(UNIT.serial) is None
@@ -134,7 +135,7 @@ def test_a_place_that_is_not_where_it_is_said_to_be_is_refused(drawn_ball, calib
 
 
 def test_places_in_one_spot_are_refused_before_anything_moves(drawn_ball, calibrate_drawn):
-    with pytest.raises(ValueError, match="at least 2 mm apart"):
+    with pytest.raises(BadInputError, match="at least 2 mm apart"):
         calibrate_drawn(drawn_ball(1), (0.5, 0.5))
 
 

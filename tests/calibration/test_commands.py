@@ -45,7 +45,7 @@ def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
     assert str(store.folder(calibration) / "report.html") in output
 
     listed = site.station("calibrate", "list")
-    assert calibration.summary() in listed.stdout
+    assert str(calibration.summary()) in listed.stdout
     site.ask(do="fruit", kind="rubber_ball")
     good = site.station("verify", "--yes")
     assert good.returncode == 0, good.stdout + good.stderr

@@ -26,7 +26,9 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.panel_live import GetPanelState, PanelState
-from station.messages import grip as messages
+from station.messages import calibration as messages
+from station.messages import grip, readiness
+from station.messages.message import verbatim
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
 from station.service.active_calibration import ActiveCalibration
@@ -38,7 +40,9 @@ from station.settings.plc import line_endpoint
 from station.settings.segmentation import Segmentation
 
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
-FAILED = Check(name="wear", passed=False, found="41%", expected="75%")
+FAILED = Check(
+    name="wear", passed=False, found=verbatim("41%"), expected=verbatim("75%"), remedy=verbatim("change the gel")
+)
 
 
 def verification(calibration, made_at, *checks):
@@ -71,7 +75,7 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     )
     calibrated = in_use(tmp_path, draft.calibration.made_at)
     assert calibrated.in_force.mm_per_px == draft.calibration.mm_per_px
-    assert draft.calibration.id in calibrated.in_force.words
+    assert draft.calibration.id in str(calibrated.in_force.words)
     stored.add_calibration(calibration, calibration_files(draft))
     assert calibrated.calibration == calibration
     assert calibrated.gate_factor == 1.3
@@ -80,9 +84,9 @@ def test_the_scale_gate_and_golden_reference_are_the_sensors_own(stored, draft, 
     assert not (tmp_path / "golden_reference.png").exists()
     prepared = golden.prepared(Segmentation())
     assert prepared is not None
-    assert prepared.renewal == messages.RENEW_BY_CALIBRATION()
+    assert prepared.renewal == grip.RENEW_BY_CALIBRATION()
     another = in_use(tmp_path, calibration.made_at, "D11111")
-    assert another.in_force[:2] == (0.0266, "none: 0.0266 mm/px, by the configuration")
+    assert another.in_force[:2] == (0.0266, messages.NONE(scale_mm=0.0266))
     assert (another.gate_factor, another.golden()) == (1.0, None)
 
 
@@ -98,9 +102,12 @@ def test_age_and_a_failed_verification_are_told(stored, draft, tmp_path):
     young = in_use(tmp_path, made_at + timedelta(days=80))
     assert (young.alarm_detail(), young.figures.age_s) == (None, 80 * 86_400.0)
     assert young.figures[1:] == (None, None)
-    assert "91 days old, at most 90" in str(in_use(tmp_path, made_at + timedelta(days=91)).alarm_detail())
+    old = in_use(tmp_path, made_at + timedelta(days=91)).alarm_detail()
+    assert old == messages.OLD(age_days=91.0, limit_days=90.0)
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=1), FAILED), {})
-    assert "failed: wear" in str(young.alarm_detail())
+    failed = young.alarm_detail()
+    assert failed is not None
+    assert messages.CHECK_WEAR.id in failed.ids()
     assert young.figures.verification_age_s == pytest.approx(80 * 86_400 - 3600)
     assert young.figures.drift == pytest.approx(-0.03)
 
@@ -126,14 +133,14 @@ def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_all
     calibrated, another = in_use(tmp_path, made_at), in_use(tmp_path, made_at, "D11111")
     assert (calibrated.refusal(), calibrated.alarm_detail()) == (None, None)
     assert "not calibrated: calibrate it with the ball on the page Maintenance" in str(another.refusal())
-    assert str(another.alarm_detail()) == "the sensor is not calibrated: calibrate it first"
+    assert another.alarm_detail() == messages.MISSING()
     unknown = in_use(tmp_path, made_at, "")
     assert (unknown.refusal() is not None, unknown.alarm_detail()) == (True, None), (
         "no sensor was met yet, or it is none"
     )
     allowed = in_use(tmp_path, made_at, "D11111", uncalibrated="allow")
     assert (allowed.refusal(), allowed.alarm_detail()) == (None, None)
-    assert "allowed by service.uncalibrated" in allowed.in_force.words
+    assert "allowed by service.uncalibrated" in str(allowed.in_force.words)
 
 
 @pytest.mark.timeout(600)
@@ -173,10 +180,11 @@ async def inspected(site, store, calibration):
         deadline_s = time.monotonic() + 300
         while not (state := await beat(client)).ready:
             assert time.monotonic() < deadline_s, state.why_not_ready
-            if "No recipe is active" in str(state.why_not_ready):
+            why = state.why_not_ready
+            if why is not None and why.id == readiness.NO_RECIPE.id:
                 command = Command(command=CommandName.CHANGE_RECIPE, argument=1)
                 await client.request(command, CommandDone, deadline_s=40)
-            elif "never verified" in str(state.why_not_ready):
+            elif why is not None and why.id == messages.NEVER_VERIFIED.id:
                 asked = True
                 assert "never verified" in str((await glance(configuration)).check_due)
                 store.add_verification(verification(calibration, datetime.now(UTC)), {})

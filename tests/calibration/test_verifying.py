@@ -60,8 +60,8 @@ def test_each_ill_of_the_gel_is_named_and_shown(drawn_ball, draft, condition, il
     assert shown.std() > 5
     page = html.unescape(files["report.html"].decode())
     assert "FAIL" in page
-    assert health[ill].found in page
-    assert health[ill].remedy in page
+    assert str(health[ill].found) in page
+    assert str(health[ill].remedy) in page
 
 
 @pytest.mark.parametrize(

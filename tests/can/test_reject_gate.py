@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from plc_interface.line_output import NoOutput, RejectGate, make_output
+from station.messages import can as messages
 from station.settings.can import CanSettings
 from station.twin.faults import CommonFault
 
@@ -120,15 +121,15 @@ def test_a_shot_outlives_the_interface(gated):
     gated(scenario)
 
 
-@pytest.mark.parametrize(("off", "why"), [(-1501, "is past"), (1, "lies further ahead than the way")])
+@pytest.mark.parametrize(("off", "why"), [(-1501, messages.COUNT_PAST), (1, messages.COUNT_TOO_FAR)])
 def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, off, why):
     async def scenario(rig):
         rig.gate.publish(outcome(9, "FAIL", rig.gate.encoder_count() + off))
         await rig.until(lambda: rig.gate.faults)
         (fault,) = rig.gate.faults
         assert fault.part == "reject"
-        assert str(fault.what).startswith("shot 9: ")
-        assert why in str(fault.what)
+        assert fault.what.parameters["sequence"] == 9
+        assert why.id in fault.what.ids()
         await rig.until(lambda: not rig.gate._due)
         assert fired(rig) == []
         assert rig.gate.counters["can_shots_failed"] == 1

@@ -8,6 +8,14 @@ import pytest
 
 from plc_interface.can.errors import NotReadyError, RejectLostError
 from plc_interface.can.link import ORDER
+from station.messages import can as messages
+
+UP = messages.COMING_UP()
+
+
+def says(definition):
+    """Whether an error's message, or one that it encloses, is of this definition."""
+    return lambda error: definition.id in error.message.ids()
 
 
 def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_bus):
@@ -19,7 +27,7 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         shot = await rig.order(1, 400)
         assert gate.output == 0
         rig.io.renew_health(0)
-        with pytest.raises(RejectLostError, match="the station is not healthy"):
+        with pytest.raises(RejectLostError, check=says(messages.UNHEALTHY)):
             await shot
         await rig.until(lambda: gate.output == 0b101)
         assert not gate.operational
@@ -42,7 +50,8 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         await rig.until(lambda: gate.read(0x1001) == 0)
         assert gate.output == 0
         assert not gate.fired
-        assert [text.split(" before")[0] for text in rig.io.reject_faults] == ["shot 1: the gate was lost"]
+        (lost,) = rig.io.reject_faults
+        assert messages.GATE_LOST.id in lost.ids()
 
     on_bus(scenario, safe_output=0b101)
 
@@ -69,15 +78,14 @@ def test_a_loop_that_hangs_sends_no_heartbeat(on_bus):
 
 
 @pytest.mark.parametrize(
-    ("fault", "name"), [("gate_silent", "the reject gate"), ("encoder_silent", "the line encoder")]
+    ("fault", "name"), [("gate_silent", messages.GATE(node=16)), ("encoder_silent", messages.ENCODER(node=17))]
 )
 def test_a_lost_node_is_named_and_found_again(on_bus, fault, name):
     async def scenario(rig):
         await rig.ready()
         rig.faults.set(fault)
-        await rig.until(lambda: f"{name} (node " in rig.io.why_not_ready)
-        assert "has fallen silent" in rig.io.why_not_ready
-        with pytest.raises(NotReadyError, match="has fallen silent"):
+        await rig.until(lambda: rig.io.why_not_ready == messages.SILENT(node=name))
+        with pytest.raises(NotReadyError, check=says(messages.SILENT)):
             await rig.io.divert(1, 1, 5000)
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
@@ -110,10 +118,8 @@ def test_a_count_that_is_not_renewed_is_unknown(on_bus):
         encoder = rig.nodes.encoder
         encoder.write(0x1800, 5, 60_000)
         await rig.until(lambda: rig.io.encoder_count() is None)
-        assert "the encoder's count is not known" in rig.io.why_not_ready
-        await rig.until(
-            lambda: any("it lost the encoder's count (emergency 0x8250" in text for text in rig.io.bus_faults)
-        )
+        assert rig.io.why_not_ready == messages.NO_COUNT()
+        await rig.until(lambda: any(messages.COUNT_LOST.id in fault.ids() for fault in rig.io.bus_faults))
         encoder.write(0x1800, 5, 10)
         encoder._due_s = 0.0  # it would only look at its timer when that is over
         await rig.until(lambda: rig.io.ready and rig.io.bus_faults == ())
@@ -127,12 +133,15 @@ def test_an_emergency_is_named_and_goes_with_its_reset(on_bus):
         await rig.ready()
         rig.faults.set("overload")
         await rig.until(lambda: not rig.io.ready)
-        said = (
-            "the reject gate (node 16): the current at an output is too high (emergency 0x2310, error register 0x03); "
-            "look for what blocks the flap, and at its valve"
+        overload = messages.EMERGENCY(
+            node=messages.GATE(node=16),
+            what=messages.CURRENT_HIGH(),
+            code="0x2310",
+            register="0x03",
+            remedy=messages.DO_FLAP(),
         )
-        assert rig.io.why_not_ready == said
-        assert rig.io.bus_faults == (said,)
+        assert rig.io.why_not_ready == overload
+        assert rig.io.bus_faults == (overload,)
         assert rig.io.counters["emergencies"] == 1
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
@@ -148,7 +157,7 @@ def test_an_error_from_before_the_start_is_asked_for(on_bus):
         await rig.io.start()
         rig.io.renew_health(40)
         await rig.until(lambda: rig.io.counters.get("bring_ups"))
-        assert "0x2310, error register 0x03" in rig.io.why_not_ready
+        assert messages.CURRENT_HIGH.id in rig.io.why_not_ready.ids()
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
 
@@ -176,7 +185,7 @@ def test_a_bus_that_stays_off_is_said(on_bus):
                 wire.send(off)
                 await asyncio.sleep(0.01)
             assert not rig.io.ready
-            assert any("is bus-off after too many errors" in text for text in rig.io.bus_faults)
+            assert messages.BUS_OFF.id in {fault.id for fault in rig.io.bus_faults}
         finally:
             wire.shutdown()
         await rig.until(lambda: rig.io.ready)
@@ -193,7 +202,7 @@ def test_a_receiving_thread_that_ends_is_noticed(on_bus):
             raise SystemExit
 
         rig.io._link._bus.recv = end
-        await rig.until(lambda: "is deaf: the receiving thread has ended" in rig.io.why_not_ready)
+        await rig.until(lambda: (rig.io.why_not_ready or UP).id == messages.DEAF.id)
         await rig.until(lambda: rig.io.ready)
         assert rig.io.counters["bring_ups"] == 2
 
@@ -220,7 +229,7 @@ def test_a_bus_that_fails_to_receive_is_reopened_and_one_bad_frame_is_forgiven(o
             raise can.CanOperationError("the interface went down")
 
         bus.recv = always
-        await rig.until(lambda: "does not receive: the interface went down" in rig.io.why_not_ready)
+        await rig.until(lambda: (rig.io.why_not_ready or UP).id == messages.NOT_RECEIVING.id)
         await rig.until(lambda: rig.io.ready)
         assert rig.io.counters["receive_errors"] == 11
 
@@ -246,7 +255,7 @@ def test_the_gate_names_an_order_of_the_wrong_length(on_bus):
     async def scenario(rig):
         await rig.ready()
         rig.io._link.send(0x210, struct.pack("<H", 3))
-        await rig.until(lambda: any("emergency 0x8210" in text for text in rig.io.bus_faults))
+        await rig.until(lambda: any(messages.WRONG_LENGTH.id in fault.ids() for fault in rig.io.bus_faults))
         assert not rig.nodes.gate.fired
 
     on_bus(scenario)
@@ -260,7 +269,7 @@ def test_a_bug_is_logged_and_does_not_end_the_driver(on_bus, monkeypatch, caplog
         with monkeypatch.context() as patch:
             patch.setattr("plc_interface.can.bring_up.verify_identity", broken)
             rig.io.renew_health(40)
-            await rig.until(lambda: "the CAN driver failed" in rig.io.why_not_ready)
+            await rig.until(lambda: rig.io.why_not_ready == messages.DRIVER_FAILED())
         await rig.until(lambda: rig.io.ready)
         assert "ZeroDivisionError" in caplog.text
 
@@ -289,7 +298,7 @@ def test_stopping_in_the_middle_of_the_bring_up_leaves_nothing(on_bus):
             rig.io.renew_health(40)
             await asyncio.sleep(delay_s)
             await rig.io.stop()
-            assert rig.io.why_not_ready == "the CAN driver is not started"
+            assert rig.io.why_not_ready == messages.NOT_STARTED()
         await rig.io.stop()
 
     on_bus(scenario, start=False)

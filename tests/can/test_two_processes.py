@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from plc_interface.can.command import check_can
 from plc_interface.can.counts import further
 from plc_interface.can.line_io import LineIo
+from station.messages import can as messages
 from station.settings.configuration import load_configuration
 from station.twin.console import ask
 
@@ -65,7 +66,7 @@ def test_a_fruit_is_diverted_between_processes(configuration, console):
                 assert state["gate"] == "operational"
                 fault = {"do": "set", "device": "line", "fault": "gate_silent"}
                 await asyncio.to_thread(ask, "127.0.0.1", console, fault)
-                while "has fallen silent" not in io.why_not_ready:
+                while io.why_not_ready is None or io.why_not_ready.id != messages.SILENT.id:
                     await asyncio.sleep(0.01)
         finally:
             await io.stop()

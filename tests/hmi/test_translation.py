@@ -14,7 +14,7 @@ from hmi import charts
 from hmi.navigation import entries, modules, parts
 from hmi.recipe_form import groups
 from hmi.texts import texts
-from hmi.translation import FOLDER, NO_VALUE, Locale, catalogue, page_translations, preferred
+from hmi.translation import FOLDER, NO_VALUE, Locale, page_translations, preferred, translations
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError, FrameFault
@@ -22,7 +22,7 @@ from station.devices.gripper.errors import GripperError, GripperFaultError
 from station.inspection.alarm_table import ALARMS
 from station.inspection.alarms import AlarmState
 from station.inspection.states import STATES
-from station.messages import arm, camera, gripper, judge
+from station.messages import arm, camera, commands, gripper, judge, lots, outbox, recipes
 from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
@@ -31,28 +31,6 @@ from station.vocabulary import OutcomeName, PackmlState, Reason
 
 HMI = FOLDER.parent
 STATION = HMI.parent / "station"
-NOT_FOR_OPERATORS = {
-    "alarm {}: expected an id of docs/alarms.md, as {}",
-}
-"""Of addresses that a page never asks for."""
-FAULTS_FROM = ("service/outcome_monitor", "service/housekeeping")
-"""Where what is wrong, and so an alarm's detail or why fruit are refused, is still put into words."""
-NO_FAULTS: set[str] = set()
-"""Names, and what a setting is refused with."""
-COMPOSED = {
-    "sentence.recipe_moved": ("recipe {} has the PLC's number {} now, and no longer {}", "{}; choose a recipe again"),
-    "sentence.recipe_other": ("the PLC's number {} is {} now, and no longer {}", "{}; choose a recipe again"),
-    "sentence.recipe_gone": ("recipe {} with the PLC's number {} is no longer in force", "{}; choose a recipe again"),
-    "sentence.changed_since": (
-        "recipe {}: it was changed since {} was looked at, to {}",
-        "; look at it as it is now and",
-    ),
-    "sentence.verification_old": (
-        " h old, at most {} h are allowed",
-        "The last verification is {}: verify with the ball",
-    ),
-}
-"""What the station puts together of several."""
 NO_PAGES = {
     "/live",
     "/fruit/{sequence}/picture.svg",
@@ -81,85 +59,6 @@ def fields(text):
     return sorted(name for _, name, _, _ in Formatter().parse(text) if name)
 
 
-def test_every_language_has_the_stations_sentences():
-    english = catalogue("en")
-    for language in LANGUAGES[1:]:
-        other = {key: text for key, text in catalogue(language).items() if not key.startswith("station.")}
-        assert sorted(other) == sorted(english), language
-        for key, text in other.items():
-            assert text.strip(), key
-            assert fields(text) == fields(english[key]), key
-
-
-@pytest.mark.parametrize("language", LANGUAGES[1:])
-def test_what_the_station_says_in_english_is_said_in_every_language(language):
-    own = {key for key in catalogue(language) if key.startswith("station.")}
-    wanted = {f"station.{what}.{alarm}" for what in ("cause", "consequence", "action") for alarm in ALARMS}
-    assert own == wanted | {f"station.state.{state}" for state in STATES}
-
-
-def sentences(path):
-    """The sentences of a module that somebody is told, with {} for what they are filled with."""
-    tree, skipped = ast.parse(path.read_text(encoding="utf-8")), set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):  # a docstring
-            skipped.add(node.value)
-        if isinstance(node, ast.JoinedStr):
-            skipped |= {each for part in node.values for each in ast.walk(part)}
-        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith((".post", "log.info", "log.warning")):
-            skipped |= {each for value in node.args for each in ast.walk(value)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in skipped:
-            yield node.value
-        elif isinstance(node, ast.JoinedStr) and node not in skipped:
-            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
-
-
-def anonymous(text):
-    return "".join(literal + ("{}" if name else "") for literal, name, _, _ in Formatter().parse(text))
-
-
-def test_what_operators_are_refused_with_is_said_in_every_language():
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
-    for module in ("readiness", "plc_commands", "operator_commands", "alarm_commands"):
-        told = {text for text in sentences(STATION / "service" / f"{module}.py") if len(text.split()) > 4}
-        assert told - NOT_FOR_OPERATORS <= known, module
-
-
-@pytest.mark.parametrize("module", FAULTS_FROM)
-def test_every_fault_of_a_device_is_said_in_every_language(module):
-    known = {anonymous(text) for key, text in catalogue("en").items() if key.startswith("sentence.")}
-    told = {text for text in sentences(STATION / f"{module}.py") if len(text.split()) > 2 and text != text.upper()}
-    assert told - NO_FAULTS <= known
-
-
-def test_every_sentence_to_translate_is_one_that_the_station_says():
-    """A sentence that was changed there would go on in English, unnoticed."""
-    told = {text for path in STATION.rglob("*.py") if path.parent.name != "messages" for text in sentences(path)}
-    for key, text in catalogue("en").items():
-        pieces = COMPOSED.get(key, (anonymous(text),))
-        if key.startswith("sentence.") and not key.startswith("sentence.expect_"):
-            assert all(any(piece in each for each in told) for piece in pieces), key
-
-
-@pytest.mark.parametrize(
-    ("language", "english", "said"),
-    [
-        ("en", "an inspection is under way", "an inspection is under way"),
-        ("de", "an inspection is under way", "eine Prüfung läuft"),
-        ("es", "reset did not come to its end within 2.5 s: an inspection is under way",
-         "reset no terminó en 2,5 s: hay una inspección en curso"),
-        ("es", "Lot B-7 cannot begin: an inspection is under way. No recipe is active: choose one by its number (1).",
-         "El lote B-7 no puede empezar: hay una inspección en curso. No hay receta activa: elija una (1)."),
-        ("es", "No recipe is active: choose one by its number (1, 2).", "No hay receta activa: elija una (1, 2)."),
-        ("de", "the <arm> is away", '<span lang="en">the &lt;arm&gt; is away</span>'),
-        ("de", "", ""),
-    ],
-)  # fmt: skip
-def test_what_the_station_says_is_said_in_the_language_of_the_page(language, english, said):
-    assert Locale(language).sentence(english) == said
-
-
 @pytest.mark.parametrize(
     ("language", "said"),
     [
@@ -179,6 +78,32 @@ def test_words_that_are_not_the_stations_are_marked_as_english_on_other_pages():
     said = verbatim("The <area> of a record of before.")
     assert Locale("en").sentence(said) == "The <area> of a record of before."
     assert Locale("de").sentence(said) == '<span lang="en">The &lt;area&gt; of a record of before.</span>'
+
+
+@pytest.mark.parametrize(
+    ("language", "message", "said"),
+    [
+        ("en", commands.BUSY(), "an inspection is under way: wait for its end"),
+        ("de", commands.BUSY(), "eine Prüfung läuft: ihr Ende abwarten"),
+        ("es", commands.TOO_SLOW(command="reset", limit_s=2.5, activity=commands.BUSY_CALL_OFF()),
+         "reset no terminó en 2,5 s: hay una inspección en curso: cancélela primero"),
+        ("es", lots.REFUSED(lot="B-7", why=recipes.GONE(recipe="blueberry", number=2)),
+         "El lote B-7 no puede empezar: la receta blueberry con el número de PLC 2 ya no está en vigor; "  # noqa: ISC004
+         "elija de nuevo."),
+        ("de", outbox.WAITING(destination="mqtt", number=1, age_s=9.0), "mqtt: 1 Eintrag wartet, seit 9 s"),
+        ("de", outbox.WAITING(destination="mqtt", number=2, age_s=9.0), "mqtt: 2 Einträge warten, seit 9 s"),
+    ],
+)  # fmt: skip
+def test_a_message_is_said_in_the_language_of_the_page(language, message, said):
+    assert Locale(language).sentence(message) == said
+
+
+@pytest.mark.parametrize("language", LANGUAGES[1:])
+def test_every_alarm_and_state_is_said_in_every_language(language):
+    told = translations(language)
+    for row in ALARMS.values():
+        assert {row.cause.id, row.consequence.id, row.action.id} <= told.keys()
+    assert {facts.reason.id for facts in STATES.values()} - {"text.sentences"} <= told.keys()
 
 
 @pytest.mark.parametrize(

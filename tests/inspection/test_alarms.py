@@ -33,7 +33,7 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
     assert numbers == sorted(set(numbers))
     assert numbers[0] == 1
     for alarm, row in ALARMS.items():
-        for text in (row.cause, row.consequence, row.action):
+        for text in map(str, (row.cause, row.consequence, row.action)):
             assert text[0].isupper(), alarm
             assert text.endswith("."), alarm
         assert row.provoked_by
@@ -202,3 +202,9 @@ def test_what_was_remembered_by_another_version_is_left_out():
     ]
     assert Alarms.from_data(rows) == good
     assert Alarms.from_data("rubbish") == Alarms()
+
+
+def test_an_alarm_that_was_stored_with_a_sentence_is_read():
+    stored = {"id": "disk_low", "state": "acknowledged", "detail": "2 GB left", "since_s": 1.0, "raised": 1}
+    assert Alarms.from_data([stored]).get(LOW).detail == verbatim("2 GB left")
+    assert Alarms.from_data([{**stored, "detail": ""}]).get(LOW).detail is None

@@ -17,9 +17,9 @@ def test_every_state_is_told_and_reached(cycle_model):
     assert set(STATES) == set(State)
     assert {world.state for world in cycle_model} == set(State)
     for state, facts in STATES.items():
-        assert facts.sentence.endswith("."), state
+        assert str(facts.reason).endswith("."), state
         assert (facts.refusal is None) == (state in READY)
-        assert not facts.needs_person or "confirm" in facts.sentence
+        assert not facts.needs_person or "confirm" in str(facts.reason)
 
 
 def test_no_row_is_dead_and_none_is_there_twice(cycle_model):

@@ -14,7 +14,9 @@ from station.messages.message import (
     define_plural,
     definition,
     definitions,
+    message_in,
     message_of,
+    text_of,
     verbatim,
 )
 
@@ -69,6 +71,18 @@ def test_an_error_carries_its_message() -> None:
     assert message_of(StationError(said)) == said
     assert str(StationError(said)) == "it is 1.0 mm wide"
     assert message_of(OSError(2, "no such file")) == verbatim("[Errno 2] no such file")
+
+
+def test_a_text_field_holds_a_message_or_the_words_of_before() -> None:
+    said = WIDE(what="it", width_mm=1)
+    assert message_in(text_of(said)) == said
+    assert message_in("2 GB left") == verbatim("2 GB left")
+    assert (message_in(""), text_of(None)) == (None, "")
+
+
+def test_a_message_gives_its_ids_and_those_that_it_encloses() -> None:
+    said = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1)])
+    assert list(said.ids()) == ["test.enclosing", "test.wide", "test.several"]
 
 
 def test_every_definition_can_be_written() -> None:

@@ -5,6 +5,7 @@ import pytest
 from plc_interface.handshake.journal import Journal
 from plc_interface.journal_file import JournalFile
 from station.errors import StationError
+from station.messages import line as messages
 
 
 def test_what_was_written_is_read(tmp_path):
@@ -38,10 +39,11 @@ def test_a_disk_that_refuses_is_said_and_the_line_goes_on(tmp_path):
     file = JournalFile(tmp_path / "plc")
     (tmp_path / "plc" / "journal.json").mkdir()
     file.write(Journal(), durable=False)
-    assert "cannot be written" in file.trouble
+    assert file.trouble is not None
+    assert file.trouble.id == messages.JOURNAL_NOT_WRITTEN.id
     (tmp_path / "plc" / "journal.json").rmdir()
     file.write(Journal(), durable=False)
-    assert file.trouble == ""
+    assert file.trouble is None
     file.close()
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from plc_interface.handshake.view import STATION_LOST_CODE, lot_checksum
 from station.channel.line import CommandDone, Reason, Refusal
+from station.messages import can, line
 from station.messages.message import verbatim
 
 
@@ -139,7 +140,7 @@ def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventual
             await eventually(lambda: station.lines[-1].faults)
             (fault,) = station.lines[-1].faults
             assert fault.part == "can"
-            assert str(fault.what).startswith("the CAN interface socketcan nocan7 cannot be opened")
+            assert fault.what.id == can.NOT_OPENED.id
             seen = await plc.trigger(1)
             assert (seen["last_refusal"], "trigger_ready" in seen["status"]) == ("not_ready", False)
             assert station.begun == {}
@@ -193,13 +194,11 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually):
             await plc.wait("lot_latched")
             await plc.wait(without="lot_latched")
             await eventually(lambda: len(station.lines[-1].faults) == 4)
-            assert {
-                str(fault.what).split(":")[0].split(" did not take its ")[1] for fault in station.lines[-1].faults
-            } == {
-                "trigger bit back",
-                "acknowledge bit back",
-                "execute bit back",
-                "latch bit back",
+            assert {fault.what.id for fault in station.lines[-1].faults} == {
+                line.TRIGGER_NOT_RESET.id,
+                line.ACKNOWLEDGE_NOT_RESET.id,
+                line.EXECUTE_NOT_RESET.id,
+                line.LATCH_NOT_RESET.id,
             }
             assert (await plc.counters())["count_communication"] == 4
 

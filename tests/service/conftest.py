@@ -11,7 +11,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -27,6 +27,7 @@ from station.channel.line import (
     CommandDone,
     CommandName,
     Line,
+    LineFault,
     Noted,
     Open,
     Outcome,
@@ -35,6 +36,7 @@ from station.channel.line import (
     StationState,
 )
 from station.inspection.states import State
+from station.messages.message import verbatim
 from station.service.station import Station
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
@@ -73,7 +75,8 @@ class LineClient:
     client: ChannelClient
     ids: Any = field(default_factory=lambda: itertools.count(1))
 
-    async def state(self, *faults: str) -> StationState:
+    async def state(self, *parts: Literal["can", "reject"]) -> StationState:
+        faults = tuple(LineFault(part=part, what=verbatim("it is silent")) for part in parts)
         return await self.client.request(LINE.model_copy(update={"faults": faults}), StationState, deadline_s=20)
 
     async def order(self, command: CommandName, argument: int = 0) -> CommandDone:

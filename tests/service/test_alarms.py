@@ -11,6 +11,7 @@ from station.devices.gripper.errors import GripperFaultError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED
 from station.inspection.states import State
+from station.messages import commands
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
@@ -160,7 +161,7 @@ def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
             await until(lambda: AlarmId.EMERGENCY_STOP in active(cell))
             refused = await cell.line.order(CommandName.RESET)
             assert not refused.done
-            assert "release the button" in str(refused.why)
+            assert refused.why.id == commands.CONFIRM_STOP.id
             cell.twin.boards["gripper"].clear()
             await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
             assert AlarmId.EMERGENCY_STOP in active(cell)  # latched

@@ -3,6 +3,7 @@
 import asyncio
 
 from station.channel.line import Begin, BeginReply, CommandName
+from station.messages import lots, recipes
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.store import RecipeStore
@@ -50,8 +51,9 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
             await asyncio.to_thread(cell.station.recipes.refresh)
             await cell.line.ready()
             assert (await begin(cell, 901, "LOT 3")).refusal is Refusal.NOT_READY
-            why = str((await cell.line.state()).why_not_ready)
-            assert "Lot LOT 3 cannot begin: recipe blueberry with the PLC's number 2 is no longer in force" in why
+            why = (await cell.line.state()).why_not_ready
+            gone = recipes.GONE(recipe="blueberry", number=2)
+            assert why.parameters["sentences"][0] == lots.REFUSED(lot="LOT 3", why=gone)
             assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
             return records_folder(home)
 

@@ -10,6 +10,7 @@ import pytest
 
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName, PackmlState
+from station.messages import commands
 from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
 from station.twin.console import ask
@@ -102,7 +103,7 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
             assert (state.ready, state.packml_state, state.error_code) == (False, PackmlState.ABORTED, 2)
             refused = await line.order(CommandName.RESET)
             assert not refused.done
-            assert "station devices recover" in str(refused.why)
+            assert refused.why.id == commands.CONFIRM_STOP.id
             assert await asyncio.to_thread(cell.recover, "protective-stop") == 0
             assert not (await line.state()).ready, "only a reset lets the station go on"
             done = await line.order(CommandName.RESET)

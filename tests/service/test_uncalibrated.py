@@ -8,6 +8,7 @@ from plc_interface.register_map import BY_NAME
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.states import State
+from station.messages import calibration
 from station.settings.configuration import Configuration
 
 NUMBER = ALARMS[AlarmId.CALIBRATION_OLD].number
@@ -40,8 +41,7 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             assert BY_NAME["last_refusal"].codes[shown["last_refusal"]].name == "not_ready"
             assert shown["accepted_trigger_id"] != 7
             state = await cell.line.state()
-            assert "calibrate it with the ball on the page Maintenance" in str(state.why_not_ready)
-            assert "`station calibrate`" in str(state.why_not_ready)
+            assert state.why_not_ready == calibration.REQUIRED()
             assert sum((await cell.station.service.registry.records.totals()).values()) == 0, (
                 "nothing was begun or lost"
             )

@@ -1,0 +1,79 @@
+"""Messages of the running station: what its checks found, and what ended an inspection."""
+
+from station.messages.message import Name, Nested, Number, define
+
+INTERFACE_SILENT = define(
+    "operation.interface_silent", "the PLC interface has sent nothing for {age_s} s", age_s=Number(0)
+)
+HEARTBEAT_STILL = define("operation.heartbeat_still", "the PLC's heartbeat does not change")
+PAGES_SILENT = define("operation.pages_silent", "the pages' process has sent no request for {age_s} s", age_s=Number(0))
+DISK_LOW = define(
+    "operation.disk_low",
+    "{free_mb} MB are free, {reserve_mb} MB are the reserve",
+    free_mb=Number(0),
+    reserve_mb=Number(0),
+)
+NEVER_CHOSEN = define("operation.never_chosen", "no recipe was ever chosen, or it is gone")
+PROCESS_GIVEN_UP = define(
+    "operation.process_given_up",
+    "the process {process} ended again and again and is not started any more",
+    process=Name(),
+)
+PROCESS_RESTARTED = define(
+    "operation.process_restarted",
+    "the process {process} was started again {times} times within {within_s} s",
+    process=Name(),
+    times=Number(),
+    within_s=Number(),
+)
+CLOCK_FORWARD = define("operation.clock_forward", "the machine's clock was set forward by {step_s} s", step_s=Number(0))
+CLOCK_BACK = define("operation.clock_back", "the machine's clock was set back by {step_s} s", step_s=Number(0))
+MANY_UNJUDGED = define("operation.many_unjudged", "the last {number} fruit could not be judged", number=Number())
+MANY_FAILED = define(
+    "operation.many_failed", "{failed} of the last {number} fruit failed", failed=Number(), number=Number()
+)
+LIGHT_DRIFTS = define(
+    "operation.light_drifts",
+    "the light differs from the golden reference's by {drift_levels} grey levels; {limit_levels} are too many",
+    drift_levels=Number(0),
+    limit_levels=Number(),
+)
+REFERENCE_OLD = define(
+    "operation.reference_old",
+    "the reference was {age_s} s old at the last step, at most {limit_s} s are allowed",
+    age_s=Number(0),
+    limit_s=Number(),
+)
+JAWS_NOT_OPEN = define(
+    "operation.jaws_not_open",
+    "the jaws are at {width_mm} mm and not open: something may touch the gel; look at them",
+    width_mm=Number(1),
+)
+INSPECTION_LATE = define(
+    "operation.inspection_late",
+    "the inspection took {took_s} s, at most {limit_s} s are allowed",
+    took_s=Number(1),
+    limit_s=Number(1),
+)
+PHASE_LATE = define(
+    "operation.phase_late",
+    "this took {took_s} s, at most {limit_s} s are allowed: {activity}",
+    took_s=Number(1),
+    limit_s=Number(1),
+    activity=Nested(),
+)
+NOT_STORED_IN_TIME = define("operation.not_stored_in_time", "the outcome could not be stored in time")
+ANOTHER_OUTCOME = define("operation.another_outcome", "the PLC got another outcome for this fruit meanwhile")
+STATION_ENDS = define("operation.station_ends", "the station was ended")
+STOPPED_AT_PANEL = define("operation.stopped_at_panel", "a person stopped the station at the panel")
+CALLED_OFF = define("operation.called_off", "the PLC or a person called the inspection off")
+RESET = define("operation.reset", "a person has reset the station")
+INTERNAL_FAULT = define("operation.internal_fault", "a fault of the software, see the log: {words}", words=Name())
+INSPECTION_TOO_LONG = define(
+    "operation.inspection_too_long",
+    "recipe {recipe}: an inspection may take {needed_s} s here, expected at most {limit_s} s; use fewer steps, a "
+    "shorter settle time or fewer frames",
+    recipe=Name(),
+    needed_s=Number(0),
+    limit_s=Number(),
+)

@@ -1,0 +1,57 @@
+"""No program compares a sentence: what branches does so on a type, a code or a message's id."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = [
+    path
+    for room in ("station", "plc_interface", "hmi")
+    for path in sorted((ROOT / room).rglob("*.py"))
+    if ROOT / "station" / "messages" not in path.parents
+]
+SAID = {"cause", "detail", "error", "explanation", "fault", "message", "reason", "remedy", "sentence", "trouble", "why"}
+"""Names of what the station says."""
+TEXT_METHODS = {
+    "endswith", "find", "index", "partition", "removeprefix", "removesuffix", "rpartition", "split", "startswith",
+}  # fmt: skip
+FOREIGN = {
+    "station/devices/arm/dashboard.py",  # the controller's own words
+    "station/devices/arm/diagnosis.py",
+}
+
+
+def says(node):
+    """Whether an expression is a sentence of ours: a name of what is said, or its text."""
+    if isinstance(node, ast.Call):
+        if isinstance(node.func, ast.Name) and node.func.id == "str" and node.args:
+            return says(node.args[0])
+        return isinstance(node.func, ast.Attribute) and says(node.func.value)
+    name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+    return name in SAID
+
+
+def words(node):
+    """Whether an expression is a literal of several words."""
+    return isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value.split()) > 1
+
+
+def compared(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            pattern = isinstance(node.func.value, ast.Name) and node.func.value.id == "re" and any(map(says, node.args))
+            of_bytes = any(isinstance(each, ast.Constant) and isinstance(each.value, bytes) for each in node.args)
+            if pattern or (node.func.attr in TEXT_METHODS and says(node.func.value) and not of_bytes):
+                yield ast.unparse(node)
+        if isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            if any(map(words, sides)) and any(map(says, sides)):
+                yield ast.unparse(node)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_sentence_is_compared(path):
+    found = list(compared(ast.parse(path.read_text(encoding="utf-8"))))
+    assert str(path.relative_to(ROOT)) in FOREIGN or found == []
