@@ -125,6 +125,8 @@ def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tu
         if each.area_mm2 > limit
     }
     changes[f"damage.area[{last}].area_mm2"] = limit
+    if recipe.damage.decided_by != "every_limit":
+        changes["damage.decided_by"] = "every_limit"  # what is proposed decides on every fruit
     changes[f"damage.area[{last}].closing_mm"] = best.closing_mm
     if recipe.damage.size is not None:
         changes["damage.size.exponent"] = best.exponent

@@ -121,7 +121,7 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         press: all measured points, in any order.
         recipe: limits and expectations.
     """
-    case = _Case(press, recipe)
+    case = _case(press, recipe)
     stopped = case.stopped
     findings = [*case.findings, *([] if case.nothing else _reach(case, stopped))]
     proofs = [finding for finding in findings if finding.proves]
@@ -132,8 +132,9 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
         outcome, findings = "NO_RESULT", case.void + findings
     else:
         outcome = "PASS"
-    recipe, evidence = case.limits.recipe, case.evidence
-    areas = tuple(_result(evidence, recipe, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
+    every_limit, evidence = sized_limits(press, recipe).recipe, case.evidence
+    areas = tuple(_result(evidence, every_limit, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
+    recipe = case.limits.recipe
     last_mm = recipe.damage.area[-1].closing_mm
     if recipe.steps.stop_when_decided:
         partial = evidence.area_at(last_mm) is None
@@ -164,7 +165,19 @@ def early_stop(press: Press, recipe: Recipe) -> Stop | None:
     Returns:
         Why; None where the next step may be made.
     """
-    return _Case(press, recipe).stopped
+    return _case(press, recipe).stopped
+
+
+def _case(press: Press, recipe: Recipe) -> "_Case":
+    """The press beside the limits that decide on it: all of them, or the first by itself whose area is trusted."""
+    if recipe.damage.decided_by == "every_limit":
+        return _Case(press, recipe)
+    cases = [_Case(press, _with_limit(recipe, limit)) for limit in recipe.damage.area]
+    return next((case for case in cases if case.decides), cases[-1])
+
+
+def _with_limit(recipe: Recipe, limit: AreaThreshold) -> Recipe:
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"area": (limit,)})})
 
 
 class _Case:
@@ -184,6 +197,14 @@ class _Case:
             return []
         damage = [] if self.limits.problem is not None else _damage(self.evidence, self.limits)
         return [*damage, *_distrust(self.evidence, self.limits.recipe)]
+
+    @property
+    def decides(self) -> bool:
+        """Whether damage is proven, or the last limit was reached and nothing is in doubt but how near it is."""
+        if self.void or any(finding.proves for finding in self.findings):
+            return True
+        reached = self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
+        return reached and all(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
 
     @cached_property
     def stopped(self) -> Stop | None:

@@ -83,14 +83,14 @@ class Inspection:
 
     @property
     def deciding_width_mm(self) -> float:
-        """The width of the first step that reaches the last damage threshold."""
+        """The width of the first step that reaches the damage threshold that decides."""
         return self._width_after(self.steps_to_decide)
 
     @property
     def steps_to_decide(self) -> int:
-        """How many steps from the first image reach the last damage threshold."""
+        """How many steps from the first image reach the damage threshold that decides."""
         recipe = self.active.recipe
-        return min(recipe.steps.number, ceil((recipe.damage.area[-1].closing_mm - AT_MM) / recipe.steps.step_mm))
+        return min(recipe.steps.number, ceil((recipe.damage.deciding_closing_mm - AT_MM) / recipe.steps.step_mm))
 
     def _width_after(self, steps: int) -> float:
         return self.steps[0].move.width_mm - steps * self.active.recipe.steps.step_mm

@@ -261,7 +261,7 @@ class Inspector:
         return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
 
     async def _close_on(self, now: Inspection) -> None:
-        """Close without a stop to where the last damage threshold is reached, measuring each frame on the way.
+        """Close without a stop to where the deciding damage threshold is reached, measuring each frame on the way.
 
         The fingers stop sooner where an area ends the steps.
         """
@@ -280,11 +280,11 @@ class Inspector:
 
     @staticmethod
     def _may_decide(now: Inspection) -> bool:
-        """Whether the last captured step reaches the last damage threshold of a recipe that stops when decided."""
+        """Whether the last captured step may decide, by a recipe that stops when decided."""
         recipe, onset_mm = now.active.recipe, now.onset_mm
         if not recipe.steps.stop_when_decided or onset_mm is None:
             return False
-        return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.area[-1].closing_mm - AT_MM
+        return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.deciding_closing_mm - AT_MM
 
     async def settle(self, now: Inspection) -> Event:
         """Let fruit and gel come to rest: every step waits as long, because fruit creeps.

@@ -232,6 +232,15 @@ class DamageThresholds(Settings):
         min_length=1,
         max_length=20,
     )
+    # Left out of a recipe's values where every limit decides, as in recipes written before it.
+    decided_by: Annotated[Literal["every_limit", "first_trusted"], Field(exclude_if=lambda by: by == "every_limit")] = (
+        setting(
+            default="every_limit",
+            title="Decided by",
+            description="`every_limit` asks each area threshold. `first_trusted` takes the first whose area is "
+            "trusted; later ones are for fruit whose area is not.",
+        )
+    )
     growth_mm2_per_mm: float = setting(
         title="Growth threshold",
         description="A larger growth of the area per millimetre of closing fails the fruit. With `damage.size`: of a "
@@ -250,6 +259,11 @@ class DamageThresholds(Settings):
     uncertainty: Annotated[AreaUncertainty, Field(exclude_if=lambda given: given == AREA_UNCERTAINTY)] = setting(
         AREA_UNCERTAINTY, title="Uncertainty", description="What the guard band of the thresholds is made of."
     )
+
+    @property
+    def deciding_closing_mm(self) -> float:
+        """The closing of the limit that decides on a fruit whose areas are trusted, mm."""
+        return self.area[0 if self.decided_by == "first_trusted" else -1].closing_mm
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -519,3 +519,51 @@ def test_a_doubtful_onset_does_not_press_a_fruit_on_to_the_early_stop():
     # An excused step may hide where the onset was; one more step tells, and a third tells nothing new.
     hides = {"confidence": 0.1, "area_mm2": 60.0}
     assert early_stop(late(5, **hides), DECIDING) is not None
+
+
+def first_trusted(growth: float, doubtful_mm: tuple[float, ...] = (), flag: Flag = Flag.LOW_CONFIDENCE) -> Press:
+    """A strawberry pressed by limits of 50 mm² at 2 mm and 100 mm² at 4 mm, of which the first trusted decides."""
+    press = Press(35.0, 0.4, ())
+    for closing in range(7):
+        flags = (flag,) if closing in doubtful_mm else ()
+        press = replace(press, points=(*press.points, point(float(closing), growth * closing, *flags)))
+        if early_stop(press, FIRST_TRUSTED):
+            return press
+    return press
+
+
+_AREAS = tuple(
+    STRAWBERRY.damage.area[0].model_copy(update={"closing_mm": closing_mm, "area_mm2": area_mm2})
+    for closing_mm, area_mm2 in ((2.0, 50.0), (4.0, 100.0))
+)
+FIRST_TRUSTED = DECIDING.model_copy(
+    update={"damage": DECIDING.damage.model_copy(update={"area": _AREAS, "decided_by": "first_trusted"})}
+)
+
+
+@pytest.mark.parametrize(
+    ("growth", "doubtful_mm", "flag", "outcome", "last_mm"),
+    [
+        (15, (), Flag.LOW_CONFIDENCE, "PASS", 2),
+        (33, (), Flag.LOW_CONFIDENCE, "FAIL", 2),
+        (24.5, (), Flag.LOW_CONFIDENCE, "NO_RESULT", 2),
+        (15, (2,), Flag.LOW_CONFIDENCE, "PASS", 4),
+        (15, (2,), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
+        (33, (2,), Flag.CUT_BY_BORDER, "FAIL", 2),
+        (15, (2, 4), Flag.LOW_CONFIDENCE, "NO_RESULT", 4),
+        (15, (4,), Flag.CUT_BY_BORDER, "PASS", 2),
+    ],
+)
+def test_the_first_limit_whose_area_is_trusted_decides(growth, doubtful_mm, flag, outcome, last_mm):
+    press = first_trusted(growth, doubtful_mm, flag)
+    verdict = judge(press, FIRST_TRUSTED)
+    assert (verdict.outcome, press.points[-1].closing_mm) == (outcome, last_mm), verdict.findings
+
+
+def test_a_recipe_says_when_not_every_limit_decides():
+    assert "decided_by" not in DECIDING.model_dump(mode="json")["damage"], "older recipes keep their content hash"
+    assert (DECIDING.damage.deciding_closing_mm, FIRST_TRUSTED.damage.deciding_closing_mm) == (4, 2)
+    both = FIRST_TRUSTED.model_copy(
+        update={"damage": FIRST_TRUSTED.damage.model_copy(update={"decided_by": "every_limit"})}
+    )
+    assert judge(first_trusted(15), both).outcome == "NO_RESULT", "the second limit is not reached"
