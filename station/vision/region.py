@@ -146,7 +146,8 @@ def find_region(
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge. The more
             # achenes or drupelets outshine the body, the further their part of the windowed level reaches beyond it.
             share = p.share_even + p.share_coherent * coherence + p.share_field * float(mask.mean())
-            share = min(share + p.share_prominent * _prominence(moved.curvature, level, mask), p.share_most)
+            prominence = max(_prominence(moved.curvature, level, mask), p.least_prominence)
+            share = float(np.clip(share + p.share_prominent * prominence, p.share_least, p.share_most))
         gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
         # A flat centre has not moved; it lies within what has, and costs nothing.
         np.maximum(gain, 0, out=gain, where=inner > 0)
