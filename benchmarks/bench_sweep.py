@@ -1,9 +1,9 @@
 """Measuring while the jaws close, beside the stepped press, on fruit of the twin with its creep.
 
-Run with `./run bench sweep [--count N]`; writes the table of `docs/decisions/0060-measured-at-rest.md`. The same fruit,
-unit, noise and onset: once stepped as by the recipe, once closed at the gripper's slowest speed with one frame every
-1/30 s, each with the width at its capture, known to the jitter of a frame's time. Compared are the areas at the damage
-limits' closings.
+Run with `./run bench sweep [--count N]`; writes the table of `docs/decisions/0060-stepped-measurement-at-rest.md`.
+The same fruit, unit, noise and onset: once stepped as by the recipe, once closed at the gripper's slowest speed with
+one frame every 1/30 s, each with the width at its capture, known to the jitter of a frame's time. Compared are the
+areas at the damage limits' closings.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from station.studies.workers import on_this_machine
 from station.vision.contact import Contact
 from station.vision.press import PressTracker
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "decisions" / "0060-measured-at-rest.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "decisions" / "0060-stepped-measurement-at-rest.md"
 BEGIN, END = "<!-- measured -->\n", "<!-- /measured -->"
 GROUPS = ("sound", "severe")
 FRAME_S = 1 / 30

@@ -1,6 +1,6 @@
 """An open CAN bus with canopen's network on it, and the receiving thread.
 
-python-can's own Notifier is not used: its thread ends at the first exception without a report (decision 0014).
+python-can's own Notifier is not used: its thread ends at the first exception without a report (decision 14).
 """
 
 import errno

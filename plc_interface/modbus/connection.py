@@ -20,7 +20,7 @@ _BUFFER_BYTES = 4 * LONGEST_FRAME
 class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     """Answers one client's requests where their bytes arrive, without a task or an await between.
 
-    pymodbus' own path from bytes to response is replaced, see decision 0012.
+    pymodbus' own path from bytes to response is replaced, see decision 12.
     """
 
     def __init__(self, listener: ModbusBaseServer, manager: "ConnectionManager") -> None:

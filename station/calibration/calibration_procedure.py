@@ -1,6 +1,6 @@
 """Calibration procedure of one unit: the paper's ball, 46 to 33 mm, then at further places.
 
-Limits of the method (decision 0022): the area over closing depends on how gel, ball and sponge share the closing, so
+Limits of the method (decision 22): the area over closing depends on how gel, ball and sponge share the closing, so
 it gives no scale. A scale needs a known length on the gel: the distance from one place of the ball to another.
 """
 

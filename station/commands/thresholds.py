@@ -117,17 +117,23 @@ def _marked(
 
 
 def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
-    """Return the recipe's text with the limit in place of its last one; earlier limits are lowered where necessary."""
-    last, limit = len(recipe.damage.area) - 1, round(best.limit_mm2, 1)
+    """Return the recipe's text with the limit in the place of the one at its closing, or of the last.
+
+    Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing.
+    """
+    limits, limit = recipe.damage.area, round(best.limit_mm2, 1)
+    same = [place for place, each in enumerate(limits) if each.closing_mm == best.closing_mm]
+    fits_last = len(limits) == 1 or best.closing_mm > limits[-2].closing_mm
+    chosen = same[0] if same else len(limits) - 1 if fits_last else 0
     changes: dict[str, Any] = {
         f"damage.area[{place}].area_mm2": limit
-        for place, each in enumerate(recipe.damage.area)
-        if each.area_mm2 > limit
+        for place, each in enumerate(limits)
+        if (place < chosen and each.area_mm2 > limit) or (place > chosen and each.area_mm2 < limit)
     }
-    changes[f"damage.area[{last}].area_mm2"] = limit
-    if recipe.damage.decided_by != "every_limit":
+    changes[f"damage.area[{chosen}].area_mm2"] = limit
+    changes[f"damage.area[{chosen}].closing_mm"] = best.closing_mm
+    if chosen and recipe.damage.decided_by != "every_limit":
         changes["damage.decided_by"] = "every_limit"  # what is proposed decides on every fruit
-    changes[f"damage.area[{last}].closing_mm"] = best.closing_mm
     if recipe.damage.size is not None:
         changes["damage.size.exponent"] = best.exponent
     changes["early_stop.area_mm2"] = max(recipe.early_stop.area_mm2, limit)

@@ -23,7 +23,7 @@ def budget(recipe: Recipe, *, sized: bool = True) -> Budget:
     assert recipe.damage.size is not None
     size = FruitSize(recipe.damage.size.reference_mm if sized else None)
     press = Press(None, count_mm, (), size=size, resolution_mm=count_mm, scale_uncertainty=SCALE)
-    return budget_at(recipe.damage.area[-1].closing_mm, press, sized_limits(press, recipe))
+    return budget_at(recipe.damage.deciding_closing_mm, press, sized_limits(press, recipe))
 
 
 def table() -> str:
