@@ -1,4 +1,4 @@
-"""Message catalogues' upkeep: extracts the texts from the source, updates and checks each language's `.po` files.
+"""Message catalogues: extracts the texts from the source, updates and checks each language's `.po` files.
 
 `./run messages` calls it. Extraction, reading and writing are Babel's.
 """

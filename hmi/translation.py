@@ -150,7 +150,7 @@ class Locale:
         return english if known is None else known[0]
 
     def sentence(self, said: Message | str | None) -> str:
-        """Write a message in this language. Words that are not the station's are marked as English on other pages.
+        """Write a message in this language. A text that is not the station's is marked as English on other pages.
 
         Args:
             said: a message, or words of a library, an operating system or a record of before there were messages;

@@ -18,7 +18,7 @@ class Priority(StrEnum):
 
 
 PRIORITIES: dict[Priority, str] = {
-    Priority.CRITICAL: "A safety stop stands.",
+    Priority.CRITICAL: "A safety stop is active.",
     Priority.HIGH: "Bad fruit may be among the good, or the station cannot come back by itself.",
     Priority.MEDIUM: "Inspections are not made, or good fruit is lost.",
     Priority.LOW: "It can wait for the next pause.",

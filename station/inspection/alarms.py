@@ -103,7 +103,7 @@ class Alarm:
     since_s: float = 0.0
     """When it became active."""
     raised: int = 0
-    """How often since it was forgotten; a chattering alarm counts up and is told once."""
+    """How often since it was forgotten; a chattering alarm counts up and is published once."""
     raises_s: tuple[float, ...] = ()
     """When, the last three times."""
     quiet_since_s: float | None = None
@@ -112,7 +112,7 @@ class Alarm:
     shelved_by: str = ""
 
     def chatters(self, now_s: float) -> bool:
-        """Whether it comes and goes too often to be told each time."""
+        """Whether it comes and goes too often to be published each time."""
         return len(self.raises_s) == CHATTER_RAISES and now_s - self.raises_s[0] < CHATTER_S
 
     def forgotten(self, now_s: float) -> bool:
@@ -147,7 +147,7 @@ class Alarms:
         return self._with(_moved(told, E.RAISED))
 
     def returned(self, alarm: AlarmId, now_s: float) -> Self:
-        """Its cause is gone; a chattering one stays until it was quiet for a while (`tick`)."""
+        """Its cause is gone; a chattering one stays until it has not come for a while (`tick`)."""
         was = self.get(alarm)
         if was.state in CAUSED and was.chatters(now_s):
             return self._with(replace(was, quiet_since_s=was.quiet_since_s or now_s))
@@ -188,7 +188,7 @@ class Alarms:
         return self._after(alarm, E.UNSHELVED)
 
     def tick(self, now_s: float) -> Self:
-        """End what time ends: shelving, and a chattering alarm that was quiet. Call it about once a second."""
+        """End what time ends: shelving, and an alarm that no longer chatters. Call it about once a second."""
         ticked = (_ticked(alarm, now_s) for alarm in self.known.values())
         return type(self)({alarm.id: alarm for alarm in ticked if not alarm.forgotten(now_s)})
 

@@ -103,9 +103,10 @@ def alarms_document() -> str:
         "## Life of an alarm\n",
         (
             f"Shelving ends by itself, after {LONGEST_SHELVED_S / 3600:g} h at the latest. An alarm that is raised "
-            f"{CHATTER_RAISES} times within {CHATTER_S:g} s is told once, counted, and stays until it was quiet for "
-            f"{CHATTER_S:g} s. All of it is remembered over a restart. `station alarms list` shows what stands, "
-            "`station alarms acknowledge`, `shelve` and `unshelve` change it; the audit trail tells who did so.\n"
+            f"{CHATTER_RAISES} times within {CHATTER_S:g} s is published once, counted, and stays until it has not "
+            f"come for {CHATTER_S:g} s. All of it is stored over a restart. `station alarms list` shows alarms that "
+            "are not in their normal state; `station alarms acknowledge`, `shelve` and `unshelve` change them, and the "
+            "audit trail has who did so.\n"
         ),
         _life(LIFE),
         "Latched alarms are never shelved, and end only when a person has reset them after their cause is gone:\n",

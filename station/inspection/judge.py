@@ -377,7 +377,7 @@ def _least_sure(points: Sequence[Measured]) -> Measured:
 
 
 def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
-    """Whether the curve begins at the onset: one that was seen too soon makes every area look smaller than it is."""
+    """Whether the curve begins at the onset: one that was seen too soon makes every area seem smaller than it is."""
     begins_mm = evidence.begins_at_mm
     allowed_mm = _LATE_START * recipe.damage.area[0].closing_mm
     if evidence.needed and (begins_mm is None or begins_mm > allowed_mm):

@@ -1,4 +1,4 @@
-"""Active calibration of the sensor: scale, contact gate, golden reference, age, and due verification."""
+"""Active calibration of the sensor: scale, detection threshold, golden reference, age, and due verification."""
 
 import time
 from collections.abc import Callable
@@ -76,7 +76,7 @@ class ActiveCalibration:
 
     @property
     def gate_factor(self) -> float:
-        """Return the factor that raises the recipe's contact gate on this unit."""
+        """Return the factor that raises the recipe's detection threshold on this unit."""
         return 1.0 if self.calibration is None else self.calibration.noise.gate_factor
 
     def golden(self) -> Path | None:

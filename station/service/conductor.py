@@ -140,7 +140,7 @@ class Conductor:
         return time.monotonic() - self.entered_s
 
     def post(self, event: Event, why: Message | None = None) -> None:
-        """Tell that something happened, from outside of the actions.
+        """Report an event from outside of the actions.
 
         Args:
             event: what.

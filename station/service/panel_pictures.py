@@ -83,7 +83,7 @@ class PanelPictures:
 
 
 def _gate_factor(record: FullRecord) -> float:
-    """Return the factor by which the sensor's calibration raised the gate in an inspection; 1 for none."""
+    """Return the factor by which the sensor's calibration raised the detection threshold; 1 for none."""
     factor = record.judged.measures.get("gate_factor") if record.judged is not None else None
     return float(factor or 1.0)
 

@@ -5,7 +5,7 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Something that tells monotonic time."""
+    """Source of monotonic time."""
 
     def now_s(self) -> float:
         """The time in seconds from an arbitrary start; it never goes back."""

@@ -131,7 +131,7 @@ class Fruit:
         return self.damage if self.bruised else NO_DAMAGE
 
     def gap_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-        """How far the smoothed surface stands behind the foremost point.
+        """How far the smoothed surface is behind the foremost point.
 
         Args:
             x_mm: across the fruit from the foremost point, any shape.

@@ -98,7 +98,7 @@ class Surface:
     radius_mm: float
 
     def gap_mm(self, relative_squared: FloatArray) -> FloatArray:
-        """How far an ellipsoid stands behind its foremost point.
+        """How far an ellipsoid is behind its foremost point.
 
         Args:
             relative_squared: (x/a)² + (y/b)² with the half axes across, any shape; beyond the ellipsoid's
@@ -120,7 +120,7 @@ class Surface:
 
 
 def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) -> FloatArray:
-    """The gel's dent under a rigid body whose surface stands `gap_mm` behind its foremost point.
+    """The gel's dent under a rigid body whose surface is `gap_mm` behind its foremost point.
 
     The contact's edge lies where the gap is half the approach: for a paraboloid that is Hertz's a² = R·δ.
     Inside the gel takes the body's shape; outside it follows Hertz's skirt over the distance from the edge.

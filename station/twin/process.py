@@ -58,7 +58,7 @@ class _Server(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TwinOptions:
-    """What the twin is, and where it listens: where the station's settings look for the devices."""
+    """What the twin is, and where it listens: where the station's settings have the devices."""
 
     fruit: Kind = Kind.STRAWBERRY
     seed: int = 1
@@ -200,7 +200,7 @@ def _beside_nest(arm: UrController, poses: ArmPoses) -> Callable[[], tuple[float
 
 
 async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
-    """Run the twin until the process is told to end by SIGINT or SIGTERM.
+    """Run the twin until SIGINT or SIGTERM.
 
     Args:
         options: what it is and where it listens.

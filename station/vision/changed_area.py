@@ -1,4 +1,4 @@
-"""Changed area: the second, plain witness of a contact, in a few lines that anyone can check.
+"""Changed area: the second, plain measure of a contact, in a few lines that anyone can check.
 
 It is the number of pixels whose change, without the background and after flat-field correction, is longer than a few
 grey levels. It takes in the halo around a contact and misses a flat centre, so it is no contact area; but it rises

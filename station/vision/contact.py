@@ -70,7 +70,7 @@ class Contact:
 
     @property
     def is_firm(self) -> bool:
-        """Whether it is more than a light touch: closing is counted from such contacts.
+        """Whether it is more than a weak contact: closing is counted from such contacts.
 
         A light touch may be a place of the gel that was another in the reference.
         """

@@ -1,4 +1,4 @@
-"""Contact region: where the gel has moved under one body, before the contact's edge is looked for.
+"""Contact region: where the gel has moved under one body, before the search for the contact's edge.
 
 A body's edge alone misleads: achenes, drupelets and a calyx outshine it, and a soft body's is weak. What the body moves
 as a whole does not: the change's root mean square over a window, above the background's, is high all over the contact,

@@ -277,7 +277,7 @@ class RobustMethod:
         state.difference *= self._unsaturated
 
     def _destripe(self, state: State) -> None:
-        """Take rows' and columns' noise off, by what is calm."""
+        """Take rows' and columns' noise off, by the places without contact."""
         if "destriping" in self._without:
             return
         size = (state.calm.shape[1], state.calm.shape[0])
@@ -341,8 +341,8 @@ class RobustMethod:
                 state.outlines.append(outline)
 
     def _drop_unsupported(self, state: State) -> None:
-        """Drop doubtful outlines within which no slope stands out of the noise: they are drift."""
-        doubtful = [one for one in state.outlines if self._sureness(one, state) < self._parameters.least_confidence]
+        """Drop doubtful outlines within which no slope exceeds the noise: they are drift."""
+        doubtful = [one for one in state.outlines if self._confidence(one, state) < self._parameters.least_confidence]
         if not doubtful or state.floor is not None or state.gate >= 10 or "support" in self._without:
             return
         response = self._weak_response(state)
@@ -356,7 +356,7 @@ class RobustMethod:
         state.outlines = [one for one in state.outlines if one not in dropped]
 
     def _find_weak_contact(self, state: State) -> None:
-        """Look for a contact below the detection threshold where nothing was found."""
+        """Search for a contact below the detection threshold where nothing was found."""
         if state.outlines or "weak contact" in self._without:
             return
         place = self._weak.place(self._weak_response(state))
@@ -377,7 +377,7 @@ class RobustMethod:
         """Say at least what the press so far has shown, where the edge is lost."""
         if state.floor is None:
             return
-        sure = [self._sureness(one, state) >= self._parameters.least_confidence for one in state.outlines]
+        sure = [self._confidence(one, state) >= self._parameters.least_confidence for one in state.outlines]
         if not sure or not all(sure):
             state.flags.add(Flag.LOWER_BOUND)
 
@@ -412,9 +412,9 @@ class RobustMethod:
         if not touched:
             state.confidence = 0.0 if state.weak_at else min(1.0, p.sure_gate * max(0.0, 1.0 - state.gate))
         else:
-            state.confidence = min((self._sureness(one, state) for one in state.outlines), default=0.0)
+            state.confidence = min((self._confidence(one, state) for one in state.outlines), default=0.0)
             if "witness" not in self._without:
-                state.confidence *= self._witnessed(state, cv2.countNonZero(state.mask))
+                state.confidence *= self._agreement(state, cv2.countNonZero(state.mask))
         if state.weak_at:
             state.confidence *= _WEAK_DOUBT
         if Flag.REFERENCE_MISMATCH in flags:
@@ -445,7 +445,7 @@ class RobustMethod:
             return outline
         if self._one_colour(state, outline, sure=sure):
             return None
-        supported = sure or state.weak_at is not None or self._sureness(outline, state) >= p.support_least
+        supported = sure or state.weak_at is not None or self._confidence(outline, state) >= p.support_least
         return outline if supported else None
 
     def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
@@ -461,13 +461,13 @@ class RobustMethod:
         power = float((mean**2).sum())
         return power > self._constants.one_colour * (power + float((deviation**2).sum()))
 
-    def _sureness(self, outline: Outline, state: State) -> float:
+    def _confidence(self, outline: Outline, state: State) -> float:
         """An outline's confidence, less where the border cuts it and the gel hardly curves: drift resembles that."""
         if outline.edge.seen.all() or state.floor is not None:
             return outline.confidence
         return outline.confidence * float(np.clip((state.gate - 1) / (self._constants.sure_gate - 1), 0, 1))
 
-    def _witnessed(self, state: State, contact_px: int) -> float:
+    def _agreement(self, state: State, contact_px: int) -> float:
         """How far the changed area agrees with the contact area, 0 to 1."""
         contact_px = round(contact_px * state.changed.size / (self._shape[0] * self._shape[1]))
         changed_px = cv2.countNonZero(state.changed)

@@ -134,7 +134,7 @@ class WeakContactDetector:
         return WeakResponse(np.sqrt(total) * self._valid, compression)
 
     def place(self, response: WeakResponse) -> tuple[int, int] | None:
-        """Find where something touches: x and y, or None where nothing stands out.
+        """Find where something touches: x and y, or None where nothing exceeds the noise.
 
         Args:
             response: from `response`.

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.timeout(400)
 PIN = "735192"
 OPERATIONS = (
     ("GET", "/api/v1/health"),
+    ("GET", "/api/v1/alarms"),
     ("GET", "/api/v1/inspections"),
     ("GET", "/api/v1/inspections/{sequence}"),
     ("GET", "/api/v1/recipes"),

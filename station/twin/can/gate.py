@@ -26,7 +26,7 @@ _GENERAL = 0x08000000
 
 
 class Shot(NamedTuple):
-    """A shot as the gate got or fired it."""
+    """A reject actuation as the gate got or fired it."""
 
     sequence: int
     lane: int
@@ -70,7 +70,7 @@ class RejectGate(TwinNode):
         return sum(1 << (lane - 1) for lane, until_s in self._open_until_s.items() if until_s > now_s)
 
     def tick(self) -> None:
-        """Send reports that are due, and look for what is missing: the station, and the encoder."""
+        """Send reports that are due, and check for what is missing: the station, and the encoder."""
         now_s = self._clock.now_s()
         while self._reports and self._reports[0][0] <= now_s:
             self._send_report(*self._reports.popleft()[1:])

@@ -25,7 +25,7 @@ class Fingers:
     stroke_mm: float = 85.0
 
     def opening_mm(self, count: int) -> float:
-        """The opening that a position request stands for; requests beyond the ends mean the ends."""
+        """The opening of a position request; requests beyond the ends mean the ends."""
         within = min(max(count, self.open_count), self.closed_count)
         return self.stroke_mm * (self.closed_count - within) / (self.closed_count - self.open_count)
 
@@ -36,12 +36,12 @@ class Fingers:
 
 
 def speed_mm_s(setting: int) -> float:
-    """The speed that a speed setting (0 to 255) stands for."""
+    """The speed of a speed setting (0 to 255)."""
     return SLOWEST_MM_S + (FASTEST_MM_S - SLOWEST_MM_S) * setting / FULL_SCALE
 
 
 def grip_force_n(setting: int) -> float:
-    """The grip force that a force setting (0 to 255) stands for; 0 is not zero force."""
+    """The grip force of a force setting (0 to 255); 0 is not zero force."""
     return WEAKEST_N + (STRONGEST_N - WEAKEST_N) * setting / FULL_SCALE
 
 

@@ -52,7 +52,7 @@ class _Leg:
 
 
 class RobotiqGripper:
-    """A 2F-85, advanced to the clock's time whenever it is looked at."""
+    """A 2F-85, advanced to the clock's time whenever it is read."""
 
     def __init__(
         self, clock: Clock, faults: FaultBoard, load: Load | None = None, fingers: Fingers | None = None

@@ -65,7 +65,7 @@ class RequestFramer:
         return frames
 
     def _length(self) -> int:
-        """The length of the frame that the buffer begins with, 0 while it cannot be told."""
+        """The length of the frame that the buffer begins with, 0 while it is unknown."""
         if len(self._buffer) < 2:
             return 0
         counter_at = {_WRITE: 6, _READ_WRITE: 10}.get(self._buffer[1])
