@@ -13,13 +13,11 @@ from station.channel.panel_live import (
     Recipes,
     RecipeSummary,
 )
+from station.messages import calibration
 from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
 
-DUE = verbatim(
-    "The calibration was never verified, and it is demanded: verify it with the ball; on the page Maintenance in "
-    "manual mode, or by `station verify` with the station stopped."
-)
+DUE = calibration.NEVER_VERIFIED(how=calibration.HOW_TO_VERIFY())
 
 
 def state(check_due):
@@ -49,5 +47,5 @@ def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypa
         status, _, body = pages("GET", path, headers={"accept-language": "de"})
         text = re.sub(r"\s+", " ", body.decode())
         assert status == 200
-        assert ("Die Kalibrierung wurde nie geprüft" in text) == bool(due)
+        assert ("Die Kalibrierung wurde nie überprüft" in text) == bool(due)
         assert ('href="/maintenance/sensor"' in text) == bool(due)

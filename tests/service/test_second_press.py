@@ -12,7 +12,7 @@ from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, snapshots
 
-OFF_MM = 1.0
+OFF_MM = 2.0
 
 
 @pytest.fixture
