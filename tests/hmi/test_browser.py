@@ -120,7 +120,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
 
     def history():  # which is written behind
         operator.page.reload()
-        rows = operator.page.locator(".log tbody tr", has_text="camera lost").all_inner_texts()
+        rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
         changes = [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows]
         first = ["raised", "acknowledged", "shelved", "shown again"]
         return changes[::-1][:4] == first and sorted(changes[::-1][4:]) == ["acknowledged", "returned to normal"]
