@@ -27,7 +27,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
             return outcome, record.judged, sensor_mm, cell.twin.world.sensor_mm()
 
     outcome, judged, [sensor_mm], at_last = asyncio.run(scenario())
-    assert outcome.outcome == "PASS", (judged.explanation, judged.measures)
+    assert outcome.outcome == "PASS", (outcome.reasons, judged.explanation, judged.curve, judged.measures)
     measures = judged.measures
     assert (measures["centring"], measures["closings"]) == ("moved", 1 + measures.get("presses", 1))
     assert not any("cut_by_border" in point.flags for point in judged.curve)
