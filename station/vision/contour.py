@@ -61,6 +61,11 @@ class Rays(NamedTuple):
         axes = vectors @ np.diag([aspect**-0.5, aspect**0.5]) @ vectors.T
         return cls(middle, axes)
 
+    @property
+    def across(self) -> float:
+        """By how much a body is narrower than a circle of its area, 0 to 1; 1 of all that are not long."""
+        return float(np.linalg.norm(self.axes, -2))
+
     def reach(self, mask: Mask) -> float:
         """The radius of a circle of a region's area, in the rays' unit, at least 3.
 

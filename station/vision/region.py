@@ -135,7 +135,9 @@ def find_region(
         inner |= floor
     for last in (False, True):
         radius = radius_of(mask)
-        level, spread = level_of(moved, max(_LEAST_WINDOW_PX, p.region_window * radius))
+        # A long body's window goes with its width: the level that a wider one spreads beyond it would count as body.
+        window_px = p.region_window * radius * Rays.about(mask).across
+        level, spread = level_of(moved, max(_LEAST_WINDOW_PX, window_px))
         level *= moved.flat_field
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
         cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
