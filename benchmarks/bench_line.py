@@ -21,7 +21,7 @@ from station.settings.configuration import load_configuration
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "line-pace.md"
 DAMAGED_SHARE = 0.1
-"""More than a packhouse's line has; each damaged one is pressed twice more often than a sound one."""
+"""An estimate, on the high side: damaged fruit are pressed twice more often, and so take longer."""
 
 
 def at_pace(kind: str, a_minute: float, count: int) -> tuple[Run, list[str]]:
@@ -80,9 +80,9 @@ def main() -> None:
     text = f"""# A line at {asked.a_minute:g} fruit a minute
 
 Written by `./run bench line`. Fruit arrive every {60 / asked.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
-lie some millimetres off, and are measured while the jaws close (`steps.measured: while_closing`). One that the nest is
-not free for waits before it: one that is centred or pressed twice takes longer than the pace, and a sound one in place
-takes less. *Books* are the PLC's readings, the records and the metrics. On the twin; unverified on hardware.
+and are measured while the jaws close (`steps.measured: while_closing`). One that the nest is not free for waits before
+it: one that is centred or pressed twice takes longer than the pace, and others take less. *Books* are the PLC's
+readings, the records and the metrics. On the twin; unverified on hardware.
 
 {pace_table}
 

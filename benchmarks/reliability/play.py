@@ -181,7 +181,7 @@ def _unlike_record(rig: Rig, sequence: int, shown: Shown) -> list[str]:
         judged = record.judged
         curve = () if judged is None else judged.curve
         reached_mm = max((point.closing_mm or 0.0 for point in curve), default=0.0)
-        enough = reached_mm + AT_MM >= rig.recipe.damage.area[-1].closing_mm
+        enough = reached_mm + AT_MM >= rig.recipe.damage.deciding_closing_mm
         whole = enough and all(point.area_mm2 is not None for point in curve)
         if judged is None or judged.outcome != "PASS" or judged.partial or not whole:
             wrong.append(f"result {sequence} is PASS without a whole curve that was judged so")

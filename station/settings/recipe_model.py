@@ -96,7 +96,7 @@ class WidthSteps(Settings):
         default="at_rest",
         title="Measured",
         description="`while_closing` makes the steps up to the deciding damage threshold without a stop, each camera "
-        "image with the width at its capture: a second less a fruit. `at_rest` stops for each.",
+        "image with the width at its capture: a fruit takes less time. `at_rest` stops for each.",
     )
 
     @property

@@ -18,7 +18,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
             async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated at home
                 while cell.phase is not State.IDLE:
                     await asyncio.sleep(0.1)
-            cell.lay("strawberry", 1, x_mm=RIGHT_MM, y_mm=DOWN_MM)
+            cell.lay("strawberry", 7, x_mm=RIGHT_MM, y_mm=DOWN_MM)
             sensor_mm = []
             cell.at(State.RECORDING_ACCEPT, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))
             outcome = await cell.line.inspect()
