@@ -97,8 +97,8 @@ pressed twice takes longer: [200 fruit of a mixed line](triggers.md). Unverified
 
 {table}
 
-*While closing*: with recipes that measure while the jaws close (`steps.measured: while_closing`). *Before* is the
-station as it was before it closed without stops. Both are of the same run.
+*While closing*: with recipes that measure while the jaws close (`steps.measured: while_closing`), in the same run, as
+is *before*, the station of an earlier revision, where one was given (`--before`).
 
 ![The floor's parts and ours](images/cycle-time.svg)
 
@@ -323,28 +323,23 @@ def table(
     results: Mapping[str, Pace], closing: Mapping[str, Pace], before: Mapping[str, Pace], spent: Spent
 ) -> list[str]:
     """Medians over the repeats."""
-    rows = []
+    rows, beside = [], {"while closing": closing, **({"before": before} if before else {})}
     for kind, _ in FRUIT:
         pace = results[kind]
         outcomes = ", ".join(sorted({each.outcome for each in pace.alone}))
         outcome_s, next_s = medians(pace)
         floor_s = statistics.median(sum(floor.kinds_s.values()) for _, _, floor in spent[kind])
         ours_s = statistics.median(each.to_next_s - sum(floor.kinds_s.values()) for each, _, floor in spent[kind])
-        on_the_way, then = (
-            [*(f"{seconds:.2f}" for seconds in medians(other[kind])), f"{other[kind].a_minute:.1f}"]
-            if kind in other
-            else ["", "", ""]
-            for other in (closing, before)
-        )
-        cells = [kind, outcomes, f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}", *on_the_way, *then]
+        cells = [kind, outcomes, f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}"]
+        for other in beside.values():
+            cells += [*(f"{seconds:.2f}" for seconds in medians(other[kind])), f"{other[kind].a_minute:.1f}"]
         rows.append(f"| {' | '.join(cells)} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / floor_s:.1f} % |")
     names = ("fruit", "outcome", "to outcome, s", "to next trigger, s", "fruit a minute")
-    others = [
-        name
-        for other in ("while closing", "before")
-        for name in (f"{other}: to outcome", "to next trigger", "fruit a minute")
+    others = [name for other in beside for name in (f"{other}: to outcome", "to next trigger", "fruit a minute")]
+    header = [
+        f"| {' | '.join((*names, *others, 'floor, s', 'ours, s', '% of the floor'))} |",
+        "|---" * (8 + len(others)) + "|",
     ]
-    header = [f"| {' | '.join((*names, *others, 'floor, s', 'ours, s', '% of the floor'))} |", "|---" * 14 + "|"]
     return [*header, *rows]
 
 
