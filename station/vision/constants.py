@@ -73,16 +73,14 @@ class Constants:
         0.85,
         "of the cap",
         "the region's end where directions are random and elements as strong as the body",
-        "trials: docs/robust.md",
+        "fit",
     )
     share_coherent: float = constant(1.6, "of the cap", "how much higher it is per unit of coherence", "fit")
-    share_prominent: float = constant(
-        0.5, "of the cap", "how much higher it is per e-fold of prominence", "trials: docs/robust.md"
-    )
+    share_prominent: float = constant(0.5, "of the cap", "how much higher it is per e-fold of prominence", "fit")
     least_prominence: float = constant(
         -1.7, "ln(1/px)", "a smoother body counts as one of this", "measured: raspberries"
     )
-    share_least: float = constant(0.3, "of the cap", "the region's end is never lower", "trials: docs/robust.md")
+    share_least: float = constant(0.3, "of the cap", "the region's end is never lower", "fit")
     share_field: float = constant(-0.2, "of the cap", "how much lower it is per share of the field", "fit")
     share_most: float = constant(0.76, "of the cap", "the region's end is never higher", "fit")
     region_span: float = constant(1.9, "radii", "how far beyond its start the region is looked for", "fit")
