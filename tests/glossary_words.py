@@ -46,9 +46,10 @@ OTHER_SENSES: dict[str, tuple[str, tuple[str, ...]]] = {
 """Words with another sense, which is meant; and the rooms in which it cannot be."""
 
 MEANT: dict[str, tuple[str, ...]] = {
-    "call off": ("station/commands/grip.py", "station/service/plc_commands.py"),  # the PLC's command `call_off`
+    # the PLC's command `call_off`
+    "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
     "calm": ("station/vision/curvature.py", "docs/robust-constants.md"),  # the constant `calm_trust`
-    "conductor": ("station/service/conductor.py",),
+    "conductor": ("station/runtime/cycle/runner.py",),
     "damaged passed": ("docs/grr.md", "docs/sorting.md"),  # column headings of a result
     "frame": ("plc_interface/modbus/exceptions.py", "plc_interface/modbus/mbap.py"),
     "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
@@ -56,7 +57,7 @@ MEANT: dict[str, tuple[str, ...]] = {
         "docs/alarms.md",  # a person does
         "docs/configuration.md",
         "docs/robust-constants.md",
-        "station/service/restored_inspections.py",
+        "station/runtime/rpc/restored_inspections.py",
         "station/twin/digit/optics.py",  # in a table
         "station/vision/press.py",  # ahead
     ),

@@ -71,4 +71,4 @@ def test_a_sense_is_meant_outside_of_the_rooms_where_it_cannot_be():
     assert not meant("plc_interface/modbus/server.py", "frame")
     assert meant("plc_interface/modbus/mbap.py", "frame")
     assert meant("docs/robust.md", "truth")
-    assert not meant("station/service/service.py", "crew")
+    assert not meant("station/runtime/cycle/service.py", "crew")

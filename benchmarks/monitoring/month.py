@@ -19,7 +19,7 @@ from prometheus_client.core import Metric
 from station.channel.line import Outcome
 from station.outbox.status import DestinationStatus, OutboxStatus
 from station.records.records import Status
-from station.service.metrics import Metrics
+from station.runtime.observability.metrics import Metrics
 from station.vocabulary import Reason
 
 from .prometheus import promtool

@@ -19,9 +19,9 @@ from station.errors import BadInputError
 from station.records.database import records_folder
 from station.records.errors import LockedError
 from station.records.open import lock_folder
-from station.service.bare_grip import renewed_lease
-from station.service.calibration_rig import StationRig
-from station.service.grip import Cell
+from station.runtime.devices.bare_grip import renewed_lease
+from station.runtime.devices.calibration_rig import StationRig
+from station.runtime.devices.grip import Cell
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
 

@@ -8,7 +8,7 @@ from station.calibration.store import CalibrationStore
 from station.records.audit import append_audit
 from station.records.database import records_folder
 from station.records.direct_transaction import direct_transaction
-from station.service.audit_logger import calibration_entry
+from station.runtime.observability.audit_logger import calibration_entry
 from station.settings.configuration import Configuration
 
 

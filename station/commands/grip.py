@@ -19,7 +19,7 @@ from station.devices.camera.open import camera_from
 from station.devices.camera.twin import TwinCamera
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
-from station.service.bare_grip import BareGrip, Cell, GripStep
+from station.runtime.devices.bare_grip import BareGrip, Cell, GripStep
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import Recipe, find_recipe
 from station.vision.methods import make_method

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from station.logs import configure_logging
-from station.service.last_good import load_or_last_good
-from station.service.station import Station
+from station.runtime.last_good import load_or_last_good
+from station.runtime.station import Station
 from station.settings.configuration import Configuration
 from station.supervision.memory import keep_freed_memory
 

@@ -17,7 +17,7 @@ from station.errors import StationError
 from station.records.audit import append_audit
 from station.records.database import records_folder
 from station.records.direct_transaction import direct_transaction
-from station.service.audit_logger import verification_entry
+from station.runtime.observability.audit_logger import verification_entry
 from station.settings.configuration import Configuration, load_configuration
 
 

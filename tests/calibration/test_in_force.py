@@ -31,9 +31,9 @@ from station.messages import grip, readiness
 from station.messages.message import verbatim
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
-from station.service.active_calibration import ActiveCalibration
-from station.service.reference import GoldenReference
-from station.service.state_files import StateFiles
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.imaging.reference import GoldenReference
+from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint

@@ -17,10 +17,10 @@ from hmi.limit_chart import Curve, Limit, area_chart, strip
 from hmi.recipe_form import BadFieldError, changed, formatted, groups
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
-from station.service.panel_jobs import MOST_WAITING, JobError, PanelJobs
-from station.service.panel_recipes import PanelRecipes
-from station.service.panel_worker import MOST_WAITING as MOST_QUESTIONS
-from station.service.panel_worker import PanelBusyError, PanelWorker
+from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
+from station.runtime.rpc.recipes import PanelRecipes
+from station.runtime.rpc.worker import MOST_WAITING as MOST_QUESTIONS
+from station.runtime.rpc.worker import PanelBusyError, PanelWorker
 from station.settings.recipe import load_recipes
 
 PATIENCE_S = 60.0

@@ -10,7 +10,7 @@ from benchmarks.archive import postgres
 from benchmarks.monitoring.asking import panels, promql, rules, sql, used
 from benchmarks.monitoring.month import LINKS, PHASES
 from benchmarks.monitoring.site import STATION, demonstration
-from station.service.metrics_table import TABLE, exposed_name
+from station.runtime.observability.metrics_table import TABLE, exposed_name
 
 FRUITS = 3
 

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.monitoring.history import NO_COMPACTION, record, told
 from benchmarks.monitoring.month import DAY_S, HOUR_S, Plan, troubles, write_history
 from benchmarks.monitoring.prometheus import running, write_configuration
-from station.service.metrics_table import TABLE
+from station.runtime.observability.metrics_table import TABLE
 
 BEGIN_S = 1_789_344_000
 """A midnight, UTC."""

@@ -14,7 +14,7 @@ from station.outbox.lag import OutboxMonitor
 from station.outbox.publisher import run_outbox
 from station.outbox.status import DestinationStatus, outbox_folder, write_status
 from station.records.audit import AuditEntry
-from station.service.station import Station
+from station.runtime.station import Station
 from station.settings.configuration import load_configuration
 
 LIMIT_S = 90.0

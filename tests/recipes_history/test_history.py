@@ -10,8 +10,8 @@ import pytest
 from station.messages import recipes
 from station.recipe_store.revision import RecipeStoreError
 from station.records.model import RecipeSnapshot
-from station.service.active_recipes import ActiveRecipes
-from station.service.state_files import StateFiles
+from station.runtime.recipes.active import ActiveRecipes
+from station.runtime.state_files import StateFiles
 from station.settings.recipe import APPROVED_NAME, approved_list, load_recipe, shipped_folder
 from station.settings.recipe_form import canonical_text, content_sha256
 

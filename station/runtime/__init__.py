@@ -1,0 +1,1 @@
+"""The running station: the process that inspects with the station's devices."""

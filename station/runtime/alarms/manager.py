@@ -1,0 +1,262 @@
+"""Alarm manager: raises and clears alarms, stores them in the records, and reports them to the PLC."""
+
+import asyncio
+import logging
+import time
+
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.camera.interface import FrameFault
+from station.devices.gripper.errors import (
+    GripperEmergencyStopError,
+    GripperLinkLostError,
+    GripperProtocolError,
+    GripperSilentError,
+    GripperTimeoutError,
+    GripperUnreachableError,
+)
+from station.errors import StationError
+from station.inspection.alarm_table import ALARMS, AlarmId
+from station.inspection.alarms import CAUSED, Alarms
+from station.messages import alarm_commands as messages
+from station.messages.message import Message, message_in, message_of, text_of
+from station.records.errors import RecordsError
+from station.records.model import AlarmEntry, AlarmRow
+from station.records.records import Records
+from station.runtime.cycle.inspection import utc_ms
+from station.runtime.devices.grip import FramesError
+from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
+from station.runtime.observability.metrics import Metrics
+
+log = logging.getLogger(__name__)
+
+OF_DEVICE: dict[str, frozenset[AlarmId]] = {
+    ARM: frozenset(
+        {
+            AlarmId.EMERGENCY_STOP,
+            AlarmId.PROTECTIVE_STOP,
+            AlarmId.SAFETY_FAULT,
+            AlarmId.ARM_LINK_LOST,
+            AlarmId.ARM_NOT_REMOTE,
+        }
+    ),
+    GRIPPER: frozenset({AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
+    CAMERA: frozenset({AlarmId.CAMERA_LOST, AlarmId.CAMERA_STALE}),
+}
+"""Alarms that only the device monitors raise; all are cleared once each of their devices is healthy."""
+
+_MOST_UNSAVED = 1000
+_ARM = {
+    ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
+    ArmCause.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
+    ArmCause.SAFETY_FAULT: AlarmId.SAFETY_FAULT,
+    ArmCause.LOCAL_CONTROL: AlarmId.ARM_NOT_REMOTE,
+    ArmCause.PROGRAM_STOPPED: AlarmId.ARM_NOT_REMOTE,
+    ArmCause.REGISTERS_IN_USE: AlarmId.ARM_NOT_REMOTE,
+}
+_FRAMES = (
+    (frozenset({FrameFault.WRONG_SIZE}), AlarmId.CAMERA_LOST),
+    (frozenset({FrameFault.STALE, FrameFault.REPEATED}), AlarmId.CAMERA_STALE),
+    (frozenset(FrameFault), AlarmId.CAMERA_SATURATED),
+)
+"""The alarm of bad frames, by the first of these that any of them had."""
+_GRIPPER_LINK = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
+
+
+def alarm_of(device: str, fault: StationError) -> AlarmId:
+    """Return the alarm that reports a device's fault.
+
+    Args:
+        device: `arm`, `gripper` or `camera`.
+    """
+    match fault:
+        case FramesError():
+            return next((alarm for faults, alarm in _FRAMES if fault.faults & faults), AlarmId.CAMERA_STALE)
+        case ArmFault():
+            return _ARM.get(fault.cause, AlarmId.ARM_LINK_LOST)
+        case GripperEmergencyStopError():
+            return AlarmId.EMERGENCY_STOP
+        case GripperTimeoutError():
+            return AlarmId.GRIPPER_JAM
+        case _ if isinstance(fault, _GRIPPER_LINK):
+            return AlarmId.GRIPPER_LINK_LOST
+    return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_LOST}[device]
+
+
+class AlarmManager:
+    """Alarm states of the station. Every method is immediate; `keep` makes the changes durable afterwards.
+
+    Args:
+        metrics: receives the active alarms.
+    """
+
+    def __init__(self, metrics: Metrics) -> None:
+        self._alarms = Alarms()
+        self._metrics = metrics
+        self._present: set[AlarmId] = set()
+        self._device_alarms: dict[str, AlarmId | None] = {}
+        """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
+        self._unsaved: list[AlarmEntry] = []
+        self._changed = asyncio.Event()
+
+    @property
+    def alarms(self) -> Alarms:
+        """Return all alarms, as a value."""
+        return self._alarms
+
+    def raise_(self, alarm: AlarmId, detail: Message | None) -> None:
+        """Raise an alarm; it is published once for as long as its cause is present.
+
+        Args:
+            detail: the finding.
+        """
+        if alarm not in self._present:
+            self._present.add(alarm)
+            self._set(self._alarms.raise_(alarm, time.time(), detail), alarm, "raised", detail)
+
+    def clear(self, alarm: AlarmId) -> None:
+        """Mark an alarm's cause as gone; an alarm whose cause was not present does not change."""
+        if alarm in self._present:
+            self._present.discard(alarm)
+            self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared")
+
+    def update(self, alarm: AlarmId, detail: Message | None) -> None:
+        """Raise the alarm if `detail` is given, else clear it.
+
+        Args:
+            detail: the finding; None if the cause is gone.
+        """
+        if detail is not None:
+            self.raise_(alarm, detail)
+        else:
+            self.clear(alarm)
+
+    def set_device_fault(self, device: str, fault: StationError | None) -> None:
+        """Raise the alarm of a device's fault, or clear the alarms of a healthy device.
+
+        Args:
+            device: `arm`, `gripper` or `camera`.
+            fault: None if the device is healthy.
+        """
+        told = None if fault is None else alarm_of(device, fault)
+        before, self._device_alarms[device] = self._device_alarms.get(device), told
+        for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
+            if alarm not in self._device_alarms.values():
+                self.clear(alarm)
+        if told is not None and fault is not None:
+            self.raise_(told, message_of(fault))
+
+    def acknowledge(self, alarm: AlarmId) -> bool:
+        """Acknowledge an alarm.
+
+        Returns:
+            Whether that changed anything.
+        """
+        return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged")
+
+    def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
+        """Shelve an alarm for a time.
+
+        Args:
+            alarm: a latched alarm, and one that is shelved already, does not change.
+            for_s: at most `LONGEST_SHELVED_S`.
+            by: the person's name.
+
+        Returns:
+            Whether that changed anything.
+        """
+        detail = messages.SHELVED(duration_s=for_s, who=by, reason=reason)
+        return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
+
+    def unshelve(self, alarm: AlarmId) -> bool:
+        """Unshelve an alarm; if its cause is present, it has to be acknowledged again.
+
+        Returns:
+            Whether that changed anything.
+        """
+        return self._set(self._alarms.unshelve(alarm), alarm, "unshelved")
+
+    def acknowledge_returned(self) -> None:
+        """Acknowledge every alarm that has returned to normal: the PLC's command."""
+        self._set_all(self._alarms.acknowledge_returned(), "acknowledged")
+
+    def reset(self) -> None:
+        """Unlatch every latched alarm whose cause is gone, after a person's reset."""
+        alarms = self._alarms
+        for alarm in self._alarms.known:
+            alarms = alarms.reset(alarm)
+        self._set_all(alarms, "reset")
+
+    def tick(self) -> None:
+        """Apply what depends on time, as the end of shelving; call it about once a second."""
+        later = self._alarms.tick(time.time())
+        if later != self._alarms:
+            self._alarms = later
+            self._publish_active()
+
+    async def restore(self, records: Records) -> None:
+        """Restore the alarms of the previous start; their causes count as present until a check clears them."""
+        self._alarms = Alarms.from_data(
+            [
+                {
+                    "id": row.id,
+                    "state": row.state,
+                    "detail": message_in(row.detail),
+                    "since_s": row.raised_utc_ms / 1000,
+                    "raised": 1,
+                    "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
+                    "shelved_by": row.shelved_by,
+                }
+                for row in await records.load_alarms()
+            ]
+        )
+        self._present = {alarm.id for alarm in self._alarms.known.values() if alarm.state in CAUSED}
+        self._publish_active()
+
+    async def store_changes(self, records: Records) -> None:
+        """Store every change until cancelled; a change that could not be stored is tried again with the next one."""
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            entries = tuple(self._unsaved)
+            rows = tuple(
+                AlarmRow(
+                    alarm.id,
+                    alarm.state,
+                    round(1000 * alarm.since_s),
+                    utc_ms(),
+                    text_of(alarm.detail),
+                    None if alarm.shelved_until_s is None else round(1000 * alarm.shelved_until_s),
+                    alarm.shelved_by,
+                )
+                for alarm in self._alarms.known.values()
+            )
+            try:
+                await records.save_alarms(rows, entries)
+            except RecordsError as error:
+                log.warning("alarms are not remembered: %s", error)
+            else:
+                del self._unsaved[: len(entries)]
+
+    def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: Message | None = None) -> bool:
+        if alarms.get(alarm) == self._alarms.get(alarm):
+            return False
+        self._alarms = alarms
+        self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, text_of(detail))][-_MOST_UNSAVED:]
+        level = logging.WARNING if change == "raised" else logging.INFO
+        if detail is None:
+            log.log(level, "alarm %s %s", alarm, change)
+        else:
+            log.log(level, "alarm %s %s: %s", alarm, change, detail)
+        self._publish_active()
+        return True
+
+    def _set_all(self, alarms: Alarms, change: str) -> None:
+        for alarm, before in self._alarms.known.items():
+            if alarms.get(alarm) != before:
+                self._unsaved.append(AlarmEntry(utc_ms(), alarm, change))
+        self._alarms = alarms
+        self._publish_active()
+
+    def _publish_active(self) -> None:
+        self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self._alarms.active)
+        self._changed.set()

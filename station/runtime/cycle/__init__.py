@@ -1,0 +1,1 @@
+"""One inspection's cycle: from an accepted trigger to its outcome."""

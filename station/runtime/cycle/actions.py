@@ -1,0 +1,390 @@
+"""Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+from station.calibration.gate import gated
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.inspection.alarm_table import AlarmId
+from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
+from station.inspection.cycle import REASONS, Event
+from station.inspection.evidence import AT_MM
+from station.inspection.judge import early_stop, judge
+from station.inspection.second_press import FREED_BY_MM, needs_second_press
+from station.messages import operation as messages
+from station.messages.message import Message, message_of
+from station.records.model import Image
+from station.runtime.alarms.manager import AlarmManager
+from station.runtime.cycle.inspection import Inspection
+from station.runtime.devices.grip import (
+    FRAME_DEADLINE_S,
+    Grip,
+    GripStep,
+    NothingTouchedError,
+    UnseenContactError,
+    at_once,
+)
+from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.imaging.reference import ALARMS, BadReferenceError
+from station.runtime.imaging.worker import MeasuredStep, VisionWorker
+from station.runtime.observability.metrics import Metrics
+from station.settings.arm import ArmSettings
+from station.settings.service import ServiceSettings
+from station.vocabulary import Reason
+
+_OPEN_WITHIN_MM = 2.0
+
+log = logging.getLogger(__name__)
+
+
+class Inspector:
+    """The actions that need the devices. Each ends with an event or a device's `StationError`.
+
+    Args:
+        settings: placing, and how old a reference may be.
+        arm: where it waits, and how it may follow a contact.
+        alarms: raised for a reference that cannot serve.
+        metrics: counts the frames.
+        calibrated: how noisy the sensor is.
+    """
+
+    def __init__(
+        self,
+        devices: DeviceManager,
+        vision: VisionWorker,
+        settings: ServiceSettings,
+        arm: ArmSettings,
+        alarms: AlarmManager,
+        metrics: Metrics,
+        calibrated: ActiveCalibration,
+    ) -> None:
+        self._devices, self._vision, self._settings, self._calibrated = devices, vision, settings, calibrated
+        self._alarms, self._metrics, self._arm = alarms, metrics, arm
+        self._reached: MoveResult | None = None
+        self._glanced: MeasuredStep | None = None
+        self._goes_on = asyncio.Event()
+        """Set when a measured step lets another one be made."""
+
+    async def open_jaws(self) -> Event:
+        """Let go of whatever is held."""
+        await self._devices.cell.gripper.open()
+        return Event.JAWS_OPEN
+
+    async def free_fruit(self, now: Inspection) -> Event:
+        """Open only so far that the sensor can move beside the fruit, which may have rolled."""
+        gripper = self._devices.cell.gripper
+        if now.met_mm is None:
+            raise RuntimeError("a fruit is freed that was not met")
+        await gripper.open(min(now.met_mm + FREED_BY_MM, gripper.max_width_mm))
+        return Event.JAWS_OPEN
+
+    async def go_home(self) -> Event:
+        """Bring the arm to where it waits, and open the jaws fully meanwhile.
+
+        From the nest, or from where it is not known, the arm goes over the place above it.
+        """
+        arm = self._devices.cell.arm
+
+        async def leave() -> None:
+            if arm is not None:
+                if (await arm.state()).at not in {"home", "above_nest", "accept", "reject"}:
+                    await arm.move_to("above_nest")
+                await arm.move_to(self._arm.waits_at)
+
+        await at_once(leave(), self._devices.cell.gripper.open())
+        return Event.HOME
+
+    async def check_jaws(self, now: Inspection) -> Event:
+        """Make sure that the jaws are open before a reference is taken: else something may be held against the gel."""
+        gripper = self._devices.cell.gripper
+        opened = await gripper.open()
+        touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
+        if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
+            now.interrupt(
+                Reason.REFERENCE_BAD,
+                messages.JAWS_NOT_OPEN(width_mm=opened.width_mm),
+            )
+            return Event.REFERENCE_BAD
+        self._devices.monitors[GRIPPER].report_success()
+        return Event.JAWS_OPEN
+
+    async def approach(self, now: Inspection) -> Event:
+        """Bring the jaws to the fruit, a little wider than it may be, while the reference is taken and examined."""
+        good: list[bool] = []
+
+        async def examined() -> None:
+            good.append(await self._examined(now))
+
+        jaws = self._devices.cell.gripper.open(self._width_around(now))
+        await at_once(self._grip(now).go("above_nest", "nest"), jaws, examined())
+        return Event.ARRIVED if all(good) else Event.REFERENCE_BAD
+
+    def _width_around(self, now: Inspection) -> float:
+        """The jaws' width beside any fruit that the recipe expects, and beside the one that was met."""
+        recipe = now.active.recipe
+        widest_mm = max(
+            recipe.expected_width.largest_mm, recipe.steps.start_width_mm or 0.0, now.met_mm or 0.0, now.onset_mm or 0.0
+        )
+        return min(widest_mm + self._arm.jaw_clearance_mm, self._devices.cell.gripper.max_width_mm)
+
+    async def _examined(self, now: Inspection) -> bool:
+        """Take the reference's frames, while nothing touches the gel, and examine them."""
+        frames = await self._grip(now, self._count).sound_frames(now.active.recipe.imaging.reference_frames)
+        self._devices.monitors[CAMERA].report_success()
+        now.reference_s = frames[-1].captured_s
+        return await self._examine(now, frames)
+
+    async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
+        """Whether the frames may serve as the reference; where not, the inspection and an alarm have the reason."""
+        try:
+            segmentation = gated(now.active.recipe.segmentation, self._calibrated.gate_factor)
+            image, looks = await self._vision.take_reference(frames, segmentation)
+        except BadReferenceError as error:
+            now.interrupt(Reason.REFERENCE_BAD, message_of(error))
+            self._alarms.raise_(error.alarm, message_of(error))
+            self._metrics.reference_refused(error.alarm)
+            return False
+        now.reference_image = Image("reference", None, image)
+        now.measures["gate_factor"] = self._calibrated.gate_factor  # without it no image can be measured again
+        if self._calibrated.calibration is None:
+            now.measures["uncalibrated"] = "allow"
+        for alarm in ALARMS:
+            self._alarms.clear(alarm)
+        drift, most = looks.drift_levels, self._settings.reference.most_drift_levels
+        halfway = messages.LIGHT_DRIFTS(drift_levels=drift, limit_levels=most)
+        self._alarms.update(AlarmId.REFERENCE_DRIFTING, halfway if drift > most / 2 else None)
+        self._metrics.reference(0.0, drift)
+        now.measures["reference_drift_levels"] = round(drift, 2)
+        now.measures["reference_sharpness_levels"] = round(looks.sharpness, 3)
+        return True
+
+    async def close_to_onset(self, now: Inspection) -> Event:
+        """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
+        self._reached = self._glanced = None
+        await self._vision.begin_press()
+        grip, plan = self._grip(now), now.active.recipe.steps
+        try:
+            if plan.start_width_mm is not None:
+                start = await grip.step(0, plan.start_width_mm)
+            else:
+                met = await grip.sweep(self._touches)
+                stopped = await self._devices.cell.gripper.read()
+                now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
+                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip, stopped)):
+                    now.closings = 1
+                    now.let_go(met.width_mm)
+                    return Event.OFF_MIDDLE
+                before, start = await grip.onset(met, self._touches)
+                now.before_onset_mm = None if before is None else before.move.width_mm
+        except (NothingTouchedError, UnseenContactError) as error:
+            now.interrupt(Reason.NO_CONTACT, message_of(error))
+            return Event.NO_ONSET
+        now.steps.append(start)
+        known = self._glanced is not None and self._glanced.step is start
+        now.seen.append(self._glanced if known and self._glanced else await self._vision.measure(start))
+        now.closings += 1
+        off = self._off_middle(now, now.seen[-1])
+        if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
+            now.let_go(start.move.width_mm)
+            return Event.OFF_MIDDLE
+        if now.moved != NOT_MOVED and off is not None:
+            now.measures["left_off_mm"] = round(off.length_mm, 2)
+        await self._vision.follow(now.seen[-1].contact)
+        return Event.ONSET_FOUND
+
+    async def _first_contact(self, now: Inspection, grip: Grip, at: GripperReading) -> Way | None:
+        """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
+        step = GripStep(-1, MoveResult(at.width_mm, at.echoed_count, at), await grip.sound_frames(1))
+        return self._off_middle(now, await self._vision.measure(step))
+
+    @staticmethod
+    def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
+        """How far a measured contact is off the field's middle; None where there is none."""
+        centroid_px = seen.contact.centroid_px
+        return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
+
+    def _sets_out(self, now: Inspection, off: Way | None) -> bool:
+        """Whether the arm follows a contact; the record says why not."""
+        from_mm = now.active.recipe.press.centre_from_mm
+        if from_mm is None or off is None:
+            return False
+        now.measures.setdefault("off_right_mm", round(off.right_mm, 2))
+        now.measures.setdefault("off_down_mm", round(off.down_mm, 2))
+        if off.length_mm < from_mm:
+            told = "near enough"
+        elif self._devices.cell.arm is None:
+            told = "no arm"
+        elif too_far(off, now.moved, self._arm.centring.most_mm):
+            told = "too far"
+        else:
+            now.target = now.moved.then(off)
+            now.measures["centring"] = "moved"
+            return True
+        now.measures.setdefault("centring", told)
+        return False
+
+    async def centre(self, now: Inspection) -> Event:
+        """Go to where the contact will be in the field's middle; nothing moves where it is to be pressed as it is."""
+        arm, target = self._devices.cell.arm, now.target
+        if arm is not None and target is not None:
+            now.target = None
+            try:
+                await arm.move_beside_nest(self._arm.centring.in_tool_mm(*target))
+            except ArmFault as fault:
+                if fault.cause is not ArmCause.UNREACHABLE:
+                    raise
+                log.warning("the contact is not centred: %s", fault)
+                now.measures["centring"] = "out of reach"
+                return Event.CENTRED
+            now.moved = target
+            now.measures["moved_right_mm"] = round(target.right_mm, 2)
+            now.measures["moved_down_mm"] = round(target.down_mm, 2)
+        return Event.CENTRED
+
+    async def close_step(self, now: Inspection) -> Event:
+        """Close by one step, counted in measured widths from the first, or by all that the recipe makes without a stop.
+
+        The step before is measured meanwhile, unless it may be the last: then its measurement comes first.
+        """
+        if self._may_decide(now) and len(now.seen) < len(now.steps):
+            self._goes_on.clear()
+            await self._goes_on.wait()
+        if self._closes_on(now):
+            await self._close_on(now)
+        else:
+            self._reached = await self._grip(now).close_to(now.next_width_mm)
+            now.closed_steps += 1
+        return Event.REACHED
+
+    @staticmethod
+    def _closes_on(now: Inspection) -> bool:
+        """Whether the next steps are made without a stop."""
+        return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
+
+    async def _close_on(self, now: Inspection) -> None:
+        """Close without a stop to where the deciding damage threshold is reached, measuring each frame on the way.
+
+        The fingers stop sooner where an area ends the steps.
+        """
+        now.closed_steps = now.steps_to_decide
+
+        async def goes_on(step: GripStep) -> bool:
+            now.steps.append(replace(step, number=len(now.steps)))
+            now.seen.append(await self._vision.measure(now.steps[-1]))
+            if early_stop(now.press(), now.active.recipe) is None:
+                return True
+            now.closed_steps = now.active.recipe.steps.number  # no step after this image
+            return False
+
+        # The frames are measured one by one: none is measured ahead, since each follows the one before.
+        self._reached = await self._grip(now, self._count).close_on(now.deciding_width_mm, goes_on)
+
+    @staticmethod
+    def _may_decide(now: Inspection) -> bool:
+        """Whether the last captured step may decide, by a recipe that stops when decided."""
+        recipe, onset_mm = now.active.recipe, now.onset_mm
+        if not recipe.steps.stop_when_decided or onset_mm is None:
+            return False
+        return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.deciding_closing_mm - AT_MM
+
+    async def settle(self, now: Inspection) -> Event:
+        """Let fruit and gel come to rest: every step waits as long, because fruit creeps.
+
+        Not after closing without a stop: the image belongs to those taken on the way.
+        """
+        on_the_way = now.active.recipe.steps.measured == "while_closing" and now.closed_steps <= now.steps_to_decide
+        await asyncio.sleep(0.0 if on_the_way else now.active.recipe.imaging.settle_s)
+        return Event.SETTLED
+
+    async def capture(self, now: Inspection) -> Event:
+        """Take the step's frames, all of them captured from now on."""
+        recipe, reached = now.active.recipe, self._reached
+        if reached is None:
+            raise RuntimeError("a step is captured that was not reached")
+        frames = await self._grip(now).sound_frames(recipe.imaging.frames_per_step)
+        self._devices.monitors[CAMERA].report_success()
+        self._devices.monitors[GRIPPER].report_success()
+        now.steps.append(GripStep(len(now.steps), reached, frames))
+        held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
+        if now.closed_steps >= recipe.steps.number or held or now.next_width_mm <= 0:
+            return Event.LAST_CAPTURED
+        return Event.CAPTURED
+
+    async def measure(self, now: Inspection) -> Event:
+        """Measure the captured step that is next in order, and say whether the recipe lets another one be made."""
+        now.seen.append(await self._vision.measure(now.steps[len(now.seen)]))
+        if early_stop(now.press(), now.active.recipe) is not None:
+            return Event.EARLY_STOP
+        self._goes_on.set()
+        return Event.MEASURED
+
+    async def judge(self, now: Inspection) -> Event:
+        """Judge what was measured; an inconclusive fruit may be pressed once more, by the recipe."""
+        age_s = now.seen[-1].step.last_frame.captured_s - (now.reference_s or 0.0)
+        self._metrics.reference(age_s, float(now.measures.get("reference_drift_levels") or 0.0))
+        if age_s > self._settings.reference.oldest_s:
+            now.interrupt(
+                Reason.REFERENCE_BAD,
+                messages.REFERENCE_OLD(age_s=age_s, limit_s=self._settings.reference.oldest_s),
+            )
+        recipe = now.active.recipe
+        now.verdict = judge(now.press(), recipe)
+        if now.presses_made < recipe.press.attempts and needs_second_press(now.verdict):
+            self._sets_out(now, self._off_middle(now, now.seen[-1]))
+            now.press_again()
+            self._metrics.pressed_again(recipe.name)
+            return Event.PRESS_AGAIN
+        now.outcome_name = now.verdict.outcome
+        return Event.JUDGED_ACCEPT if now.outcome_name == "PASS" else Event.JUDGED_REJECT
+
+    async def place(self, now: Inspection) -> Event:
+        """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
+        carried = self._settings.placing == "arm" and self._devices.cell.arm is not None
+        if carried:
+            await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
+        width_mm = None if carried else self._width_around(now)
+        try:
+            await self._devices.cell.gripper.open(width_mm)
+        except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
+            # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
+            # unknown needs a person.
+            await self._devices.cell.gripper.open(width_mm)
+        return Event.PLACED
+
+    @staticmethod
+    def close_as_no_result(now: Inspection, because: Event, why: Message | None) -> None:
+        """End an inspection that cannot be judged, with what was measured so far.
+
+        Args:
+            now: the inspection.
+            because: the event that ended it.
+            why: for a person.
+        """
+        now.interrupt(REASONS[because], why)
+        now.verdict = judge(now.press(), now.active.recipe)
+        now.outcome_name = "NO_RESULT"
+
+    def _grip(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> Grip:
+        deadline_s = FRAME_DEADLINE_S * self._settings.patience
+        return Grip(self._devices.cell, now.active.recipe, deadline_s, on_frame or self._measure_ahead)
+
+    def _measure_ahead(self, frame: Frame) -> None:
+        self._count(frame)
+        if not frame.faults:
+            self._vision.measure_ahead(frame)
+
+    def _count(self, frame: Frame) -> None:
+        for fault in frame.faults or ("good",):
+            self._metrics.frame(fault)
+
+    async def _touches(self, step: GripStep) -> bool:
+        self._devices.monitors[CAMERA].report_success()
+        self._devices.monitors[GRIPPER].report_success()
+        self._glanced = await self._vision.measure(step)
+        return self._glanced.contact.is_firm

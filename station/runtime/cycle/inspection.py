@@ -1,0 +1,246 @@
+"""One inspection's own state: what was triggered, seen and found, until it is a record."""
+
+import time
+from dataclasses import dataclass, field
+from math import ceil
+
+from station.channel.line import Outcome
+from station.inspection.centring import NOT_MOVED, Way
+from station.inspection.deadlines import Deadlines
+from station.inspection.evidence import AT_MM
+from station.inspection.judge import Verdict
+from station.inspection.press import Flag, Measured, Press
+from station.inspection.second_press import together
+from station.messages.message import Message
+from station.records.first_press import first_press_findings, first_press_measures
+from station.records.judgement import judgement_measures
+from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
+from station.runtime.devices.grip import GripStep
+from station.runtime.imaging.worker import MeasuredStep
+from station.runtime.recipes.active import ActiveRecipe
+from station.vocabulary import OutcomeName, Reason
+
+
+def utc_ms() -> int:
+    """Milliseconds since 1970-01-01 UTC; for records, never for waits."""
+    return time.time_ns() // 1_000_000
+
+
+@dataclass(slots=True)
+class Inspection:
+    """From the trigger to the record."""
+
+    trigger: Trigger
+    active: ActiveRecipe
+    limits: Deadlines
+    mm_per_px: float
+    calibration: str
+    """In words, for the record."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of `mm_per_px`."""
+    resolution_mm: float
+    """One count of the gripper."""
+    began_s: float = field(default_factory=time.monotonic)
+    sequence: int | None = None
+    """Once it is durable."""
+    accepted_s: float | None = None
+    reference_s: float | None = None
+    """Capture of the reference's last frame; monotonic, as are all times in s."""
+    reference_image: Image | None = None
+    before_onset_mm: float | None = None
+    """The last width at which nothing touched."""
+    met_mm: float | None = None
+    """The width at which an earlier closing met the fruit; None in the first."""
+    closings: int = 0
+    """How often the jaws have closed on the fruit."""
+    moved: Way = NOT_MOVED
+    """Where the sensor is, from its place at the taught nest."""
+    target: Way | None = None
+    """Where it has to go before the next closing; None where it stays."""
+    closed_steps: int = 0
+    """Steps of the recipe by which the jaws have closed since the first image."""
+    steps: list[GripStep] = field(default_factory=list)
+    """Captured, in order; more than `closed_steps` where they are also taken while the jaws close."""
+    seen: list[MeasuredStep] = field(default_factory=list)
+    """Measured, in order."""
+    earlier: list[Press] = field(default_factory=list)
+    """Presses on this fruit that were inconclusive; `steps` and `seen` are those of the present one."""
+    first_verdict: Verdict | None = None
+    """On the first press, where it was inconclusive."""
+    interruptions: list[Reason] = field(default_factory=list)
+    explanation: list[Message] = field(default_factory=list)
+    verdict: Verdict | None = None
+    outcome_name: OutcomeName = "NO_RESULT"
+    phases_s: dict[str, float] = field(default_factory=dict)
+    measures: dict[str, float | int | str | bool | None] = field(default_factory=dict)
+    standing: Outcome | None = None
+    """What the records hold."""
+
+    @property
+    def next_width_mm(self) -> float:
+        """The width of the next step, counted from the measured width of the first."""
+        return self._width_after(self.closed_steps + 1)
+
+    @property
+    def deciding_width_mm(self) -> float:
+        """The width of the first step that reaches the damage threshold that decides."""
+        return self._width_after(self.steps_to_decide)
+
+    @property
+    def steps_to_decide(self) -> int:
+        """How many steps from the first image reach the damage threshold that decides."""
+        recipe = self.active.recipe
+        return min(recipe.steps.number, ceil((recipe.damage.deciding_closing_mm - AT_MM) / recipe.steps.step_mm))
+
+    def _width_after(self, steps: int) -> float:
+        return self.steps[0].move.width_mm - steps * self.active.recipe.steps.step_mm
+
+    @property
+    def presses_made(self) -> int:
+        """How many presses were begun, the present one counted."""
+        return 1 + len(self.earlier)
+
+    @property
+    def onset_mm(self) -> float | None:
+        """The measured width of the first contact; None before it."""
+        return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
+
+    def interrupt(self, reason: Reason, why: Message | None) -> None:
+        """Something from outside the measurement ended or spoilt it.
+
+        Args:
+            reason: for the PLC.
+            why: for a person.
+        """
+        if reason not in self.interruptions:
+            self.interruptions.append(reason)
+        if why is not None and why not in self.explanation:
+            self.explanation.append(why)
+
+    def press_again(self) -> None:
+        """Begin another press on the fruit. Of the one before stays what was measured, not its images."""
+        self.first_verdict = self.verdict
+        self.earlier.append(self._latest())
+        self.verdict = None
+        self.let_go(self.onset_mm)
+
+    def let_go(self, met_mm: float | None) -> None:
+        """Begin another closing: what this one has shown is done with.
+
+        Args:
+            met_mm: the width at which this closing met the fruit.
+        """
+        self.met_mm, self.before_onset_mm, self.closed_steps = met_mm, None, 0
+        self.steps.clear()
+        self.seen.clear()
+
+    def forget_pictures(self) -> None:
+        """Let go of the frames, which are in the records by now or never will be."""
+        self.steps.clear()
+        self.seen.clear()
+        self.reference_image = None
+
+    def press(self) -> Press:
+        """What was measured so far, of all presses together, for the judge."""
+        return together([*self.earlier, self._latest()])
+
+    def _latest(self) -> Press:
+        """The present press."""
+        onset_mm = self.onset_mm
+        if onset_mm is None:
+            return self._press(None, 0.0, ())
+        untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
+        if self.before_onset_mm is not None:
+            untouched.append(self.before_onset_mm)
+        sooner_mm = min(untouched) - onset_mm if untouched else 0.0
+        points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
+        return self._press(onset_mm, sooner_mm, points)
+
+    def _press(self, onset_mm: float | None, sooner_mm: float, points: tuple[Measured, ...]) -> Press:
+        return Press(
+            onset_mm,
+            sooner_mm,
+            points,
+            tuple(self.interruptions),
+            self.trigger.size,
+            self.resolution_mm,
+            self.scale_uncertainty,
+        )
+
+    def record(self) -> InspectionRecord:
+        """What is to be made durable."""
+        verdict, onset_mm = self.verdict, self.onset_mm
+        deciding = verdict.deciding if verdict is not None else None
+        found = [finding.reason for finding in verdict.findings] if verdict is not None else []
+        if self.interruptions and not self.seen:
+            found = []  # that nothing was touched is no news where nothing was looked at
+        reasons = tuple(dict.fromkeys([*self.interruptions, *found]))
+        said = [finding.message for finding in verdict.findings if finding.reason in found] if verdict else []
+        return InspectionRecord(
+            outcome=self.outcome_name,
+            reasons=() if self.outcome_name == "PASS" else tuple(map(str, reasons)),
+            explanation=tuple(dict.fromkeys([*self.explanation, *said])),
+            late=Reason.LATE in self.interruptions,
+            partial=verdict.partial if verdict is not None else True,
+            area_mm2=None if deciding is None else deciding.area_mm2,
+            area_px=None if deciding is None else deciding.area_px,
+            closing_mm=None if deciding is None else deciding.closing_mm,
+            confidence=None if deciding is None else deciding.confidence,
+            ended_utc_ms=utc_ms(),
+            duration_ms=round(1000 * (time.monotonic() - self.began_s)),
+            curve=tuple(self._point(number, seen, onset_mm) for number, seen in enumerate(self.seen)),
+            phases_s=dict(self.phases_s),
+            measures={
+                **self.measures,
+                **first_press_measures(self.earlier),
+                "closings": self.closings,
+                "onset_mm": onset_mm,
+                "onset_uncertainty_mm": self.press().onset_uncertainty_mm,
+                "mm_per_px": self.mm_per_px,
+                "scale_uncertainty": self.scale_uncertainty,
+                "gripper_resolution_mm": self.resolution_mm,
+                **({} if verdict is None else judgement_measures(verdict)),
+            },
+            judgement=verdict.summary if verdict is not None else None,
+            first_press_findings=first_press_findings(self.first_verdict),
+            images=self._images(),
+        )
+
+    def _measured(self, seen: MeasuredStep, onset_mm: float) -> Measured:
+        contact = seen.contact
+        area_mm2 = contact.area_px * self.mm_per_px**2
+        return Measured(
+            closing_mm=onset_mm - seen.step.move.width_mm,
+            area_mm2=area_mm2,
+            area_px=contact.area_px,
+            confidence=contact.confidence,
+            flags=frozenset(Flag(flag.value) for flag in contact.flags),
+            changed_area_mm2=self._mm2(contact.changed_area_px),
+            changed_area_px=contact.changed_area_px,
+        )
+
+    def _point(self, number: int, seen: MeasuredStep, onset_mm: float | None) -> CurvePoint:
+        width_mm = seen.step.move.width_mm
+        return CurvePoint(
+            step=number,
+            width_mm=width_mm,
+            closing_mm=None if onset_mm is None else onset_mm - width_mm,
+            area_mm2=seen.contact.area_px * self.mm_per_px**2,
+            area_px=seen.contact.area_px,
+            confidence=seen.contact.confidence,
+            flags=tuple(sorted(flag.value for flag in seen.contact.flags)),
+            captured_s=seen.step.last_frame.captured_s - self.began_s,
+            changed_area_mm2=self._mm2(seen.contact.changed_area_px),
+            changed_area_px=seen.contact.changed_area_px,
+        )
+
+    def _mm2(self, area_px: int | None) -> float | None:
+        return None if area_px is None else area_px * self.mm_per_px**2
+
+    def _images(self) -> tuple[Image, ...]:
+        steps = [
+            image
+            for number, seen in enumerate(self.seen)
+            for image in (Image("step", number, seen.image), Image("mask", number, seen.contact.mask))
+        ]
+        return (*([] if self.reference_image is None else [self.reference_image]), *steps)

@@ -1,0 +1,87 @@
+"""Cycle time budget: the deadlines of an inspection and its phases on this cell, and what is late now."""
+
+import time
+from itertools import combinations
+
+from station.devices.arm.ur import POSES
+from station.inspection.deadlines import LONGEST_S, Deadlines, Late, Pace, deadlines, late
+from station.inspection.states import State
+from station.runtime.cycle.inspection import Inspection
+from station.runtime.devices.grip import Cell
+from station.settings.arm import ArmSettings
+from station.settings.configuration import Configuration
+from station.settings.recipe import Recipe
+
+RECORD_NO_RESULT_S = 1.0
+"""For a NO_RESULT to become durable, past the inspection's own deadline."""
+_MEASURE_S = 0.3
+_FRAMES_PER_S = 30.0
+
+
+class Pacing:
+    """The deadlines of one cell.
+
+    Args:
+        configuration: the site's.
+        cell: the devices; a camera tells its rate once it is open.
+    """
+
+    def __init__(self, configuration: Configuration, cell: Cell) -> None:
+        self._configuration, self._cell = configuration, cell
+
+    def expected(self, recipe: Recipe) -> Deadlines:
+        """The deadlines of a recipe's inspection on a machine that has nothing else to do.
+
+        Args:
+            recipe: the recipe.
+
+        Raises:
+            BadInputError: an inspection would take longer than the PLC can be told.
+        """
+        cell, configuration = self._cell, self._configuration
+        pace = Pace(
+            frames_per_s=cell.camera.description.frames_per_s or _FRAMES_PER_S,
+            arm_move_s=0.0 if cell.arm is None else longest_move_s(configuration.arm),
+            stroke_mm=cell.gripper.max_width_mm,
+            record_s=configuration.records.deadline_s,
+            measure_s=_MEASURE_S,
+        )
+        return deadlines(recipe, pace)
+
+    def limits(self, recipe: Recipe) -> Deadlines:
+        """The same with the site's patience, and its own limit of a whole inspection.
+
+        Args:
+            recipe: one that `expected` has passed.
+        """
+        expected, settings = self.expected(recipe), self._configuration.service
+        whole_s = min(settings.patience * expected.inspection_s, LONGEST_S - RECORD_NO_RESULT_S)
+        return Deadlines(
+            {state: settings.patience * limit_s for state, limit_s in expected.phases_s.items()},
+            min(whole_s, settings.inspection_deadline_s or whole_s),
+        )
+
+
+def late_now(now: Inspection, state: State, in_state_s: float) -> Late | None:
+    """What of an accepted inspection is late.
+
+    Args:
+        now: the inspection.
+        state: the cycle's.
+        in_state_s: for how long.
+    """
+    if now.accepted_s is None:
+        return None
+    since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
+    return late(now.limits, state, in_state_s, since_s)
+
+
+def longest_move_s(arm: ArmSettings) -> float:
+    """The longest way between two of the arm's places: its leading joint speeds up, travels and brakes.
+
+    Args:
+        arm: poses, speed and acceleration.
+    """
+    places = [arm.poses.joints_rad(pose) for pose in POSES]
+    ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in combinations(places, 2)]
+    return max(ways_rad) / arm.joint_speed_rad_s + arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2

@@ -1,0 +1,108 @@
+"""Triggers and outcomes in progress: the callers that wait for each, and those answered already."""
+
+import asyncio
+from collections import OrderedDict
+
+from station.channel.line import Begin, BeginReply, Outcome
+from station.messages import records as messages
+from station.records.errors import UnknownInspectionError
+from station.runtime.cycle.inspection import Inspection
+
+_REMEMBERED = 64
+
+
+class RecentTriggers:
+    """Last inspections by their sequence, with the callers that wait for them."""
+
+    def __init__(self) -> None:
+        self._outcomes: OrderedDict[int, asyncio.Future[Outcome]] = OrderedDict()
+        self._inspections: dict[int, Inspection] = {}
+        self._last: tuple[Begin, int] | None = None
+        """The last accepted trigger, until its outcome was published."""
+
+    def repeated(self, request: Begin) -> Inspection | None:
+        """Return the inspection that this trigger has begun already: a retried request begins none.
+
+        The PLC never gives an id twice in a row; an id that repeats before its outcome was published is the same fruit.
+        """
+        if self._last is None or self._last[0] != request:
+            return None
+        return self._inspections.get(self._last[1])
+
+    def accepted(self, request: Begin, now: Inspection) -> None:
+        """Add a durable trigger whose inspection has begun; earlier inspections are over and release their pictures.
+
+        Args:
+            now: with its sequence.
+        """
+        assert now.sequence is not None  # noqa: S101 (it is durable)
+        self._last = (request, now.sequence)
+        for earlier in self._inspections.values():
+            earlier.forget_pictures()
+        self._inspections[now.sequence] = now
+        self._outcomes[now.sequence] = asyncio.get_running_loop().create_future()
+        while len(self._outcomes) > _REMEMBERED:
+            forgotten, _ = self._outcomes.popitem(last=False)
+            self._inspections.pop(forgotten, None)
+
+    def ended(self, outcome: Outcome) -> None:
+        """Pass an outcome to the callers that wait for it now or later; a second one is ignored.
+
+        Args:
+            outcome: as stored.
+        """
+        waiting = self._outcomes.get(outcome.sequence)
+        if waiting is not None and not waiting.done():
+            waiting.set_result(outcome)
+
+    def published(self, outcome: Outcome) -> None:
+        """Note that an outcome was published; from now on the same trigger id is another fruit's."""
+        if self._last is not None and self._last[1] == outcome.sequence:
+            self._last = None
+        self.ended(outcome)
+
+    def inspection(self, sequence: int) -> Inspection | None:
+        """Return one of the last inspections."""
+        return self._inspections.get(sequence)
+
+    async def outcome(self, sequence: int) -> Outcome:
+        """Wait for an outcome.
+
+        Args:
+            sequence: of an inspection of this start of the station.
+
+        Raises:
+            UnknownInspectionError: none of the last has this number.
+        """
+        waiting = self._outcomes.get(sequence)
+        if waiting is None:
+            raise UnknownInspectionError(messages.NOT_THIS_START(number=sequence), messages.ASK_OPEN())
+        return await asyncio.shield(waiting)
+
+
+class PendingTrigger:
+    """One trigger between its request and its answer."""
+
+    def __init__(self, request: Begin, inspection: Inspection) -> None:
+        self.request, self.inspection = request, inspection
+        self.recording: asyncio.Future[int] | None = None
+        """Task that makes it durable; when it is cancelled, the record is withdrawn."""
+        self._answer: asyncio.Future[BeginReply] = asyncio.get_running_loop().create_future()
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether the request has its answer."""
+        return self._answer.done()
+
+    def answer(self, begun: BeginReply) -> None:
+        """Answer the request; a second answer is ignored.
+
+        Args:
+            begun: accepted or refused.
+        """
+        if not self.is_answered:
+            self._answer.set_result(begun)
+
+    async def answered(self) -> BeginReply:
+        """Wait for the answer."""
+        return await asyncio.shield(self._answer)

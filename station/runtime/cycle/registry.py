@@ -1,0 +1,129 @@
+"""Inspection registry: stores every trigger before it is accepted and every outcome before it is published."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from station.channel.line import Open, Outcome
+from station.inspection.cycle import Event
+from station.logs import inspecting
+from station.messages import operation as messages
+from station.records.errors import RecordsError
+from station.records.records import Records
+from station.runtime.cycle.inspection import Inspection
+from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.observability.log_line import log_fruit
+from station.vocabulary import Reason
+
+log = logging.getLogger(__name__)
+
+
+class InspectionRegistry:
+    """Records of this start's inspections; none is left without an outcome.
+
+    Args:
+        records: opened, or reopened once `fault` is repaired.
+        triggers: receives the outcomes for the callers that wait.
+        devices: gives the device names for the records.
+        versions: of the programs, for the records.
+    """
+
+    def __init__(
+        self, records: Records, triggers: RecentTriggers, devices: DeviceManager, versions: Mapping[str, str]
+    ) -> None:
+        self.records = records
+        self.fault: RecordsError | None = None
+        """Fault of the records, until they were reopened."""
+        self.on_outcome: Callable[[Inspection], None] = lambda _: None
+        """Called with every inspection once its outcome is durable."""
+        self._triggers, self._devices, self._versions = triggers, devices, versions
+        self._begun: list[Inspection] = []
+        """Accepted, in order, and perhaps without a durable outcome."""
+        self._closing = asyncio.Lock()
+
+    @property
+    def running(self) -> Inspection | None:
+        """Return the first inspection without a durable outcome, if any."""
+        return next((now for now in self._begun if now.standing is None), None)
+
+    async def begin(self, pending: PendingTrigger) -> None:
+        """Make a trigger durable.
+
+        Args:
+            pending: gets its record's number.
+
+        Raises:
+            RecordsError: the trigger could not be stored.
+        """
+        pending.recording = asyncio.ensure_future(self.records.begin(pending.inspection.trigger))
+        try:
+            pending.inspection.sequence = await pending.recording
+        except RecordsError as error:
+            self.fault = error
+            raise
+
+    def accepted(self, now: Inspection) -> None:
+        """Note that an inspection needs an outcome from now on."""
+        self._begun = [known for known in self._begun if known.standing is None]
+        self._begun.append(now)
+
+    async def conclude(self, now: Inspection) -> Event:
+        """Make an inspection's outcome durable; one that the records have already is not changed.
+
+        Raises:
+            RecordsError: the outcome could not be stored.
+        """
+        if now.sequence is None:
+            raise RuntimeError("an inspection without a number is recorded")
+        devices = {**self._devices.names, "calibration": now.calibration}
+        signed = replace(now.record(), devices=devices, versions=self._versions)
+        try:
+            now.standing = await self.records.conclude(now.sequence, signed)
+        except RecordsError as error:
+            self.fault = error
+            raise
+        return Event.RECORDED
+
+    def deliver(self, now: Inspection) -> None:
+        """Pass a durable outcome to the callers that wait for it.
+
+        Args:
+            now: without an outcome nothing is passed on.
+        """
+        if now.standing is not None:
+            self._triggers.ended(now.standing)
+            self.on_outcome(now)
+            areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
+            with inspecting(now.standing.sequence):
+                log_fruit(log, now.standing, now.active.recipe.name, now.record().explanation, areas)
+
+    async def close_unfinished(self) -> Event:
+        """Store NO_RESULT for every inspection that has no durable outcome.
+
+        Raises:
+            RecordsError: it cannot be stored now.
+        """
+        async with self._closing:
+            while (now := self.running) is not None:
+                now.outcome_name = "NO_RESULT"
+                if not now.interruptions:
+                    now.interrupt(Reason.RECORDS_FAULT, messages.NOT_STORED_IN_TIME())
+                await self.conclude(now)
+                self.deliver(now)
+        return Event.UNFINISHED_CLOSED
+
+    async def outcome(self, sequence: int) -> Outcome:
+        """Wait for an inspection's outcome; that of an earlier start is returned at once."""
+        if self._triggers.inspection(sequence) is None:
+            for outcome in (await self.records.open_inspections()).ended:
+                if outcome.sequence == sequence:
+                    return outcome
+        return await self._triggers.outcome(sequence)
+
+    async def open_inspections(self) -> Open:
+        """Return the inspections that began and were not acknowledged."""
+        held, now = await self.records.open_inspections(), self.running
+        running = None if now is None or now.sequence is None else (now.sequence, now.trigger.trigger_id)
+        return Open(running=running, outcomes=held.ended)

@@ -1,0 +1,332 @@
+"""Inspection service: carries out the cycle's actions, and answers requests for inspections."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from station.channel.line import Begin, BeginReply, Outcome
+from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
+from station.inspection.states import STATES, State
+from station.messages import operation as messages
+from station.messages.message import Message, message_of
+from station.records.errors import RecordsError
+from station.records.model import Trigger
+from station.records.records import Records
+from station.runtime.alarms.manager import AlarmManager
+from station.runtime.alarms.outcome_monitor import OutcomeMonitor
+from station.runtime.cycle.actions import Inspector
+from station.runtime.cycle.inspection import Inspection, utc_ms
+from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
+from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
+from station.runtime.cycle.registry import InspectionRegistry
+from station.runtime.cycle.runner import Conductor, Happened, Work, event_of
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.health import Liveness
+from station.runtime.observability.metrics import Metrics
+from station.runtime.recipes.active import ActiveRecipe
+from station.settings.configuration import Configuration
+from station.vocabulary import Refusal
+
+CYCLE = "cycle"
+_LEASE_S = 2.0
+
+
+class Service:
+    """Performer of the cycle, and server of the line's requests.
+
+    Args:
+        devices: the devices; gets the start and end of inspections.
+        inspector: carries out what needs the devices.
+        alarms: raised and cleared by the cycle.
+        liveness: gets the cycle's progress.
+        versions: of the programs, for the records.
+        calibrated: the scale that areas are reported in.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        records: Records,
+        devices: DeviceManager,
+        inspector: Inspector,
+        alarms: AlarmManager,
+        metrics: Metrics,
+        liveness: Liveness,
+        versions: Mapping[str, str],
+        calibrated: ActiveCalibration,
+    ) -> None:
+        self._settings, self._calibrated = configuration.service, calibrated
+        self._resolution_mm = configuration.gripper.calibration.mm_per_count
+        self._devices, self._inspector = devices, inspector
+        self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
+        self.conductor = Conductor(self)
+        self.triggers = RecentTriggers()
+        self.registry = InspectionRegistry(records, self.triggers, devices, versions)
+        self.pacing = Pacing(configuration, devices.cell)
+        self.active: ActiveRecipe | None = None
+        """The recipe that the next fruit is inspected with."""
+        self.reset_wanted = self._settings.automatic_reset
+        """Whether a stopped station makes itself ready."""
+        self.stop_requested = False
+        """The end of the process was requested."""
+        self.stop_wanted = False
+        """A person has stopped the station, until the next reset."""
+        self.on_published: Callable[[Outcome], None] = lambda _: None
+        """Called once with every outcome that the PLC was given."""
+        self._pending: PendingTrigger | None = None
+        self._now: Inspection | None = None
+        self._beginning = asyncio.Lock()
+        self._background: set[asyncio.Task[None]] = set()
+        self._late_in: State | None = None
+        self._outcomes = OutcomeMonitor(alarms)
+
+    @property
+    def state(self) -> State:
+        """Return the cycle's state."""
+        return self.conductor.state
+
+    # Requests of the line.
+
+    async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> BeginReply:
+        """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
+
+        Args:
+            request: the trigger.
+            refusal: why none may begin now.
+            lot: of the fruit.
+        """
+        async with self._beginning:
+            if (same := self.triggers.repeated(request)) is not None:
+                return self._accepted(same)
+            if refusal is not None or self.active is None:
+                return self._refused(refusal or Refusal.NOT_READY)
+            trigger = Trigger(
+                request.trigger_id,
+                request.encoder,
+                lot,
+                utc_ms(),
+                self.active.snapshot,
+                self._devices.simulated,
+                request.fruit_length_mm_x10,
+                request.size_class,
+            )
+            limits = self.pacing.limits(self.active.recipe)
+            scale = self._calibrated.in_force
+            now = Inspection(
+                trigger,
+                self.active,
+                limits,
+                scale.mm_per_px,
+                str(scale.words),
+                scale.scale_uncertainty,
+                self._resolution_mm,
+            )
+            self._pending = PendingTrigger(request, now)
+            self.conductor.post(Event.TRIGGER)
+            return await self._pending.answered()
+
+    async def published(self, outcome: Outcome) -> None:
+        """Store that the PLC was given an outcome, and count it, once; a fruit still under inspection is cancelled.
+
+        Args:
+            outcome: the final one.
+        """
+        first = await self.registry.records.published(outcome)
+        self.triggers.published(outcome)
+        if first:
+            now = self.triggers.inspection(outcome.sequence)
+            fruit = "" if now is None else now.active.recipe.name
+            known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
+            self._metrics.inspection(fruit, outcome, *known)
+            self._outcomes.add(outcome)
+            self.on_published(outcome)
+        running = self.registry.running
+        if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
+            self.conductor.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
+
+    # Actions of the cycle: see `Performer`.
+
+    def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
+        """Carry out an action of the cycle."""
+        match action:
+            case Action.OPEN_JAWS:
+                return self._inspector.open_jaws
+            case Action.GO_HOME:
+                return self._inspector.go_home
+            case Action.CHECK_DEVICES:
+                return self._check
+            case Action.CLOSE_UNFINISHED:
+                return self.registry.close_unfinished
+            case Action.RECOVER_ARM:
+                return self._recover_arm
+            case Action.RECORD_TRIGGER:
+                return self._record_trigger
+            case Action.ACCEPT_TRIGGER:
+                self._accept()
+                return None
+            case Action.REFUSE_TRIGGER:
+                self._refuse(because)
+                return None
+            case Action.READ_DEVICES:  # the monitors read for ever, and `tick` posts the event when all are healthy
+                return None
+            case _:
+                pass
+        now = self._now
+        if now is None:
+            raise RuntimeError(f"{action} without an inspection")
+        match action:
+            case Action.CLOSE_AS_NO_RESULT:
+                self._inspector.close_as_no_result(now, because.event, because.why)
+                return None
+            case Action.RECORD:
+                return partial(self.registry.conclude, now)
+            case Action.PUBLISH:
+                self.registry.deliver(now)
+                return None
+            case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
+                return partial(self._inspector.place, now)
+            case _:
+                return partial(getattr(self._inspector, action.value), now)
+
+    async def halt(self) -> None:
+        """Stop the devices where they are."""
+        await self._devices.halt()
+
+    def raise_alarm(self, told: Raise, why: Message | None) -> None:
+        """Raise an alarm of the cycle."""
+        self.alarms.raise_(told.alarm, why)
+
+    def failed(self, fault: StationError) -> None:
+        """Report a fault to the device's monitor before the cycle reads the devices' state."""
+        self._devices.report_fault(fault)
+
+    def refused(self, state: State, event: Event) -> None:
+        """Count an event that the table does not list; a trigger among them is answered."""
+        self._metrics.unexpected()
+        if event is Event.TRIGGER and self._pending is not None and not self._pending.is_answered:
+            self._pending.answer(self._refused(STATES[state].refusal or Refusal.NOT_READY))
+
+    def entered(self, state: State, after: State, took_s: float) -> None:
+        """Store the phase's time, and do what depends on the new state."""
+        self._late_in = None
+        if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
+            self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
+        inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
+        self._devices.use(by_inspection=inspecting_now)
+        if state in {State.LATCHED, State.CARRIED}:
+            self.reset_wanted = False
+        if state is State.IDLE:
+            self.reset_wanted = self._settings.automatic_reset
+            self.alarms.clear(AlarmId.FRUIT_HELD)
+        if state is State.STOPPED and self.reset_wanted and not (self.stop_requested or self.stop_wanted):
+            self.conductor.post(Event.RESET)
+
+    def tick(self) -> None:
+        """Feed the watchdogs, and give the cycle the events of elapsed time."""
+        self._liveness.progress(CYCLE)
+        if not self._liveness.stuck():
+            self._devices.renew_health(_LEASE_S)
+        self._report_late()
+        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+            self._late_in = self.state
+            self.conductor.post(Event.STOP, messages.STATION_ENDS())
+
+    def device_changed(self, fault: StationError | None) -> None:
+        """Handle a monitor's report that a device's state has changed.
+
+        Args:
+            fault: from now on; None for no fault.
+        """
+        if fault is not None:
+            self.conductor.post(event_of(fault), message_of(fault))
+
+    # The actions.
+
+    async def _check(self) -> Event:
+        if self.stop_requested or self.stop_wanted:
+            return Event.STOP
+        for fault in (*self._devices.faults.values(), self.registry.fault):
+            if fault is not None:
+                raise fault
+        return Event.READY
+
+    async def _recover_arm(self) -> Event:
+        await self._devices.restart_program()
+        return Event.RECOVERED
+
+    async def _record_trigger(self) -> Event | None:
+        pending = self._pending
+        if pending is None:
+            raise RuntimeError("no trigger is waiting")
+        try:
+            await self.registry.begin(pending)
+        except RecordsError:
+            pending.answer(self._refused(Refusal.RECORDS_FULL))
+            raise
+        return Event.TRIGGER_RECORDED
+
+    def _accept(self) -> None:
+        pending, self._pending = self._pending, None
+        if pending is None:
+            raise RuntimeError("no trigger is waiting")
+        self._now = pending.inspection
+        self._take_on(pending)
+
+    def _refuse(self, because: Happened) -> None:
+        """End a trigger without an inspection: refused if it is not durable yet, else accepted and closed."""
+        pending, self._pending = self._pending, None
+        if pending is None:
+            return
+        now = pending.inspection
+        if now.sequence is None:
+            if pending.recording is not None:
+                pending.recording.cancel()  # which takes the record back
+            if not pending.is_answered:
+                pending.answer(self._refused(STATES[self.state].refusal or Refusal.NOT_READY))
+            return
+        self._take_on(pending)
+        now.interrupt(REASONS[because.event], because.why)
+        closing = asyncio.create_task(self._close_refused(), name="closing a refused trigger")
+        self._background.add(closing)
+        closing.add_done_callback(self._background.discard)
+
+    def _take_on(self, pending: PendingTrigger) -> None:
+        now = pending.inspection
+        now.accepted_s = time.monotonic()
+        self.triggers.accepted(pending.request, now)
+        self.registry.accepted(now)
+        pending.answer(self._accepted(now))
+
+    # Small parts.
+
+    def _accepted(self, now: Inspection) -> BeginReply:
+        left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
+        if now.accepted_s is not None:
+            left_s -= time.monotonic() - now.accepted_s
+        return BeginReply(sequence=now.sequence, deadline_s=max(0.0, left_s))
+
+    def _refused(self, refusal: Refusal) -> BeginReply:
+        self._metrics.refused(refusal)
+        return BeginReply(refusal=refusal)
+
+    def _report_late(self) -> None:
+        if self._now is None or self._late_in is self.state:
+            return
+        found = late_now(self._now, self.state, self.conductor.in_state_s)
+        if found is not None:
+            self._late_in = self.state
+            took = {"took_s": found.took_s, "limit_s": found.allowed_s}
+            if found.event is Event.LATE:
+                why = messages.INSPECTION_LATE(**took)
+            else:
+                why = messages.PHASE_LATE(**took, activity=STATES[self.state].activity)
+            self.conductor.post(found.event, why)
+
+    async def _close_refused(self) -> None:
+        with contextlib.suppress(RecordsError):  # the registry still has it, and the next clearing tries again
+            await self.registry.close_unfinished()

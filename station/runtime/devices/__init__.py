@@ -1,0 +1,1 @@
+"""The cell's devices while the station runs: connected, watched, moved."""

@@ -1,0 +1,278 @@
+"""Device manager: opens and monitors the devices, and recovers them where that is safe."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+
+from station.channel.panel import RecoveryName
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.arm.ur import UrArm
+from station.devices.camera.interface import CameraError, describe
+from station.devices.camera.open import camera_from
+from station.devices.gripper.errors import (
+    NEEDS_ACTIVATION,
+    GripperEmergencyStopError,
+    GripperError,
+    GripperFaultError,
+    GripperNotActiveError,
+)
+from station.devices.gripper.robotiq import make_gripper
+from station.errors import StationError
+from station.messages import camera as camera_messages
+from station.messages import device as device_messages
+from station.messages import gripper as gripper_messages
+from station.runtime.devices.grip import FRAME_DEADLINE_S, Cell, FramesError
+from station.runtime.devices.monitor import DeviceMonitor
+from station.settings.configuration import Configuration
+
+CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
+TITLES = {CAMERA: device_messages.CAMERA(), GRIPPER: device_messages.GRIPPER(), ARM: device_messages.ARM()}
+SAFETY_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
+"""Stops by the arm's safety controller that a person has to check at the cell."""
+_BAD_FRAMES = 3
+_STALE_CHECKS = 3
+"""Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
+_ARM_PAUSE_S = 0.5
+"""The driver reconnects to the arm by itself; only its state is read."""
+_OPEN_WITHIN_MM = 2.0
+_OVER_TEMPERATURE = 0x8
+
+
+class DeviceManager:
+    """Camera, gripper and arm of one station with their monitors.
+
+    Args:
+        on_change: gets a device's name and its fault from now on, None for no fault.
+        on_progress: gets a device's name after each of its checks.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        on_change: Callable[[str, StationError | None], None],
+        on_progress: Callable[[str], None],
+    ) -> None:
+        arm = None if configuration.service.bench else UrArm(configuration.arm)
+        self._arm, self._configuration = arm, configuration
+        self.cell = Cell(camera_from(configuration.camera), make_gripper(configuration.gripper), arm)
+        self.simulated = (
+            configuration.camera.driver != "digit"
+            or (arm is not None and configuration.arm.host.startswith("127."))
+            or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
+        )
+        self.confirmed_clear = False
+        """A person has confirmed that nothing is between the jaws; valid for one activation."""
+        self._bad_frames, self._stale_checks = 0, 0
+        self._not_activated: StationError | None = None
+        checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
+        if arm is not None:
+            checks[ARM] = self._check_arm
+        self.monitors = {
+            name: DeviceMonitor(
+                name,
+                TITLES[name],
+                check,
+                _ARM_PAUSE_S if name == ARM else configuration.service.retry_longest_s,
+                lambda fault, name=name: on_change(name, fault),
+                lambda name=name: on_progress(name),
+            )
+            for name, check in checks.items()
+        }
+        self._tasks: list[asyncio.Task[None]] = []
+
+    async def open(self) -> None:
+        """Start the monitors; they wait for a device that is away."""
+        if self._arm is not None:
+            await self._arm.open()
+        self._tasks = [
+            asyncio.create_task(watch.run(), name=f"watch of the {name}") for name, watch in self.monitors.items()
+        ]
+
+    async def close(self) -> None:
+        """Close the devices. Nothing is moved."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.cell.camera.close()
+        with contextlib.suppress(GripperError):
+            await self.cell.gripper.close()
+        if self._arm is not None:
+            await self._arm.close()
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Return the devices' names for the records."""
+        camera, gripper = self.cell.camera.description.name, self._configuration.gripper.driver
+        names = {CAMERA: camera, GRIPPER: f"Robotiq 2F-85 by {gripper}"}
+        return names if self._arm is None else {**names, ARM: f"UR10e at {self._configuration.arm.host}"}
+
+    @property
+    def faults(self) -> dict[str, StationError]:
+        """Return the faults by device; empty if all are healthy."""
+        return {name: watch.fault for name, watch in self.monitors.items() if watch.fault is not None}
+
+    def healthy_since(self, since_s: float) -> bool:
+        """Check that every device was found healthy after a time, and none has a fault.
+
+        Args:
+            since_s: monotonic time.
+        """
+        watches = self.monitors.values()
+        return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
+
+    def use(self, *, by_inspection: bool) -> None:
+        """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored.
+
+        Args:
+            by_inspection: whether an inspection is under way.
+        """
+        for name in (CAMERA, GRIPPER):
+            self.monitors[name].in_use = by_inspection
+
+    def report_fault(self, fault: StationError) -> None:
+        """Report a fault that a caller met while it worked with a device."""
+        match fault:
+            case ArmFault():
+                self.monitors[ARM].report_fault(fault)
+            case GripperError():
+                self.monitors[GRIPPER].report_fault(fault)
+            case CameraError() | FramesError():
+                self.monitors[CAMERA].report_fault(fault)
+            case _:
+                pass
+
+    @property
+    def active_stop(self) -> StationError | None:
+        """Return the active safety stop that only a person may end."""
+        return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
+
+    def renew_health(self, lease_s: float) -> None:
+        """Let the arm move for a time; its controller stops it when the lease runs out.
+
+        Args:
+            lease_s: seconds from now.
+        """
+        if self._arm is not None:
+            self._arm.renew_health(lease_s)
+
+    async def halt(self) -> None:
+        """Stop arm and gripper where they are. Never raises: the monitors find a device that does not answer."""
+
+        async def quietly(stop: Callable[[], object]) -> None:
+            with contextlib.suppress(StationError, TimeoutError):
+                result = stop()
+                if asyncio.iscoroutine(result):
+                    await result
+
+        await asyncio.gather(
+            quietly(self.cell.gripper.stop), quietly(self._arm.stop if self._arm is not None else lambda: None)
+        )
+
+    async def recover(self, what: RecoveryName) -> None:
+        """Recover the arm after a stop, as a person at the cell requested; nothing moves by it.
+
+        Args:
+            what: the stop that the person has checked.
+
+        Raises:
+            ArmFault: the recovery failed.
+        """
+        if self._arm is None:
+            return
+        match what:
+            case "protective-stop":
+                await self._arm.confirm_protective_stop()
+            case "power":
+                await self._arm.power_on_and_release_brakes()
+            case "program":
+                await self._arm.upload_again()
+        self.monitors[ARM].check_now()
+
+    async def restart_program(self) -> None:
+        """Restart the arm's program after a stop whose cause is gone; a playing one does not change.
+
+        Raises:
+            ArmFault: the program does not play.
+        """
+        if self._arm is not None:
+            await self._arm.upload_again()
+            self.monitors[ARM].check_now()
+
+    @property
+    def needs_program_restart(self) -> bool:
+        """Check whether the arm stopped only because this station was too slow for the controller's watchdog.
+
+        Such a stop is the station's own, as after a lost link: once the station is healthy no person is needed.
+        """
+        fault = self.monitors[ARM].fault if ARM in self.monitors else None
+        return isinstance(fault, ArmFault) and fault.cause is ArmCause.WATCHDOG
+
+    async def activate_if_safe(self) -> None:
+        """Activate a gripper that lost its activation, unless a fruit may be between the jaws: it would be crushed.
+
+        Nothing is between them if the arm is away from the nest, or a person has confirmed it. With the jaws open at
+        the nest the arm leaves the nest first.
+
+        Raises:
+            StationError: activation is not safe, with the remedy; or it failed.
+        """
+        reading = await self.cell.gripper.read()
+        if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
+            return
+        try:
+            if not self.confirmed_clear:
+                await self._leave_the_nest(reading.width_mm)
+            self.confirmed_clear = False
+            await self.cell.gripper.activate()
+        except StationError as error:
+            self._not_activated = error
+            raise
+        self._not_activated = None
+
+    async def _leave_the_nest(self, width_mm: float) -> None:
+        refusal = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
+        if self._arm is None:
+            raise refusal
+        state = await self._arm.state()
+        if state.fault is not None:
+            raise state.fault
+        if state.at == "nest" and width_mm > self.cell.gripper.max_width_mm - _OPEN_WITHIN_MM:
+            await self._arm.move_to("above_nest")
+        elif state.at not in {"home", "above_nest"}:
+            raise refusal
+
+    async def _check_camera(self) -> None:
+        await self.cell.camera.open()
+        newer_than_s = time.monotonic()
+        frame = await self.cell.camera.frame(newer_than_s, FRAME_DEADLINE_S)
+        self._bad_frames = self._bad_frames + 1 if frame.faults else 0
+        known_ill = isinstance(self.monitors[CAMERA].fault, FramesError)  # which only a good frame ends
+        if self._bad_frames >= _BAD_FRAMES or (frame.faults and known_ill):
+            raise FramesError(
+                camera_messages.BAD_FRAMES(number=self._bad_frames, faults=describe(frame.faults)),
+                frame.faults,
+            )
+
+    async def _check_gripper(self) -> None:
+        reading = await self.cell.gripper.read()
+        if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
+            raise self._not_activated or GripperFaultError(reading.fault_code)
+        if not reading.active:
+            raise self._not_activated or GripperNotActiveError(
+                gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT()
+            )
+
+    async def _check_arm(self) -> None:
+        assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
+        fault = (await self._arm.state()).fault
+        stale = fault is not None and fault.cause is ArmCause.STALE
+        self._stale_checks = self._stale_checks + 1 if stale else 0
+        if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:
+            raise fault
+
+
+def _is_stop(fault: StationError) -> bool:
+    """Check whether a fault is a safety stop, as the arm or the gripper on it reports it."""
+    stopped_arm = isinstance(fault, ArmFault) and fault.cause in SAFETY_STOPS
+    return stopped_arm or isinstance(fault, GripperEmergencyStopError)

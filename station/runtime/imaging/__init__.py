@@ -1,0 +1,1 @@
+"""Reference and measurement of the frames while the station runs."""

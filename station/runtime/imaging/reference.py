@@ -1,0 +1,162 @@
+"""Reference check: whether a picture of the untouched gel may be the reference of a measurement."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from station.devices.camera.interface import Image
+from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
+from station.messages import grip as messages
+from station.messages.message import Message
+from station.runtime.state_files import StateFiles
+from station.settings.segmentation import Segmentation
+from station.settings.service import ReferenceSettings
+from station.vision.contact import Flag, Method
+from station.vision.methods import make_method
+
+_DETAIL_PX = (5.0, 15.0)
+"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
+_SATURATED_LEVEL = 250
+GOLDEN = "golden_reference.png"
+
+
+ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
+"""Alarms that a refused reference raises."""
+
+
+class BadReferenceError(StationError):
+    """The picture cannot be a reference; the message gives the reason and the remedy."""
+
+    def __init__(self, alarm: AlarmId, message: Message) -> None:
+        super().__init__(message)
+        self.alarm = alarm
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceProperties:
+    """Properties of a reference."""
+
+    sharpness: float
+    """Root mean square of its detail, grey levels."""
+    saturated_share: float
+    drift_levels: float
+    """Root mean square of the light's change since the golden reference; 0 if there is none yet."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedReference:
+    """A golden reference, prepared for comparisons."""
+
+    shape: tuple[int, ...]
+    sharpness: float
+    method: Method
+    renewal: Message
+    """Instruction to make another one."""
+
+
+class GoldenReference:
+    """Golden reference: the gel when a person last checked that it was clean, stored in the home folder.
+
+    For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
+    the gel or its cleaning, a person removes the file and the next reference replaces it.
+
+    Args:
+        state_files: state files of the home folder.
+        calibrated: returns the calibration's file; None if there is none.
+    """
+
+    def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+        self._state_files, self._calibrated = state_files, calibrated
+        self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
+
+    def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
+        """Return the golden reference, prepared for comparisons; None if there is none that can be read.
+
+        Args:
+            segmentation: of the recipe; finds a contact between the golden and another reference.
+        """
+        data, renewal = self._read()
+        if data is None:
+            return None
+        if self._prepared is None or self._prepared[:2] != (data, segmentation):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+            if picture is None:
+                return None
+            image = np.asarray(picture, np.uint8)
+            self._prepared = (
+                data,
+                segmentation,
+                PreparedReference(image.shape, sharpness(image), make_method([image], segmentation), renewal),
+            )
+        return self._prepared[2]
+
+    def store_first(self, image: Image) -> None:
+        """Store a picture as the golden reference if there is none yet.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8, BGR.
+        """
+        if self._read()[0] is None:
+            self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+
+    def _read(self) -> tuple[bytes | None, Message]:
+        """Return its file's content, and the instruction to make another one."""
+        calibrated = self._calibrated()
+        if calibrated is not None and (data := self._state_files.read(str(calibrated))) is not None:
+            return data, messages.RENEW_BY_CALIBRATION()
+        return self._state_files.read(GOLDEN), messages.RENEW_BY_REMOVAL(file=GOLDEN)
+
+
+def check_reference(image: Image, golden: PreparedReference | None, settings: ReferenceSettings) -> ReferenceProperties:
+    """Check a candidate reference.
+
+    Args:
+        image: the median of frames taken with nothing touching the gel, shape (height, width, 3), dtype uint8.
+        golden: None if there is none yet.
+        settings: limits for a good reference.
+
+    Raises:
+        BadReferenceError: it is not good enough.
+    """
+    saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
+    if saturated > settings.saturated_share:
+        raise BadReferenceError(
+            AlarmId.CAMERA_SATURATED,
+            messages.REFERENCE_SATURATED(found=100 * saturated, limit=100 * settings.saturated_share),
+        )
+    detail = sharpness(image)
+    if golden is None or golden.shape != image.shape:
+        return ReferenceProperties(detail, saturated, 0.0)
+    contact = golden.method.measure(image)
+    drift = contact.drift_levels or 0.0
+    share = detail / golden.sharpness
+    if share < settings.least_sharpness:
+        raise BadReferenceError(
+            AlarmId.CAMERA_DIRTY,
+            messages.REFERENCE_BLURRED(found=100 * share, limit=100 * settings.least_sharpness),
+        )
+    if drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
+        raise BadReferenceError(
+            AlarmId.CAMERA_LED_DEAD,
+            messages.REFERENCE_LIGHT(levels=drift, renewal=golden.renewal),
+        )
+    if contact.found if contact.gate is None else contact.gate > settings.most_change:
+        raise BadReferenceError(
+            AlarmId.REFERENCE_BAD,
+            messages.REFERENCE_TOUCHED(renewal=golden.renewal),
+        )
+    return ReferenceProperties(detail, saturated, drift)
+
+
+def sharpness(image: Image) -> float:
+    """Return the root mean square of the detail between two scales, grey levels.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+    """
+    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
+    return float(np.sqrt(np.mean((finer - coarser) ** 2)))

@@ -1,0 +1,66 @@
+"""Last good configuration: the station runs by it while its file is broken."""
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from station.runtime.state_files import StateFiles
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.environment import CONFIG_VARIABLE, variable
+from station.settings.problems import SettingsError
+
+_FOLDER = "last_good"
+
+
+def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = None) -> tuple[Configuration, str]:
+    """Read the configuration; if it is broken, return the last good one of the same file.
+
+    A good configuration is stored in its home folder. A broken one does not name its home folder: the folder of the
+    environment, the file's folder and the default are searched.
+
+    Args:
+        file: the file that the user named; None: found as `load_configuration` does.
+        environ: the environment; the process's own by default.
+
+    Returns:
+        The configuration, and the error in its files; empty for none.
+
+    Raises:
+        SettingsError: it is broken, and there is no last good one.
+    """
+    environ = os.environ if environ is None else environ
+    name = f"{_FOLDER}/{_key(file, environ)}.json"
+    try:
+        configuration = load_configuration(file, environ)
+    except SettingsError as error:
+        for home in _homes(file, environ):
+            data = StateFiles(home).read(name)
+            if data is not None:
+                try:
+                    return Configuration.model_validate_json(data), str(error)
+                except ValidationError:
+                    continue
+        raise
+    StateFiles(configuration.home).write(name, configuration.model_dump_json().encode())
+    return configuration, ""
+
+
+def _key(file: Path | None, environ: Mapping[str, str]) -> str:
+    """Return a name for the configuration's source, so that those of two stations are never mixed up."""
+    named = file or environ.get(CONFIG_VARIABLE) or ""
+    place = str(Path(named).absolute()) if named else "default"
+    return hashlib.sha256(place.encode()).hexdigest()[:16]
+
+
+def _homes(file: Path | None, environ: Mapping[str, str]) -> list[Path]:
+    """Return the possible home folders, likeliest first."""
+    default = Configuration().home
+    homes = [environ[variable(("home",))]] if environ.get(variable(("home",))) else []
+    named = file or environ.get(CONFIG_VARIABLE)
+    if named:
+        beside = Path(named).absolute().parent
+        homes += [beside / default, beside]
+    return [Path(home).absolute() for home in (*homes, default)]

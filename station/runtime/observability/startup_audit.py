@@ -1,0 +1,60 @@
+"""Audit entries of a start, of its end, and of settings changed between two starts."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from station.records.audit import STATION, AuditEntry
+from station.runtime.state_files import StateFiles
+from station.settings.configuration import Configuration
+
+_LAST = "audited_configuration.json"
+_HIDDEN = ("password", "secret", "token", "pin")
+"""Settings with these words in their name are audited by their hash."""
+
+
+def start_entries(
+    boot: str, configuration: Configuration, state_files: StateFiles, versions: Mapping[str, str], broken: str
+) -> tuple[AuditEntry, ...]:
+    """Make the entries of a start, with the settings that changed since the previous start.
+
+    Args:
+        boot: name of this start.
+        configuration: in force.
+        state_files: stores the configuration of the last start.
+        versions: of the programs.
+        broken: error of the configuration's file; its last good form is in force then.
+    """
+    values = dict(_flat(configuration.model_dump(mode="json"), ""))
+    text = json.dumps(values, sort_keys=True)
+    before = json.loads(state_files.read(_LAST) or b"null")
+    state_files.write(_LAST, text.encode())
+    sha256 = hashlib.sha256(text.encode()).hexdigest()
+    told = {"boot": boot, "configuration_sha256": sha256, **versions} | ({"broken": broken} if broken else {})
+    start = AuditEntry(STATION, STATION, "service.started", "station", "", None, told)
+    if not isinstance(before, dict) or before == values:
+        return (start,)
+    changed = sorted(name for name in {*before, *values} if before.get(name) != values.get(name))
+    old, new = ({name: each.get(name) for name in changed} for each in (before, values))
+    return start, AuditEntry("configuration", STATION, "settings.changed", "station.yaml or environment", "", old, new)
+
+
+def end_entry(boot: str, *, requested: bool) -> AuditEntry:
+    """Make the entry of an end.
+
+    Args:
+        boot: name of the start.
+        requested: the end was requested, and is not caused by a failure.
+    """
+    return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})
+
+
+def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _flat(inner, f"{path}.{name}" if path else str(name))
+    elif value is not None and any(word in path.rpartition(".")[2] for word in _HIDDEN):
+        yield path, f"sha256 {hashlib.sha256(str(value).encode()).hexdigest()[:16]}"
+    else:
+        yield path, value

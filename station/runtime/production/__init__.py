@@ -1,0 +1,1 @@
+"""Production: commands of PLC and operator, lots, readiness."""

@@ -1,0 +1,204 @@
+"""Housekeeping outside of inspections: recovers what an inspection needs where that is safe, and raises alarms."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+
+from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
+from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import Event
+from station.inspection.states import State
+from station.messages import operation as messages
+from station.messages.message import Message, joined, message_of
+from station.records.errors import RecordsError
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import GRIPPER, DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.audit_logger import AuditLogger
+from station.runtime.observability.health import Liveness
+from station.runtime.observability.metrics import Metrics
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.runtime.recipes.active import ActiveRecipes
+from station.supervision import restarts
+
+UPKEEP = "upkeep"
+PERIOD_S = 0.2
+_ALARMS_EVERY_S = 1.0
+_BOOK_EVERY_S = 2.0
+_CLOCK_STEP_S = 2.0
+_MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
+_MB = 1_000_000
+_AWAY = {State.UNKNOWN, State.HELD}
+
+
+class Housekeeping:
+    """One task beside the cycle.
+
+    Args:
+        interlock: readiness, for the metrics.
+        plc_commands: raises the line's alarms.
+        recipes: the recipes; read again regularly, because people edit and approve them.
+        audit: gets the findings.
+        metrics: gets the readiness.
+        liveness: gets this task's progress.
+        calibrated: age of the sensor's calibration.
+        hmi_fault: returns the fault of the HMI's process; None for none.
+        outbox: returns the outbox's delay, None for none.
+        broken: error of the configuration at the start; None for none.
+        reserve_mb: free disk space below which nothing is inspected.
+        longest_pause_s: between two attempts to recover something.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        devices: DeviceManager,
+        interlock: Interlock,
+        plc_commands: PlcCommands,
+        recipes: ActiveRecipes,
+        audit: AuditLogger,
+        metrics: Metrics,
+        liveness: Liveness,
+        calibrated: ActiveCalibration,
+        hmi_fault: Callable[[], Message | None],
+        outbox: Callable[[], Message | None],
+        *,
+        broken: Message | None,
+        reserve_mb: int,
+        longest_pause_s: float,
+    ) -> None:
+        self._service, self._devices, self._interlock, self._plc_commands, self._recipes = (
+            service,
+            devices,
+            interlock,
+            plc_commands,
+            recipes,
+        )
+        self._metrics, self._liveness, self._audit, self._calibrated = metrics, liveness, audit, calibrated
+        self._hmi_fault = hmi_fault
+        self._book_at_s, self._outbox = time.monotonic(), outbox
+        self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
+        self._logged_ready_s = 0.0
+        self._alarms_at_s = 0.0
+        self._clock_offset_s = time.time() - time.monotonic()
+        self._pause_s, self._again_s = PERIOD_S, 0.0
+        self._restarts_counted: dict[str, int] = {}
+
+    async def run(self) -> None:
+        """Run until cancelled."""
+        while True:
+            if self._service.state in _AWAY:
+                await self._recover()
+            else:
+                self._pause_s, self._again_s = PERIOD_S, 0.0
+            if time.monotonic() - self._alarms_at_s > _ALARMS_EVERY_S:
+                self._alarms_at_s = time.monotonic()
+                self._update_alarms()
+            if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
+                await self._refresh_recipes()
+            self._metrics.ready(ready=self._interlock.refusal()[0] is None)
+            self._liveness.progress(UPKEEP)
+            await asyncio.sleep(PERIOD_S)
+
+    async def _refresh_recipes(self) -> None:
+        """Read what people changed in the recipes. The current lot does not change."""
+        await asyncio.to_thread(self._recipes.refresh)
+        self._book_at_s = time.monotonic()
+        noticed, self._recipes.noticed = self._recipes.noticed, []
+        self._audit.log(*noticed)
+
+    async def _recover(self) -> None:
+        service = self._service
+        await self._try_recovery()
+        entered_s = service.conductor.entered_s
+        if (
+            service.registry.fault is None
+            and self._logged_ready_s < entered_s
+            and self._devices.healthy_since(entered_s)
+        ):
+            self._logged_ready_s = time.monotonic()
+            service.conductor.post(Event.READY)
+
+    async def _try_recovery(self) -> None:
+        """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
+        activate = self._activation_is_lost and set(self._devices.faults) == {GRIPPER}
+        play = self._devices.needs_program_restart and not self._liveness.stuck()
+        if time.monotonic() < self._again_s or not (activate or play or self._service.registry.fault is not None):
+            return
+        self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
+        await self._reopen_records()
+        with contextlib.suppress(StationError):
+            if activate:
+                await self._devices.activate_if_safe()
+            elif play:
+                await self._devices.restart_program()
+        self._again_s = time.monotonic() + self._pause_s
+
+    @property
+    def _activation_is_lost(self) -> bool:
+        return isinstance(self._devices.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
+
+    async def _reopen_records(self) -> None:
+        service = self._service
+        if service.registry.fault is None:
+            return
+        try:
+            await service.registry.records.reopen()
+            free_mb = service.registry.records.status().free_bytes / _MB
+            if free_mb >= self._reserve_mb:
+                service.registry.fault = None
+        except RecordsError as error:
+            service.registry.fault = error
+
+    def _update_alarms(self) -> None:
+        service, alarms = self._service, self._service.alarms
+        alarms.tick()
+        for name, watch in self._devices.monitors.items():
+            alarms.set_device_fault(name, watch.reported_fault)
+        fault = service.registry.fault
+        alarms.update(AlarmId.RECORDS_NOT_WRITABLE, None if fault is None else message_of(fault))
+        free_mb = service.registry.records.status().free_bytes / _MB
+        alarms.update(
+            AlarmId.DISK_LOW,
+            messages.DISK_LOW(free_mb=free_mb, reserve_mb=self._reserve_mb) if free_mb < 2 * self._reserve_mb else None,
+        )
+        alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
+        problems = self._recipes.problems
+        alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
+        alarms.update(
+            AlarmId.NO_RECIPE,
+            None if service.active is not None else messages.NEVER_CHOSEN(),
+        )
+        alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
+        alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
+        alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
+        self._plc_commands.update_line_alarms()
+        self._count_restarts()
+        self._check_clock()
+
+    def _count_restarts(self) -> None:
+        many: list[Message] = []
+        for name, program in restarts.read().items():
+            for _ in range(program.total - self._restarts_counted.get(name, 0)):
+                self._metrics.restarted(name)
+            self._restarts_counted[name] = program.total
+            lately = program.within(_MANY_WITHIN_S)
+            if program.given_up:
+                many.append(messages.PROCESS_GIVEN_UP(process=name))
+            elif lately >= _MANY_RESTARTS:
+                many.append(messages.PROCESS_RESTARTED(process=name, times=lately, within_s=_MANY_WITHIN_S))
+        self._service.alarms.update(AlarmId.PROCESS_RESTARTS, joined(many) if many else None)
+
+    def _check_clock(self) -> None:
+        alarms = self._service.alarms
+        offset_s = time.time() - time.monotonic()
+        if abs(offset_s - self._clock_offset_s) > _CLOCK_STEP_S:
+            step_s = offset_s - self._clock_offset_s
+            step = messages.CLOCK_FORWARD if step_s > 0 else messages.CLOCK_BACK
+            alarms.raise_(AlarmId.CLOCK_STEPPED, step(step_s=abs(step_s)))
+        else:
+            alarms.clear(AlarmId.CLOCK_STEPPED)
+        self._clock_offset_s = offset_s

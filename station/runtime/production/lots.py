@@ -1,0 +1,115 @@
+"""Lot manager: the current lot, and the control recipe that is frozen for it."""
+
+import asyncio
+import logging
+
+from station.errors import StationError
+from station.messages import lots as messages
+from station.messages.message import Message, message_of
+from station.records.audit import STATION, AuditEntry
+from station.runtime.cycle.service import Service
+from station.runtime.observability.audit_logger import PLC, AuditLogger
+from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
+
+log = logging.getLogger(__name__)
+
+
+class LotManager:
+    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot.
+
+    Args:
+        service: inspects by the frozen recipe.
+        recipes: the recipes in force.
+    """
+
+    def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:
+        self._service, self._recipes, self._audit = service, recipes, audit
+        self._turn = asyncio.Lock()
+        self.lot: str | None = None
+        """The lot under way; None before the first fruit of one."""
+        self.named = ""
+        """The lot that a person started at the panel, for fruit without a lot of the PLC."""
+        self.plc_names = False
+        """Whether the PLC named a lot with its last trigger."""
+        self.mismatch: Message | None = None
+        """Reason why the last lot could not begin: number, name and content of the recipe do not match."""
+
+    def restore(self) -> None:
+        """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
+        remembered = self._recipes.restored()
+        if remembered is not None:
+            self._service.active, self.lot = remembered
+
+    def choose(self, active: ActiveRecipe) -> bool:
+        """Set the recipe of the next lot; a lot under way continues with its own.
+
+        Returns:
+            Whether the choice is stored for a restart.
+        """
+        self.mismatch = None
+        self._service.active = active
+        return self._recipes.store_active(active, self.lot)
+
+    def lot_of(self, named_by_plc: str) -> str:
+        """Return the lot of a fruit.
+
+        Args:
+            named_by_plc: the lot as the PLC names it; may be empty.
+        """
+        self.plc_names = bool(named_by_plc)
+        return named_by_plc or self.named
+
+    def set_lot(self, lot: str) -> None:
+        """Start or end a lot for a person; the next fruit freezes the recipe in force again.
+
+        Args:
+            lot: its name; empty for none.
+        """
+        self.named, self.lot = lot, None
+
+    async def begin(self, lot: str) -> bool:
+        """Begin a fruit of a lot. The first fruit of another lot freezes the active recipe's revision in force.
+
+        Args:
+            lot: its name, as the PLC gives it.
+
+        Returns:
+            Whether it may be inspected; if not, `mismatch` is the reason.
+        """
+        async with self._turn:
+            active = self._service.active
+            if active is None or lot == self.lot:
+                return active is not None
+            try:
+                now = self._recipes.current(active)
+                self._service.pacing.expected(now.recipe)
+            except StationError as error:
+                why = message_of(error)
+                self.mismatch = messages.REFUSED(lot=lot, why=why) if lot else messages.NAMELESS_REFUSED(why=why)
+                self._service.active, self.lot = None, None
+                log.warning("%s", self.mismatch)
+                self._audit.log(
+                    AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _audited(active), {"why": str(error)})
+                )
+                return False
+            before, self.lot, self.mismatch = self.lot, lot, None
+            self._service.active = now
+            if now.snapshot != active.snapshot:
+                log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)
+            self._audit.log(
+                AuditEntry(
+                    PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_audited(active)}, _audited(now)
+                )
+            )
+            await asyncio.to_thread(self._recipes.store_active, now, lot)
+            return True
+
+
+def _audited(active: ActiveRecipe) -> dict[str, str | int]:
+    snapshot = active.snapshot
+    return {
+        "recipe": snapshot.name,
+        "number": snapshot.number,
+        "revision": snapshot.revision,
+        "sha256": snapshot.sha256,
+    }

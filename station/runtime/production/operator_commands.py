@@ -1,0 +1,192 @@
+"""Operator commands from the panel: started at once, followed to their end, shown on all panels, and audited."""
+
+import asyncio
+import contextlib
+import itertools
+from collections import deque
+
+from station.channel.line import Command, CommandName
+from station.channel.panel import Recover, RecoveryName
+from station.channel.panel_live import LONGEST_LOT, OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.errors import StationError
+from station.inspection.cycle import UNJUDGED, WAITING
+from station.inspection.states import State
+from station.messages import commands as messages
+from station.messages import lots
+from station.messages.message import Message, message_of
+from station.records.errors import RecordsError
+from station.records.lots import end_lot, start_lot
+from station.records.records import Records
+from station.runtime.cycle.inspection import utc_ms
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import ARM, DeviceManager
+from station.runtime.observability.audit_logger import AuditLogger
+from station.runtime.production.lots import LotManager
+from station.runtime.production.plc_commands import PlcCommands
+
+AT_ONCE_S = 0.4
+"""Longest time for which a command's answer waits for the command's end."""
+_REMEMBERED = 8
+_RECOVERIES: dict[ArmCause, RecoveryName] = {
+    ArmCause.PROTECTIVE_STOP: "protective-stop",
+    ArmCause.EMERGENCY_STOP: "power",
+    ArmCause.SAFETY_FAULT: "power",
+    ArmCause.NOT_POWERED: "power",
+    ArmCause.SAFEGUARD_STOP: "program",
+    ArmCause.LOCAL_CONTROL: "program",
+    ArmCause.PROGRAM_STOPPED: "program",
+    ArmCause.REGISTERS_IN_USE: "program",
+}
+_COMMANDS = {
+    OperatorCommandName.CHOOSE_RECIPE: CommandName.CHANGE_RECIPE,
+    OperatorCommandName.START: CommandName.RESET,
+    OperatorCommandName.CALL_OFF: CommandName.CALL_OFF,
+    OperatorCommandName.SET_MODE: CommandName.SET_MODE,
+}
+"""Commands that the PLC has too are executed as the PLC's."""
+
+
+class OperatorCommands:
+    """Executes operators' commands.
+
+    Args:
+        plc_commands: executes commands that the PLC has too.
+        records: gets lots with a grower.
+        audit: gets the commands that `plc_commands` does not audit.
+    """
+
+    def __init__(
+        self,
+        plc_commands: PlcCommands,
+        service: Service,
+        devices: DeviceManager,
+        lots: LotManager,
+        records: Records,
+        audit: AuditLogger,
+    ) -> None:
+        self._plc_commands, self._service, self._devices, self._lots = plc_commands, service, devices, lots
+        self._records, self._audit = records, audit
+        self._tickets = itertools.count(1)
+        self._recent: deque[OperatorCommandView] = deque(maxlen=_REMEMBERED)
+        self._tasks: dict[int, asyncio.Task[None]] = {}
+
+    async def close(self) -> None:
+        """Cancel the commands under way."""
+        for task in self._tasks.values():
+            task.cancel()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+
+    @property
+    def recent(self) -> tuple[OperatorCommandView, ...]:
+        """Return the last commands, newest first."""
+        return tuple(reversed(self._recent))
+
+    @property
+    def recoveries(self) -> tuple[RecoveryName, ...]:
+        """Return the stops that a person may recover from after a check of the cell."""
+        fault = self._devices.monitors[ARM].fault if ARM in self._devices.monitors else None
+        found = _RECOVERIES.get(fault.cause) if isinstance(fault, ArmFault) else None
+        return () if found is None else (found,)
+
+    @property
+    def possible(self) -> tuple[OperatorCommandName, ...]:
+        """Return the commands that would be started now."""
+        service, state = self._service, self._service.state
+        conditions = {
+            OperatorCommandName.CHOOSE_RECIPE: not self._plc_commands.recipe_changing,
+            OperatorCommandName.START: not self._plc_commands.reset_refusal()
+            and (state in WAITING or service.stop_wanted),
+            OperatorCommandName.STOP: not service.stop_wanted
+            and not service.stop_requested
+            and state is not State.LATCHED,
+            OperatorCommandName.CALL_OFF: state in UNJUDGED,
+            OperatorCommandName.RECOVER: bool(self.recoveries),
+            OperatorCommandName.SET_MODE: True,
+            OperatorCommandName.START_LOT: not self._lots.plc_names,
+            OperatorCommandName.END_LOT: not self._lots.plc_names and bool(self._lots.named),
+        }
+        return tuple(order for order, possible in conditions.items() if possible)
+
+    async def start(self, request: OperatorCommand) -> OperatorCommandView:
+        """Start a command, and wait a moment for its end."""
+        same = next((each for each in self.recent if _under_way(each, request)), None)
+        entry = same or OperatorCommandView(
+            ticket=next(self._tickets),
+            order=request.order,
+            argument=request.argument,
+            state="executing",
+            why=None,
+            who=request.person.who,
+            began_utc_ms=utc_ms(),
+            ended_utc_ms=None,
+        )
+        if same is None:
+            self._recent.append(entry)
+            task = asyncio.create_task(self._follow(entry, request), name=f"order {request.order}")
+            self._tasks[entry.ticket] = task
+            task.add_done_callback(lambda _: self._tasks.pop(entry.ticket, None))
+        if (running := self._tasks.get(entry.ticket)) is not None:
+            await asyncio.wait({running}, timeout=AT_ONCE_S)
+        return next((each for each in self._recent if each.ticket == entry.ticket), entry)
+
+    async def _follow(self, entry: OperatorCommandView, request: OperatorCommand) -> None:
+        try:
+            why = await self._execute(request)
+        except StationError as error:
+            why = message_of(error)
+        ended = entry.model_copy(
+            update={"state": "done" if why is None else "failed", "why": why, "ended_utc_ms": utc_ms()}
+        )
+        self._recent = deque((ended if each.ticket == entry.ticket else each for each in self._recent), _REMEMBERED)
+
+    async def _execute(self, request: OperatorCommand) -> Message | None:
+        by, order, argument = (request.person.who, request.person.role), request.order, request.argument
+        if order in _COMMANDS:
+            if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
+                return messages.NO_NUMBER(command=order, argument=argument)
+            command = Command(command=_COMMANDS[order], argument=int(argument or 0))
+            return (await self._plc_commands.execute(command, by)).why
+        match order:
+            case OperatorCommandName.RECOVER:
+                return await self._recover(argument, by)
+            case OperatorCommandName.STOP:
+                why = await self._plc_commands.stop()
+            case OperatorCommandName.START_LOT:
+                why = await self._start_lot(argument, request.grower)
+            case _:
+                why = await self._end_lot()
+        self._audit.log_command(by[0], order, argument, why, by[1])
+        return why
+
+    async def _recover(self, what: str, by: tuple[str, str]) -> Message | None:
+        for standing in self.recoveries:
+            if standing == what:
+                return (await self._plc_commands.recover(Recover(what=standing), by)).why
+        return messages.NOTHING_TO_RECOVER()
+
+    async def _start_lot(self, name: str, grower: str) -> Message | None:
+        if self._lots.plc_names:
+            return lots.PLC_NAMES()
+        if not name.strip() or len(name) > LONGEST_LOT or not (name.isascii() and name.isprintable()):
+            return lots.BAD_NAME(name=name, longest=LONGEST_LOT)
+        if grower:
+            try:
+                await self._records.change(lambda connection: start_lot(connection, name, grower))
+            except RecordsError as error:
+                return message_of(error)
+        self._lots.set_lot(name)
+        return None
+
+    async def _end_lot(self) -> Message | None:
+        name = self._lots.named
+        if not name:
+            return lots.NONE()
+        with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
+            await self._records.change(lambda connection: end_lot(connection, name))
+        self._lots.set_lot("")
+        return None
+
+
+def _under_way(entry: OperatorCommandView, request: OperatorCommand) -> bool:
+    return entry.state == "executing" and (entry.order, entry.argument) == (request.order, request.argument)

@@ -1,0 +1,294 @@
+"""PLC commands between fruits, and the line's state as the PLC interface reports it."""
+
+import asyncio
+import logging
+import time
+from typing import Any
+
+from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
+from station.channel.panel import Recover
+from station.devices.arm.faults import ArmFault
+from station.errors import BadInputError
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import UNJUDGED, WAITING, Event
+from station.inspection.states import STATES, State
+from station.messages import commands as messages
+from station.messages import operation
+from station.messages.message import Message, message_of
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.observability.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
+from station.runtime.observability.metrics import Metrics
+from station.runtime.production.lots import LotManager
+from station.runtime.recipes.active import ActiveRecipes
+from station.runtime.state_files import StateFiles
+from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
+
+DEADLINE_S = 25.0
+"""Less than the PLC interface's own deadline for a command."""
+LINE_SILENT_S = 2.0
+MODES = (1, 2, 3)
+_STOPPED = "stopped_by_a_person"
+_ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
+
+
+class PlcCommands:
+    """Executes the PLC's commands, one after the other.
+
+    Args:
+        lots: gets a chosen recipe.
+        audit: gets every command.
+        metrics: gets the line's signs of life.
+        state_files: stores a person's stop for a restart.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        devices: DeviceManager,
+        recipes: ActiveRecipes,
+        lots: LotManager,
+        audit: AuditLogger,
+        metrics: Metrics,
+        state_files: StateFiles,
+    ) -> None:
+        self._service, self._devices, self._recipes, self._metrics = service, devices, recipes, metrics
+        self._lots, self._audit, self._state_files = lots, audit, state_files
+        self.mode = MODES[0]
+        """PackML's: 1 production, 2 maintenance, 3 manual."""
+        self.recipe_changing = False
+        self.kept_manual: Message | None = None
+        """Activity at the panel that needs the mode unchanged."""
+        self.registers_wanted = False
+        """Requests the PLC interface's registers with the next beat."""
+        self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
+        self._line: Line | None = None
+        self._line_at_s: float | None = None
+        self._turn = asyncio.Lock()
+
+    @property
+    def line_age_s(self) -> float | None:
+        """Return the time since the PLC interface's last message; None if there was none."""
+        return None if self._line_at_s is None else time.monotonic() - self._line_at_s
+
+    @property
+    def last_report(self) -> Line | None:
+        """Return the PLC interface's last message; None if there was none."""
+        return self._line
+
+    def restore_stop(self) -> None:
+        """Restore a person's stop after a restart; it lasts until a reset."""
+        self._service.stop_wanted = self._state_files.read(_STOPPED) == b"yes"
+
+    def set_line(self, line: Line) -> None:
+        """Store the PLC interface's beat."""
+        self._line, self._line_at_s = line, time.monotonic()
+        if line.registers:
+            self._registers, self.registers_wanted = (line.registers, time.monotonic()), False
+        self._metrics.heard("plc_interface")
+        self._metrics.waiting(line.waiting)
+        if line.plc_alive:
+            self._metrics.heard("plc")
+
+    @property
+    def registers(self) -> tuple[tuple[RegisterView, ...], float]:
+        """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
+        return self._registers
+
+    def line_fault(self) -> Message | None:
+        """Return the line's fault, as far as known."""
+        age_s = self.line_age_s
+        if self._line is None or age_s is None:
+            return None
+        if age_s > LINE_SILENT_S:
+            return operation.INTERFACE_SILENT(age_s=age_s)
+        beats = self._line.plc_alive or not self._line.enabled
+        return None if beats else operation.HEARTBEAT_STILL()
+
+    def update_line_alarms(self) -> None:
+        """Raise and clear the alarms of the line's state."""
+        age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
+        if line is None or age_s is None:
+            return
+        silent = age_s > LINE_SILENT_S
+        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else None)
+        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, None if silent else self.line_fault())
+        faults = {fault.part: fault.what for fault in reversed(line.faults)}
+        alarms.update(AlarmId.GATE_NOT_FIRED, faults.get("reject"))
+        alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
+
+    async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
+        """Execute one command.
+
+        Args:
+            by: name and role of who gave it.
+        """
+        log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
+        before, alarms = self._value_before(command.command), self._service.alarms.alarms
+        async with self._turn:
+            try:
+                async with asyncio.timeout(DEADLINE_S):
+                    why = await self._execute(command)
+            except TimeoutError:
+                why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())
+        if why is not None:
+            log.warning("%s was not done: %s", command.command, why)
+        done = CommandDone(done=why is None, why=why)
+        self._audit.log(command_entry(command, done, before, by))
+        if command.command in _ON_ALARMS:
+            now, change = self._service.alarms.alarms, _ON_ALARMS[command.command]
+            changed = [alarm for alarm, was in alarms.known.items() if now.get(alarm) != was]
+            self._audit.log(*(alarm_entry(*by, change, alarm) for alarm in changed))
+        return done
+
+    def _value_before(self, command: CommandName) -> dict[str, Any]:
+        """Return the value that a command is about to change, for the audit log."""
+        active = self._service.active
+        match command:
+            case CommandName.CHANGE_RECIPE:
+                snapshot = None if active is None else active.snapshot
+                return {"recipe": None if snapshot is None else [snapshot.number, snapshot.name, snapshot.revision]}
+            case CommandName.SET_MODE:
+                return {"mode": self.mode}
+            case _:
+                return {"state": str(self._service.state)}
+
+    async def _execute(self, command: Command) -> Message | None:
+        match command.command:
+            case CommandName.CHANGE_RECIPE:
+                return await self._change_recipe(command.argument)
+            case CommandName.RESET:
+                return await self._reset()
+            case CommandName.CALL_OFF:
+                return await self._call_off()
+            case CommandName.SET_MODE:
+                return self._set_mode(command.argument)
+            case CommandName.CLEAR_ALARMS:
+                self._service.alarms.acknowledge_returned()
+                return None
+
+    def _set_mode(self, mode: int) -> Message | None:
+        if mode not in MODES:
+            return messages.MODE_UNKNOWN(mode=mode)
+        if self.kept_manual is not None and mode != self.mode:
+            return messages.MODE_KEPT(activity=self.kept_manual)
+        self.mode = mode
+        return None
+
+    async def _change_recipe(self, number: int) -> Message | None:
+        await asyncio.to_thread(self._recipes.read)
+        found = self._recipes.find(number)
+        if found is None:
+            return self._recipe_unknown(number)
+        widest_mm = self._devices.cell.gripper.max_width_mm
+        if found.recipe.expected_width.smallest_mm >= widest_mm:
+            return messages.RECIPE_TOO_WIDE(number=number, widest_mm=widest_mm)
+        try:
+            self._service.pacing.expected(found.recipe)
+        except BadInputError as error:
+            return message_of(error)
+        self.recipe_changing = True
+        try:
+            await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
+            kept = self._lots.choose(found)
+            log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
+        finally:
+            self.recipe_changing = False
+        if not kept:
+            return messages.RECIPE_NOT_STORED(number=number)
+        return None
+
+    def _recipe_unknown(self, number: int) -> Message:
+        known = ", ".join(map(str, self._recipes.numbers))
+        refusal = messages.RECIPE_UNKNOWN(number=number, known=known) if known else messages.NO_RECIPES(number=number)
+        problems = self._recipes.problems
+        return messages.RECIPE_UNKNOWN_BECAUSE(refusal=refusal, problems=problems) if problems else refusal
+
+    async def stop(self) -> Message | None:
+        """Accept no trigger until the next reset, also over a restart; the fruit under way is inspected to its end.
+
+        Returns:
+            Why the stop is not complete; None if it is.
+        """
+        service = self._service
+        service.stop_wanted = True
+        kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
+        if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
+            service.conductor.post(Event.STOP, operation.STOPPED_AT_PANEL())
+        reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
+        if reached not in WAITING:
+            return messages.STARTED_MEANWHILE()
+        if kept:
+            return None
+        return messages.STOP_NOT_STORED()
+
+    async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
+        """Recover the arm after a stop that a person has checked; the station continues after a reset.
+
+        Args:
+            by: name and role of who gave it.
+        """
+        if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
+            return CommandDone(done=False, why=messages.BUSY())
+        log.info("a person at the cell asks for: %s", request.what)
+        try:
+            await self._devices.recover(request.what)
+            why = None
+        except ArmFault as fault:
+            why = message_of(fault)
+        self._audit.log_command(by[0], "recover", request.what, why, by[1])
+        return CommandDone(done=why is None, why=why)
+
+    async def _call_off(self) -> Message | None:
+        service = self._service
+        if service.state not in UNJUDGED:
+            busy = STATES[service.state].refusal is Refusal.BUSY
+            return messages.JUDGED() if busy else None
+        service.conductor.post(Event.CALLED_OFF, operation.CALLED_OFF())
+        await service.conductor.until(lambda state: state not in UNJUDGED)
+        return None
+
+    def reset_refusal(self) -> Message | None:
+        """Return why a reset would do nothing now; None if it would work."""
+        if self._service.stop_requested:
+            return messages.ENDING()
+        if stop := self._devices.active_stop:
+            return messages.CONFIRM_STOP(stop=message_of(stop))
+        busy = STATES[self._service.state].refusal is Refusal.BUSY
+        return messages.BUSY_CALL_OFF() if busy else None
+
+    async def _reset(self) -> Message | None:
+        service, state = self._service, self._service.state
+        if why_not := self.reset_refusal():
+            return why_not
+        service.stop_wanted = False
+        await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
+        if state in {State.IDLE, State.RETREATING_READY}:
+            return None
+        service.reset_wanted = True
+        self._devices.confirmed_clear = True
+        if state is State.LATCHED:
+            service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
+        elif state is State.STOPPED:
+            service.conductor.post(Event.RESET)
+        else:
+            try:
+                await self._devices.restart_program()
+            except ArmFault as fault:
+                return message_of(fault)
+            if state is State.CARRIED:
+                service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
+        tried_s = time.monotonic()
+        reached = await service.conductor.until(
+            lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
+        )
+        if reached is not State.IDLE:
+            return self._activity()
+        service.alarms.reset()
+        return None
+
+    def _activity(self) -> Message:
+        faults = list(self._devices.faults.values())
+        return message_of(faults[0]) if faults else STATES[self._service.state].activity

@@ -1,0 +1,145 @@
+"""Readiness for a trigger, or the reason against it: one sentence with the remedy."""
+
+from station.channel.line import StationState
+from station.inspection.states import STATES, State
+from station.messages import readiness as messages
+from station.messages.message import Message, joined, message_of
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.health import Dependency, Liveness, Readiness
+from station.runtime.production.lots import LotManager
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.recipes.active import ActiveRecipes
+from station.vocabulary import PackmlState, Refusal
+
+PRODUCTION = 1
+_DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
+
+
+class Interlock:
+    """Interlock: checks everything that a trigger needs.
+
+    Args:
+        boot: this start of the station.
+        plc_commands: the mode, and a recipe change under way.
+        lots: why a lot cannot begin.
+        liveness: the progress of tasks.
+        calibrated: whether the sensor is calibrated, and verified where the site requires it.
+    """
+
+    def __init__(
+        self,
+        boot: str,
+        service: Service,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        recipes: ActiveRecipes,
+        lots: LotManager,
+        liveness: Liveness,
+        calibrated: ActiveCalibration,
+    ) -> None:
+        self._boot, self._lots, self._calibrated = boot, lots, calibrated
+        self._service, self._devices, self._plc_commands = service, devices, plc_commands
+        self._recipes, self._liveness = recipes, liveness
+
+    def refusal(self) -> tuple[Refusal | None, Message | None]:
+        """Return why no trigger is accepted, for the PLC and for a person; both None if one is."""
+        service, facts = self._service, STATES[self._service.state]
+        if service.stop_requested:
+            return Refusal.NOT_READY, messages.ENDING()
+        if facts.refusal is not None:
+            return facts.refusal, self._trouble() or facts.reason
+        if service.stop_wanted:
+            return Refusal.NOT_READY, messages.STOPPED_BY_PERSON()
+        return self._idle_refusal()
+
+    def _idle_refusal(self) -> tuple[Refusal | None, Message | None]:
+        service = self._service
+        if stuck := self._liveness.stuck():
+            parts = [messages.PART_AGE(part=name, age_s=age_s) for name, age_s in stuck.items()]
+            return Refusal.NOT_READY, messages.NO_PROGRESS(parts=parts)
+        if self._plc_commands.recipe_changing:
+            return Refusal.RECIPE_CHANGING, messages.RECIPE_CHANGING()
+        if service.active is None:
+            return Refusal.NOT_READY, self._no_recipe()
+        if why := self._calibrated.refusal():
+            return Refusal.NOT_READY, why
+        if self._plc_commands.mode != PRODUCTION:
+            return Refusal.NOT_READY, messages.NOT_PRODUCTION()
+        return None, None
+
+    def _no_recipe(self) -> Message:
+        numbers = ", ".join(map(str, self._recipes.numbers))
+        choose = messages.NO_RECIPE(numbers=numbers) if numbers else messages.NO_RECIPE_AT_ALL()
+        mismatch = self._lots.mismatch
+        return choose if mismatch is None else joined((mismatch, choose))
+
+    def state(self) -> StationState:
+        """Return the whole state, as the PLC interface gets it with every beat."""
+        service = self._service
+        refusal, why = self.refusal()
+        snapshot = None if service.active is None else service.active.snapshot
+        return StationState(
+            boot=self._boot,
+            healthy=not self._liveness.stuck(),
+            ready=refusal is None,
+            why_not_ready=why,
+            packml_state=self._packml(),
+            mode=self._plc_commands.mode,
+            recipe_number=0 if snapshot is None else snapshot.number,
+            recipe_checksum=0 if snapshot is None else snapshot.checksum,
+            error_code=service.alarms.alarms.error_code,
+            alarms=service.alarms.alarms.word,
+            simulated=self._devices.simulated,
+            registers_wanted=self._plc_commands.registers_wanted,
+        )
+
+    def _packml(self) -> PackmlState | None:
+        """Return the state's own; while an orderly end is under way it is stopping, whatever still runs."""
+        facts = STATES[self._service.state]
+        return PackmlState.STOPPING if self._service.stop_requested and not facts.may_exit else facts.packml
+
+    def readiness(self) -> Readiness:
+        """Return the same for supervisors, with every dependency's age."""
+        refusal, why = self.refusal()
+        devices = [
+            Dependency(
+                name,
+                "ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
+                watch.age_s,
+                None if watch.fault is None else message_of(watch.fault),
+                None if watch.fault is None else messages.SEE_DEVICES(),
+            )
+            for name, watch in self._devices.monitors.items()
+        ]
+        return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
+
+    def _records(self) -> Dependency:
+        fault, status = self._service.registry.fault, self._service.registry.records.status()
+        if fault is None:
+            return Dependency("records", "ok", status.last_write_age_s)
+        return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
+
+    def _line(self) -> Dependency:
+        age_s = self._plc_commands.line_age_s
+        if age_s is None:
+            return Dependency(
+                "plc",
+                "unknown",
+                None,
+                messages.PLC_NOT_HEARD(),
+                messages.START_PLC(),
+            )
+        if trouble := self._plc_commands.line_fault():
+            return Dependency("plc", "fault", age_s, trouble, messages.SEE_DETAIL())
+        return Dependency("plc", "ok", age_s)
+
+    def _trouble(self) -> Message | None:
+        if self._service.state not in _DEVICES_DECIDE:
+            return None
+        faults = [
+            *self._devices.faults.values(),
+            *([self._service.registry.fault] if self._service.registry.fault else []),
+        ]
+        return message_of(faults[0]) if faults else None

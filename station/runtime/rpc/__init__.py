@@ -1,0 +1,1 @@
+"""Requests of the PLC interface and of the HMI."""

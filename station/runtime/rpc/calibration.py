@@ -1,0 +1,357 @@
+"""Calibration and verification with the ball from the panel, in manual mode, guided by a person."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Literal
+
+from station.calibration.calibration_procedure import CalibrationProcedure, Draft
+from station.calibration.checks import check_name, failed_check
+from station.calibration.model import Calibration, Verification
+from station.calibration.rig import Place, Progress, Unit
+from station.calibration.store import CalibrationStore
+from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
+from station.channel.messages import ChannelMessage
+from station.channel.panel import Actor
+from station.channel.panel_maintenance_queries import (
+    CalibrationRunView,
+    CalibrationState,
+    CalibrationView,
+    CheckView,
+    ContinueCalibrationRun,
+    EndCalibrationRun,
+    GetCalibration,
+    GetCalibrationPicture,
+    RunStep,
+    StartCalibrationRun,
+)
+from station.channel.panel_queries import Picture
+from station.channel.server import Handler
+from station.errors import BadInputError, StationError
+from station.messages import calibration as messages
+from station.messages.maintenance import UNDER_WAY
+from station.messages.message import Message, joined, message_of
+from station.records.audit import AuditEntry, append_audit
+from station.records.records import Records
+from station.runtime.devices.calibration_rig import StationRig
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.rpc.worker import PanelWorker
+from station.settings.configuration import Configuration
+from station.settings.recipe import find_recipe
+
+ANSWERED_S = 600.0
+"""Longest wait for a person to lay the ball."""
+_PICTURES = ("area.png", "field.png")
+_NAMES = {"calibration": messages.A_CALIBRATION, "verification": messages.A_VERIFICATION}
+
+
+@dataclass(slots=True)
+class _Run:
+    """One run, under way or over."""
+
+    kind: Literal["calibration", "verification"]
+    actor: Actor
+    state: Literal["running", "waiting", "passed", "failed", "ended"] = "running"
+    request: Message | None = None
+    steps: dict[str, RunStep] = field(default_factory=dict)
+    result: Message | None = None
+    laid: asyncio.Event = field(default_factory=asyncio.Event)
+    task: asyncio.Task[None] | None = None
+
+    @property
+    def open(self) -> bool:
+        return self.state in {"running", "waiting"}
+
+
+class PanelCalibration:
+    """Requests about the calibration, and runs of the procedures of `station.calibration`.
+
+    Args:
+        plc_commands: the mode, which must not change during a run.
+        calibrated: the calibration in force.
+        records: stores the audit entry and the result together.
+        audit: gets the start and the cancellation of runs.
+        worker: reads and writes files in its thread.
+        refusal: returns why nothing may be moved by hand now.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        calibrated: ActiveCalibration,
+        records: Records,
+        audit: AuditLogger,
+        worker: PanelWorker,
+        refusal: Callable[[], Message | None],
+    ) -> None:
+        self._site, self._devices, self._plc_commands, self._calibrated = (
+            configuration,
+            devices,
+            plc_commands,
+            calibrated,
+        )
+        self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
+        self._store = CalibrationStore(configuration.home)
+        self._run: _Run | None = None
+
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
+        """Return the handler of each request."""
+        return {
+            GetCalibration: self.state,
+            GetCalibrationPicture: self.picture,
+            StartCalibrationRun: self.begin,
+            ContinueCalibrationRun: self.go_on,
+            EndCalibrationRun: self.end,
+        }
+
+    async def close(self) -> None:
+        """Cancel the run under way; the jaws open. Idempotent."""
+        if self._run is not None and self._run.task is not None:
+            self._run.task.cancel()
+            await asyncio.gather(self._run.task, return_exceptions=True)
+
+    async def state(self, _request: GetCalibration) -> CalibrationState:
+        """Return the sensor's calibration state."""
+        serial = self._devices.cell.camera.description.serial
+
+        def read() -> tuple[Calibration | None, Verification | None]:
+            calibration = self._calibrated.calibration
+            return calibration, None if calibration is None else self._store.last_verification(calibration)
+
+        calibration, verification = await self._worker.do(read)
+        figures, settings = self._calibrated.figures, self._site.calibration
+        return CalibrationState(
+            serial=serial,
+            in_use=self._calibrated.in_force.words,
+            calibration=None if calibration is None else self._calibration_view(calibration),
+            verification=None if verification is None else self._verification_view(verification),
+            age_s=figures.age_s,
+            verification_age_s=figures.verification_age_s,
+            oldest_days=settings.oldest_days,
+            verify_every_h=settings.verify_every_h,
+            trouble=self._calibrated.refusal() or self._calibrated.alarm_detail(),
+            ball_mm=settings.ball_mm,
+            run=None if self._run is None else _run_view(self._run),
+            run_refused=self._why_not(serial),
+        )
+
+    async def picture(self, request: GetCalibrationPicture) -> Picture:
+        """Return a plot of the calibration in force."""
+
+        def read() -> Picture:
+            calibration = self._calibrated.calibration
+            record: Calibration | Verification | None = calibration
+            if calibration is not None and request.kind == "verification":
+                record = self._store.last_verification(calibration)
+            if record is None:
+                raise BadInputError(messages.NO_PLOT())
+            try:
+                return Picture(media_type="image/png", data=(self._store.folder(record) / request.name).read_bytes())
+            except OSError as error:
+                raise BadInputError(
+                    messages.PLOT_UNREADABLE(file=f"{record.id}/{request.name}", error=str(error.strerror))
+                ) from error
+
+        return await self._worker.do(read)
+
+    async def begin(self, request: StartCalibrationRun) -> CalibrationRunView:
+        """Start a run; the gripper closes on the ball."""
+        if why := self._why_not(self._devices.cell.camera.description.serial):
+            raise StationError(why)
+        run = self._run = _Run(request.kind, request.actor)
+        self._note(request.actor, "begun")
+        self._plc_commands.kept_manual = _NAMES[request.kind]()
+        self._devices.use(by_inspection=True)
+        run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
+        return _run_view(run)
+
+    async def go_on(self, _request: ContinueCalibrationRun) -> CalibrationRunView:
+        """Continue after the ball was laid."""
+        run = self._run
+        if run is None or run.state != "waiting":
+            raise BadInputError(messages.NOT_WAITING())
+        run.state, run.request = "running", None
+        run.laid.set()
+        return _run_view(run)
+
+    async def end(self, request: EndCalibrationRun) -> CalibrationRunView:
+        """Cancel the run."""
+        run = self._run
+        if run is None:
+            raise BadInputError(messages.NOT_BEGUN())
+        if run.open:
+            self._note(request.actor, "called_off")
+            await self.close()
+        return _run_view(run)
+
+    def _why_not(self, serial: str) -> Message | None:
+        if self._run is not None and self._run.open:
+            return UNDER_WAY(activity=_NAMES[self._run.kind]())
+        if not serial:
+            return messages.NO_SENSOR()
+        return self._refusal()
+
+    async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:
+        try:
+            result = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
+        except asyncio.CancelledError:
+            run.state, run.result = "ended", messages.CALLED_OFF()
+            raise
+        except (StationError, ValueError) as error:
+            run.state, run.result = "failed", message_of(error)
+            if isinstance(error, StationError):
+                self._devices.report_fault(error)
+        else:
+            run.state, run.result = ("passed", None) if result is None else ("failed", result)
+        finally:
+            run.request = None
+            self._plc_commands.kept_manual = None
+            self._devices.use(by_inspection=False)
+
+    async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
+        recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
+        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        draft = await CalibrationProcedure(
+            bench,
+            self._unit(),
+            recipe,
+            self._site.calibration,
+            [Place(x_mm, y_mm) for x_mm, y_mm in request.places],
+            run.actor.who,
+            version("fruit-station"),
+            lambda progress: _note_step(run, progress),
+        ).run()
+        before, new = self._store.current(draft.calibration.serial), draft.calibration
+        files = await asyncio.to_thread(_calibration_files, draft)
+        entry = calibration_entry(
+            run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
+        )
+        await self._records.change(
+            lambda connection: (append_audit(connection, entry), self._store.add_calibration(new, files))
+        )
+
+    async def _verify(self, run: _Run) -> Message | None:
+        calibration = self._calibrated.calibration
+        if calibration is None:
+            raise BadInputError(messages.MISSING())
+        recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
+        golden, presses = await self._worker.do(
+            lambda: (self._store.golden(calibration), self._store.presses(calibration))
+        )
+        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        verified = await VerificationProcedure(
+            bench,
+            recipe,
+            self._site.calibration,
+            calibration,
+            golden,
+            presses,
+            run.actor.who,
+            lambda progress: _note_step(run, progress),
+        ).run()
+        files = await asyncio.to_thread(_verification_files, verified, calibration)
+        made = verified.verification
+        entry = verification_entry(
+            run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
+        )
+        await self._records.change(
+            lambda connection: (append_audit(connection, entry), self._store.add_verification(made, files))
+        )
+        failed = [failed_check(check) for check in made.checks if not check.passed]
+        return joined(failed) if failed else None
+
+    async def _lay(self, run: _Run, place: Place) -> None:
+        """Request the ball from the person, and wait until it is in place."""
+        run.laid.clear()
+        run.state = "waiting"
+        run.request = messages.LAY_BALL(right_mm=place.x_mm, down_mm=place.y_mm)
+        try:
+            async with asyncio.timeout(ANSWERED_S):
+                await run.laid.wait()
+        except TimeoutError:
+            raise StationError(messages.BALL_LATE(limit_min=ANSWERED_S / 60)) from None
+
+    def _unit(self) -> Unit:
+        description = self._devices.cell.camera.description
+        return Unit(description.serial, description.name, simulated=self._site.camera.driver != "digit")
+
+    def _note(self, actor: Actor, what: str) -> None:
+        kind = self._run.kind if self._run is not None else "run"
+        self._audit.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
+
+    def _calibration_view(self, made: Calibration) -> CalibrationView:
+        return CalibrationView(
+            serial=made.serial,
+            id=made.id,
+            made_utc_ms=round(1000 * made.made_at.timestamp()),
+            operator=made.operator,
+            words=made.summary(),
+            passed=True,
+            checks=_check_views(made),
+            pictures=_files_in(self._store.folder(made)),
+        )
+
+    def _verification_view(self, made: Verification) -> CalibrationView:
+        ratio = None if made.area_ratio is None else messages.RATIO_OF_BALL(percent=100 * made.area_ratio)
+        return CalibrationView(
+            serial=made.serial,
+            id=made.id,
+            made_utc_ms=round(1000 * made.made_at.timestamp()),
+            operator=made.operator,
+            words=ratio,
+            passed=made.passed,
+            checks=_check_views(made),
+            pictures=_files_in(self._store.folder(made)),
+        )
+
+
+def _note_step(run: _Run, progress: Progress) -> None:
+    run.steps[progress.title.id] = RunStep(
+        number=progress.number, of=progress.of, title=progress.title, detail=progress.detail
+    )
+
+
+def _run_view(run: _Run) -> CalibrationRunView:
+    return CalibrationRunView(
+        kind=run.kind, state=run.state, request=run.request, steps=tuple(run.steps.values()), result=run.result
+    )
+
+
+def _check_views(made: Calibration | Verification) -> tuple[CheckView, ...]:
+    return tuple(
+        CheckView(
+            name=check_name(check.name),
+            passed=check.passed,
+            found=check.found,
+            expected=check.expected,
+            remedy=check.remedy,
+        )
+        for check in made.checks
+    )
+
+
+def _files_in(folder: Path) -> tuple[str, ...]:
+    with contextlib.suppress(OSError):
+        return tuple(name for name in _PICTURES if (folder / name).is_file())
+    return ()
+
+
+# The plots' library is a third of what this process would load at its start, for pages that are made once a shift.
+def _calibration_files(draft: Draft) -> dict[str, bytes]:
+    from station.calibration.report import calibration_files  # noqa: PLC0415
+
+    return calibration_files(draft)
+
+
+def _verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
+    from station.calibration.report import verification_files  # noqa: PLC0415
+
+    return verification_files(verified, calibration)

@@ -1,0 +1,287 @@
+"""Maintenance page's requests: health, jogging in manual mode, live image, PLC registers, log."""
+
+import asyncio
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from station.channel.messages import ChannelMessage
+from station.channel.panel import Actor
+from station.channel.panel_maintenance_queries import (
+    HISTOGRAM_BINS,
+    GetHealth,
+    GetLiveImage,
+    GetRegisters,
+    Health,
+    Jogged,
+    JogGripper,
+    LedsSet,
+    LiveImage,
+    Log,
+    PartHealth,
+    ReadLog,
+    Registers,
+    SetLeds,
+)
+from station.channel.panel_queries import Picture
+from station.channel.server import Handler
+from station.devices.camera.interface import Frame, Image, Leds
+from station.errors import StationError
+from station.inspection.states import STATES, State
+from station.messages import maintenance as messages
+from station.messages.commands import JOGGING
+from station.messages.message import Message
+from station.records.audit import AuditEntry
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import GRIPPER, DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.imaging.reference import GOLDEN, sharpness
+from station.runtime.observability.audit_logger import AuditLogger
+from station.runtime.observability.health import Liveness
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.runtime.rpc.log import LogRing
+from station.runtime.rpc.worker import PanelWorker
+from station.settings.segmentation import Segmentation
+from station.vision.contact import Contact, Method
+from station.vision.methods import make_method
+from station.vocabulary import Refusal
+
+MANUAL = 3
+"""PackML's unit mode in which a person moves things by hand."""
+JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
+"""The gripper's slowest and weakest."""
+FRAME_DEADLINE_S = 2.0
+REGISTERS_DEADLINE_S = 3.0
+_JOGGED = {State.IDLE, State.STOPPED, State.CARRIED}
+"""States in which the cycle moves nothing."""
+_SATURATED_LEVEL = 250
+_JPEG_QUALITY = 85
+_WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
+
+
+class NotNowError(StationError):
+    """A request that is refused in this state; the message gives what has to be done first."""
+
+
+class PanelMaintenance:
+    """Requests of the maintenance page.
+
+    Args:
+        plc_commands: the mode, and the PLC interface's report.
+        interlock: the dependencies of an inspection, with ages.
+        liveness: the progress of tasks.
+        calibrated: the scale, and the golden reference.
+        audit: gets every manual motion.
+        home: folder of the golden reference of a sensor that is not calibrated.
+        worker: makes pictures in its thread.
+        log: the last lines.
+    """
+
+    def __init__(
+        self,
+        service: Service,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
+        liveness: Liveness,
+        calibrated: ActiveCalibration,
+        audit: AuditLogger,
+        home: Path,
+        worker: PanelWorker,
+        log: LogRing,
+        versions: Mapping[str, str],
+    ) -> None:
+        self._service, self._devices, self._plc_commands, self._interlock = service, devices, plc_commands, interlock
+        self._liveness, self._calibrated, self._audit, self._home = liveness, calibrated, audit, home
+        self._worker, self._log, self._versions = worker, log, dict(versions)
+        self._moving = asyncio.Lock()
+        self._method: tuple[object, Method] | None = None
+
+    def handlers(self) -> dict[type[ChannelMessage], Handler]:
+        """Return the handler of each request."""
+        return {
+            GetHealth: self.health,
+            JogGripper: self.jog,
+            SetLeds: self.set_leds,
+            GetLiveImage: self.live_image,
+            GetRegisters: self.registers,
+            ReadLog: self.log_lines,
+        }
+
+    def refusal(self) -> Message | None:
+        """Return why nothing may be moved by hand now, with the remedy; None if it may."""
+        service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
+        if service.stop_requested:
+            return messages.ENDING()
+        if facts.refusal is Refusal.BUSY:
+            return messages.BUSY()
+        if mode != MANUAL:
+            return messages.SET_MANUAL(mode=mode, manual=MANUAL)
+        if service.state not in _JOGGED:
+            return facts.activity
+        if self._plc_commands.kept_manual is not None and not self._moving.locked():
+            return messages.UNDER_WAY(activity=self._plc_commands.kept_manual)
+        return None
+
+    async def health(self, _request: GetHealth) -> Health:
+        """Return the health of all dependencies."""
+        readiness, records, figures = (
+            self._interlock.readiness(),
+            self._service.registry.records,
+            self._calibrated.figures,
+        )
+        status = await self._worker.do(records.status)
+        return Health(
+            ready=readiness.ready,
+            why=readiness.why,
+            mode=self._plc_commands.mode,
+            state=STATES[self._service.state].activity,
+            jog_refused=self.refusal(),
+            parts=tuple(
+                PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
+                for each in readiness.dependencies
+            ),
+            devices=self._devices.names,
+            versions=self._versions,
+            progress_age_s=self._liveness.ages_s(),
+            records={
+                "database_bytes": status.database_bytes,
+                "image_bytes": status.image_bytes,
+                "free_bytes": status.free_bytes,
+                "queue": status.queue,
+                "images_waiting": status.images_waiting,
+                "writes": status.writes,
+            },
+            records_error=status.error,
+            calibration_age_s=figures.age_s,
+            verification_age_s=figures.verification_age_s,
+            simulated=self._devices.simulated,
+        )
+
+    async def jog(self, request: JogGripper) -> Jogged:
+        """Move the fingers, or stop them.
+
+        Raises:
+            NotNowError: refused in this state.
+            GripperError: the fingers did not reach the width.
+        """
+        gripper, width_mm = self._devices.cell.gripper, request.width_mm
+        if (request.to == "width") != (width_mm is not None):
+            raise StationError(messages.JOG_WIDTH())
+        self._check(request.actor, "jog", request.to)
+        if request.to == "stop":
+            reading = await gripper.stop()
+        else:
+            if width_mm is not None and width_mm > gripper.max_width_mm:
+                raise StationError(messages.JOG_TOO_WIDE(widest_mm=gripper.max_width_mm, width_mm=width_mm))
+            if self._moving.locked():
+                raise NotNowError(messages.JOG_MOVING())
+            async with self._moving:
+                self._plc_commands.kept_manual = JOGGING()
+                try:
+                    wide_mm = gripper.max_width_mm if width_mm is None else width_mm
+                    reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
+                finally:
+                    self._plc_commands.kept_manual = None
+        self._devices.monitors[GRIPPER].report_success()
+        where = f"{reading.width_mm:.1f} mm"
+        self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
+        return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
+
+    async def set_leds(self, request: SetLeds) -> LedsSet:
+        """Set the sensor's light; the next start of the camera sets its own again."""
+        self._check(request.actor, "leds", "camera")
+        await self._devices.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
+        self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
+        return LedsSet()
+
+    async def live_image(self, request: GetLiveImage) -> LiveImage:
+        """Return the newest image; it is measured only while nothing is inspected."""
+        frame = await self._devices.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
+        active = self._service.active
+        why = None
+        if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
+            why = messages.IMAGE_BUSY()
+        elif request.contact and active is None:
+            why = messages.IMAGE_NO_RECIPE()
+        segmentation = active.recipe.segmentation if request.contact and active is not None and why is None else None
+        return await self._worker.do(lambda: self._live(frame, segmentation, why))
+
+    async def registers(self, _request: GetRegisters) -> Registers:
+        """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
+        asked_s = time.monotonic()
+        self._plc_commands.registers_wanted = True
+        while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
+            await asyncio.sleep(0.05)
+        told, at_s = self._plc_commands.registers
+        return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
+
+    async def log_lines(self, request: ReadLog) -> Log:
+        """Return the last lines of the log."""
+        return Log(lines=self._log.last(request.limit, request.level))
+
+    def _check(self, actor: Actor, command: str, subject: str) -> None:
+        if why := self.refusal():
+            self._note(actor, command, subject, {"done": False, "why": str(why)})
+            raise NotNowError(why)
+
+    def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
+        self._audit.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+
+    def _live(self, frame: Frame, segmentation: Segmentation | None, why: Message | None) -> LiveImage:
+        image, contact = frame.image, None
+        shown = image
+        if segmentation is not None:
+            contact, why = self._contact(segmentation, image)
+            shown = image if contact is None else _outlined(image, contact)
+        data = cv2.imencode(".jpg", shown, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
+        blue, green, red = (_histogram(image[:, :, channel]) for channel in range(3))
+        scale_mm = self._calibrated.in_force.mm_per_px
+        return LiveImage(
+            picture=Picture(media_type="image/jpeg", data=data),
+            captured_s=frame.captured_s,
+            age_s=time.monotonic() - frame.captured_s,
+            faults=tuple(sorted(fault.value for fault in frame.faults)),
+            histogram=(red, green, blue),
+            saturated_share=float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL)),
+            sharpness=sharpness(image),
+            area_px=contact.area_px if contact else None,
+            area_mm2=contact.area_px * scale_mm**2 if contact else None,
+            flags=tuple(sorted(flag.value for flag in contact.flags)) if contact else (),
+            contact=why,
+        )
+
+    def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, Message | None]:
+        """Return the contact against the golden reference, or why none is measured."""
+        path = self._calibrated.golden() or self._home / GOLDEN
+        try:
+            key = (path, path.stat().st_mtime_ns, segmentation)
+        except OSError:
+            return None, messages.NO_GOLDEN()
+        if self._method is None or self._method[0] != key:
+            picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+            if picture is None:
+                return None, messages.GOLDEN_UNREADABLE(file=path.name)
+            self._method = key, make_method([np.asarray(picture, np.uint8)], segmentation)
+        try:
+            return self._method[1].measure(image), None
+        except ValueError:
+            return None, messages.GOLDEN_SIZE()
+
+
+def _outlined(image: Image, contact: Contact) -> Image:
+    drawn = image.copy()
+    outlines, _ = cv2.findContours(contact.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(drawn, outlines, -1, _BLACK, 3)
+    cv2.drawContours(drawn, outlines, -1, _WHITE, 1)
+    return drawn
+
+
+def _histogram(channel: np.ndarray) -> tuple[int, ...]:
+    return tuple(
+        int(count) for count in np.bincount(channel.ravel() // (256 // HISTOGRAM_BINS), minlength=HISTOGRAM_BINS)
+    )

@@ -1,0 +1,219 @@
+"""Panel server: answers the HMI's process from memory; nothing here waits for a device."""
+
+import asyncio
+import logging
+import time
+
+from station.channel.line import Noted
+from station.channel.panel_live import (
+    AlarmChange,
+    AlarmHistory,
+    DeviceView,
+    Fruit,
+    GetAlarmHistory,
+    GetFruit,
+    GetPanelState,
+    GetPicture,
+    GetRecent,
+    GetRecipes,
+    OperatorCommand,
+    OperatorCommandView,
+    PanelState,
+    PersonNoted,
+    Picture,
+    Recent,
+    RecipeNames,
+    Recipes,
+    RecipeSummary,
+)
+from station.channel.server import Handlers
+from station.inspection.alarm_table import ALARMS, AlarmId
+from station.inspection.states import STATES
+from station.messages import operation as messages
+from station.messages.message import Message, message_in, message_of, verbatim
+from station.records.audit import AuditEntry
+from station.records.errors import RecordsError
+from station.records.records import Records
+from station.runtime.alarms.commands import AlarmCommands
+from station.runtime.cycle.inspection import utc_ms
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.audit_logger import AuditLogger
+from station.runtime.production.lots import LotManager
+from station.runtime.production.operator_commands import OperatorCommands
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
+from station.runtime.rpc.recent_inspections import RecentInspections
+from station.runtime.rpc.restored_inspections import read_recent
+from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 3.0
+"""Time for a killed HMI process to restart, on a machine that is otherwise idle."""
+
+
+class PanelServer:
+    """Channel server for the HMI.
+
+    Args:
+        interlock: the state, and why the station is not ready.
+        plc_commands: the PLC interface's last report.
+        records: gets lots; read for alarms.
+        alarms: alarm commands of people.
+        audit: gets what people do.
+        calibrated: whether the verification with the ball is due.
+    """
+
+    def __init__(
+        self,
+        interlock: Interlock,
+        service: Service,
+        devices: DeviceManager,
+        lots: LotManager,
+        recipes: ActiveRecipes,
+        plc_commands: PlcCommands,
+        records: Records,
+        alarms: AlarmCommands,
+        audit: AuditLogger,
+        calibrated: ActiveCalibration,
+    ) -> None:
+        self._interlock, self._service, self._devices, self._lots = interlock, service, devices, lots
+        self._book, self._plc_commands, self._records, self._alarms, self._audit = (
+            recipes,
+            plc_commands,
+            records,
+            alarms,
+            audit,
+        )
+        self._calibrated = calibrated
+        self._operator_commands = OperatorCommands(plc_commands, service, devices, lots, records, audit)
+        self._inspections = RecentInspections()
+        self._heard_s: float | None = None
+        service.registry.on_outcome, service.on_published = self._inspections.add, self._inspections.set_outcome
+        self.handlers: Handlers = {
+            GetPanelState: self._state,
+            GetRecent: self._recent,
+            GetFruit: self._fruit,
+            GetPicture: self._picture,
+            GetRecipes: self._recipes,
+            GetAlarmHistory: self._alarm_history,
+            OperatorCommand: self._order,
+            PersonNoted: self._person,
+            **alarms.handlers,
+        }
+        """For a channel's server."""
+
+    async def restore(self) -> None:
+        """Restore the last fruit of the previous start, and the counts of their lots."""
+        pacing = self._service.pacing
+        try:
+            found = await asyncio.to_thread(
+                read_recent, self._records.folder, lambda recipe: pacing.limits(recipe).inspection_s
+            )
+        except RecordsError as error:
+            log.warning("the last fruit are not shown: %s", error)
+            return
+        self._inspections.restore(*found)
+
+    async def close(self) -> None:
+        """Cancel the commands under way."""
+        await self._operator_commands.close()
+
+    def hmi_fault(self) -> Message | None:
+        """Return the fault of the HMI's process; None for none, and before its first message."""
+        age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
+        return messages.PAGES_SILENT(age_s=age_s) if age_s > SILENT_S else None
+
+    async def _state(self, _request: GetPanelState) -> PanelState:
+        self._heard_s = time.monotonic()
+        service, line = self._service, self._interlock.state()
+        facts, active = STATES[service.state], service.active
+        report = self._plc_commands.last_report
+        return PanelState(
+            boot=line.boot,
+            utc_ms=utc_ms(),
+            state=service.state,
+            activity=facts.activity,
+            packml_state=line.packml_state,
+            mode=line.mode,
+            ready=line.ready,
+            why_not_ready=line.why_not_ready,
+            busy=facts.refusal is Refusal.BUSY,
+            needs_person=facts.needs_person,
+            stopping=service.stop_wanted,
+            simulated=line.simulated,
+            recipe=None if active is None else _recipe_name(active),
+            lot=self._lots.lot,
+            named_lot=self._lots.named,
+            plc_names_lots=self._lots.plc_names,
+            plc_connected=report is not None and report.plc_connected,
+            plc_alive=report is not None and report.plc_alive,
+            line_trouble=self._plc_commands.line_fault(),
+            check_due=self._calibrated.refusal(),
+            alarms=self._alarms.active(),
+            devices=tuple(
+                DeviceView(name=name, fault=watch.fault and message_of(watch.fault), age_s=watch.age_s)
+                for name, watch in self._devices.monitors.items()
+            ),
+            orders=self._operator_commands.recent,
+            may=self._operator_commands.possible,
+            recoveries=self._operator_commands.recoveries,
+            last_sequence=self._inspections.last_sequence,
+            lot_counts=self._inspections.counts(self._lots.lot),
+            deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
+        )
+
+    async def _recent(self, request: GetRecent) -> Recent:
+        return Recent(fruit=self._inspections.recent(request.most))
+
+    async def _fruit(self, request: GetFruit) -> Fruit:
+        return self._inspections.fruit(request.sequence)
+
+    async def _picture(self, request: GetPicture) -> Picture:
+        return await self._inspections.picture(request.sequence)
+
+    async def _recipes(self, _request: GetRecipes) -> Recipes:
+        found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
+        active = self._service.active
+        return Recipes(
+            recipes=tuple(_recipe_view(each) for each in found),
+            active=None if active is None else _recipe_view(active),
+            problems=self._book.problems,
+        )
+
+    async def _alarm_history(self, request: GetAlarmHistory) -> AlarmHistory:
+        rows = await self._records.alarm_log(request.most)
+        return AlarmHistory(
+            changes=tuple(
+                AlarmChange(
+                    utc_ms=row.utc_ms,
+                    id=row.id,
+                    cause=ALARMS[AlarmId(row.id)].cause if row.id in set(AlarmId) else verbatim(row.id),
+                    change=row.change,
+                    detail=message_in(row.detail),
+                )
+                for row in rows
+            )
+        )
+
+    async def _order(self, request: OperatorCommand) -> OperatorCommandView:
+        return await self._operator_commands.start(request)
+
+    async def _person(self, request: PersonNoted) -> Noted:
+        entry = AuditEntry(request.person.who, request.person.role, f"panel.{request.what}", request.subject)
+        self._audit.log(entry)
+        return Noted()
+
+
+def _recipe_name(active: ActiveRecipe) -> RecipeNames:
+    recipe = active.recipe
+    return RecipeNames(
+        number=recipe.plc_number, name=recipe.name, title=recipe.title, revision=active.snapshot.revision
+    )
+
+
+def _recipe_view(active: ActiveRecipe) -> RecipeSummary:
+    return RecipeSummary(**_recipe_name(active).model_dump(), values=active.snapshot.text)

@@ -1,0 +1,91 @@
+"""Page handlers for Recipes, History and Maintenance, put together for the panel's server."""
+
+import contextlib
+from collections.abc import Mapping
+from typing import Self
+
+from station.channel.messages import ChannelMessage
+from station.channel.server import Handler
+from station.records.records import Records
+from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.observability.audit_logger import AuditLogger
+from station.runtime.observability.health import Liveness
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.runtime.rpc.calibration import PanelCalibration
+from station.runtime.rpc.history import PanelHistory
+from station.runtime.rpc.jobs import PanelJobs
+from station.runtime.rpc.log import LogRing
+from station.runtime.rpc.maintenance import PanelMaintenance
+from station.runtime.rpc.pictures import PanelPictures
+from station.runtime.rpc.recipes import PanelRecipes
+from station.runtime.rpc.worker import PanelWorker
+from station.settings.configuration import Configuration
+
+
+class PanelPages:
+    """Handlers of these pages; use them inside `async with`, and close before the devices.
+
+    Args:
+        plc_commands: the mode.
+        interlock: the dependencies of an inspection.
+        liveness: the progress of tasks.
+        calibrated: the scale.
+        audit: gets everything that a person does.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        records: Records,
+        service: Service,
+        devices: DeviceManager,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
+        liveness: Liveness,
+        calibrated: ActiveCalibration,
+        audit: AuditLogger,
+        versions: Mapping[str, str],
+    ) -> None:
+        self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
+        history = PanelHistory(records, self._worker, self._jobs)
+        recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker, self._jobs)
+        maintenance = PanelMaintenance(
+            service,
+            devices,
+            plc_commands,
+            interlock,
+            liveness,
+            calibrated,
+            audit,
+            configuration.home,
+            self._worker,
+            self._log,
+            versions,
+        )
+        self._ball = PanelCalibration(
+            configuration, devices, plc_commands, calibrated, records, audit, self._worker, maintenance.refusal
+        )
+        self.handlers: dict[type[ChannelMessage], Handler] = {
+            **history.handlers(),
+            **PanelPictures(records.folder, self._worker).handlers(),
+            **recipes.handlers(),
+            **maintenance.handlers(),
+            **self._ball.handlers(),
+        }
+        """Handler of each request."""
+        self._open = contextlib.AsyncExitStack()
+
+    async def __aenter__(self) -> Self:
+        """Store log lines from now on."""
+        self._open.callback(self._worker.close)
+        self._open.enter_context(self._log)
+        self._open.push_async_callback(self._jobs.close)
+        self._open.push_async_callback(self._ball.close)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        """Cancel what runs."""
+        await self._open.aclose()

@@ -1,0 +1,98 @@
+"""Channel server of the station: answers the PLC interface and the commands of people at the cell."""
+
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    BeginReply,
+    Command,
+    CommandDone,
+    Line,
+    Noted,
+    Open,
+    Outcome,
+    Published,
+    Resume,
+    StationState,
+)
+from station.channel.panel import Recover
+from station.channel.server import ChannelServer
+from station.runtime.alarms.commands import AlarmCommands
+from station.runtime.cycle.service import Service
+from station.runtime.production.lots import LotManager
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.vocabulary import Refusal
+
+
+class PlcInterfaceServer:
+    """Server for the PLC interface.
+
+    Args:
+        endpoint: bound when the server is made.
+        service: the cycle and its outcomes.
+        plc_commands: the PLC's commands, and the line's state.
+        interlock: decides whether a trigger is accepted.
+        lots: freezes the recipe at a lot's first trigger.
+        alarms: alarm commands of people.
+    """
+
+    def __init__(
+        self,
+        endpoint: str,
+        service: Service,
+        plc_commands: PlcCommands,
+        interlock: Interlock,
+        lots: LotManager,
+        alarms: AlarmCommands,
+    ) -> None:
+        self._service, self._plc_commands, self._interlock, self._lots = service, plc_commands, interlock, lots
+        self._server = ChannelServer(
+            endpoint,
+            {
+                Begin: self._begin,
+                AwaitOutcome: self._outcome,
+                Published: self._published,
+                Acknowledged: self._acknowledged,
+                Resume: self._resume,
+                Line: self._line,
+                Command: self._command,
+                Recover: self._recover,
+                **alarms.handlers,
+            },
+        )
+
+    async def serve(self) -> None:
+        """Answer requests until cancelled."""
+        await self._server.serve()
+
+    async def _begin(self, request: Begin) -> BeginReply:
+        refusal, _ = self._interlock.refusal()
+        lot = self._lots.lot_of(request.lot)
+        if refusal is None and not await self._lots.begin(lot):
+            refusal = Refusal.NOT_READY
+        return await self._service.begin(request, refusal, lot)
+
+    async def _outcome(self, request: AwaitOutcome) -> Outcome:
+        return await self._service.registry.outcome(request.sequence)
+
+    async def _published(self, request: Published) -> Noted:
+        await self._service.published(request.outcome)
+        return Noted()
+
+    async def _acknowledged(self, request: Acknowledged) -> Noted:
+        await self._service.registry.records.acknowledged(request.sequence)
+        return Noted()
+
+    async def _resume(self, _request: Resume) -> Open:
+        return await self._service.registry.open_inspections()
+
+    async def _line(self, request: Line) -> StationState:
+        self._plc_commands.set_line(request)
+        return self._interlock.state()
+
+    async def _recover(self, request: Recover) -> CommandDone:
+        return await self._plc_commands.recover(request)
+
+    async def _command(self, request: Command) -> CommandDone:
+        return await self._plc_commands.execute(request)

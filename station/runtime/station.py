@@ -1,0 +1,248 @@
+"""Station process: makes all parts, starts them, and ends them in order."""
+
+import asyncio
+import contextlib
+import logging
+import uuid
+from collections.abc import Callable, Coroutine
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from station.channel.server import ChannelServer
+from station.errors import StationError
+from station.inspection.states import STATES
+from station.messages.message import verbatim
+from station.outbox.lag import OutboxMonitor
+from station.outbox.status import outbox_folder, read_status
+from station.records.errors import RecordsError
+from station.records.records import Records
+from station.runtime.alarms.commands import AlarmCommands
+from station.runtime.alarms.manager import AlarmManager
+from station.runtime.cycle.actions import Inspector
+from station.runtime.cycle.service import CYCLE, Service
+from station.runtime.devices.manager import DeviceManager
+from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.imaging.reference import GoldenReference
+from station.runtime.imaging.worker import VisionWorker
+from station.runtime.observability.audit_logger import FLUSH_S, AuditLogger
+from station.runtime.observability.health import HealthServer, Liveness
+from station.runtime.observability.metrics import Metrics
+from station.runtime.observability.startup_audit import end_entry, start_entries
+from station.runtime.production.housekeeping import UPKEEP, Housekeeping
+from station.runtime.production.lots import LotManager
+from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.readiness import Interlock
+from station.runtime.recipes.active import ActiveRecipes
+from station.runtime.rpc.operator import PanelServer
+from station.runtime.rpc.pages import PanelPages
+from station.runtime.rpc.plc import PlcInterfaceServer
+from station.runtime.state_files import StateFiles
+from station.settings.configuration import Configuration
+from station.settings.hmi import panel_endpoint
+from station.settings.plc import line_endpoint
+from station.supervision.notify import feed_watchdog, notify
+
+log = logging.getLogger(__name__)
+
+PROGRAM = "fruit-station"
+_USUAL_DEADLINE_S = 30.0
+
+
+class Station:
+    """One start of the station.
+
+    Args:
+        configuration: the site's, or its last good form.
+        broken: the error of the configuration's files; empty for none.
+    """
+
+    def __init__(self, configuration: Configuration, broken: str = "") -> None:
+        self.boot = uuid.uuid4().hex
+        self._configuration, self._broken = configuration, broken
+        self._stop = asyncio.Event()
+        self.service: Service | None = None
+        """The cycle, once `run` has put it together."""
+        self.recipes: ActiveRecipes | None = None
+        """The recipes in force, likewise."""
+
+    def stop(self) -> None:
+        """Request an orderly end; a second call changes nothing."""
+        self._stop.set()
+
+    async def run(self, on_started: Callable[[int], None]) -> None:
+        """Run until `stop` is called; then the running inspection gets its outcome and the jaws open before it returns.
+
+        Args:
+            on_started: gets the port of metrics and health once everything is served. Devices may still be away.
+
+        Raises:
+            StationError: the station cannot start: an address is in use.
+        """
+        async with contextlib.AsyncExitStack() as stack:
+            tasks, port = await self._build(stack)
+            on_started(port)
+            notify("READY=1")
+            await self._until_stop(tasks)
+            await self._end()
+
+    async def _build(self, stack: contextlib.AsyncExitStack) -> tuple[tuple[asyncio.Task[None], ...], int]:
+        configuration, settings = self._configuration, self._configuration.service
+        versions = {PROGRAM: version(PROGRAM)}
+        liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
+        kept, alarms = StateFiles(configuration.home), AlarmManager(metrics)
+        calibrated = ActiveCalibration(configuration, lambda: devices.cell.camera.description.serial)
+        eye = VisionWorker(GoldenReference(kept, calibrated.golden), settings.reference)
+        stack.callback(eye.close)
+        records = Records(configuration.home / "records", configuration.records, self.boot)
+        stack.push_async_callback(records.close)
+        audit = AuditLogger(records)
+        stack.push_async_callback(self._note_end, audit)
+        _register_scrapes(metrics, configuration, records, calibrated)
+
+        def device_changed(name: str, fault: StationError | None) -> None:
+            alarms.set_device_fault(name, devices.monitors[name].reported_fault)
+            service.device_changed(fault)
+
+        def progress(name: str) -> None:
+            liveness.progress(name)
+            if devices.monitors[name].fault is None:
+                metrics.heard(name)
+
+        devices = DeviceManager(configuration, device_changed, progress)
+        inspector = Inspector(devices, eye, settings, configuration.arm, alarms, metrics, calibrated)
+        self.service = service = Service(
+            configuration, records, devices, inspector, alarms, metrics, liveness, versions, calibrated
+        )
+        try:
+            await records.reopen()
+            await alarms.restore(records)
+        except RecordsError as error:
+            service.registry.fault = error
+        self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
+        await asyncio.to_thread(book.read)
+        lots = LotManager(service, book, audit)
+        await asyncio.to_thread(lots.restore)
+        audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
+        orders = PlcCommands(service, devices, book, lots, audit, metrics, kept)
+        orders.restore_stop()
+        interlock = Interlock(self.boot, service, devices, orders, book, lots, liveness, calibrated)
+        alarm_orders = AlarmCommands(alarms, audit)
+        panel = PanelServer(interlock, service, devices, lots, book, orders, records, alarm_orders, audit, calibrated)
+        upkeep = Housekeeping(
+            service,
+            devices,
+            interlock,
+            orders,
+            book,
+            audit,
+            metrics,
+            liveness,
+            calibrated,
+            panel.hmi_fault,
+            OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
+            broken=verbatim(self._broken) if self._broken else None,
+            reserve_mb=configuration.records.free_reserve_mb,
+            longest_pause_s=settings.retry_longest_s,
+        )
+        line = PlcInterfaceServer(
+            _with_folder(line_endpoint(configuration.handshake, configuration.home)),
+            service,
+            orders,
+            interlock,
+            lots,
+            alarm_orders,
+        )
+        tasks = [self._begin(stack, line.serve(), "line server")]
+        pages = PanelPages(
+            configuration, records, service, devices, orders, interlock, liveness, calibrated, audit, versions
+        )
+        await self._serve(stack, panel, pages)
+        health = HealthServer(
+            configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
+        )
+        port = await health.start()
+        stack.push_async_callback(health.close)
+        await self._open_devices(stack, devices, pages)
+        tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
+        self._begin(stack, alarms.store_changes(records), "alarms' records")
+        self._begin(stack, audit.run(), "audit trail")
+        self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, UPKEEP))
+        return tuple(tasks), port
+
+    @staticmethod
+    async def _open_devices(stack: contextlib.AsyncExitStack, devices: DeviceManager, pages: PanelPages) -> None:
+        """Open the devices; manual motions from the panel end before the devices are closed."""
+        stack.push_async_callback(devices.close)
+        await stack.enter_async_context(pages)
+        await devices.open()
+
+    async def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
+        await panel.restore()
+        stack.push_async_callback(panel.close)
+        endpoint = _with_folder(panel_endpoint(self._configuration.hmi, self._configuration.home))
+        self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **pages.handlers}).serve(), "panel server")
+
+    def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
+        for name in names:
+            liveness.watch(name, self._configuration.service.progress_s)
+        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
+
+    async def _note_end(self, audit: AuditLogger) -> None:
+        """Write the last audit entry of this start, if it can be written in time."""
+        audit.log(end_entry(self.boot, requested=self._stop.is_set()))
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(FLUSH_S):
+                await audit.flush()
+
+    async def _until_stop(self, needed: tuple[asyncio.Task[None], ...]) -> None:
+        """Wait for the request to end; a required task that ends by a bug ends the process."""
+        asked = asyncio.create_task(self._stop.wait(), name="order to end")
+        try:
+            done, _ = await asyncio.wait({asked, *needed}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done - {asked}:
+                task.result()
+                raise StationError(f"{task.get_name()} has ended by itself; start the station again")
+        finally:
+            asked.cancel()
+            await asyncio.gather(asked, return_exceptions=True)
+
+    async def _end(self) -> None:
+        """End the running inspection with its outcome, open the jaws and move the arm home."""
+        service = self.service
+        if service is None:
+            return
+        service.stop_requested = True
+        limit_s = self._configuration.service.clean_up_deadline_s
+        try:
+            async with asyncio.timeout(limit_s):
+                await service.conductor.until(lambda state: STATES[state].may_exit)
+        except TimeoutError:
+            log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].activity)
+
+    @staticmethod
+    def _begin(stack: contextlib.AsyncExitStack, work: Coroutine[None, None, None], name: str) -> asyncio.Task[None]:
+        task = asyncio.create_task(work, name=name)
+
+        async def end() -> None:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+        stack.push_async_callback(end)
+        return task
+
+
+def _with_folder(endpoint: str) -> str:
+    """Return the endpoint, and make the folder of a socket file; only this user may access it."""
+    if endpoint.startswith("ipc://"):
+        Path(endpoint.removeprefix("ipc://")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return endpoint
+
+
+def _register_scrapes(
+    metrics: Metrics, configuration: Configuration, records: Records, calibrated: ActiveCalibration
+) -> None:
+    metrics.watch_calibration(lambda: calibrated.figures)
+    metrics.watch_records(records.status)
+    if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
+        metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))

@@ -1,1 +1,0 @@
-"""Station service: the process that inspects with the station's devices."""

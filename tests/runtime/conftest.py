@@ -1,0 +1,299 @@
+"""The station's own process, in this one, on a simulated bench: real drivers, a channel client in the PLC's place."""
+
+import asyncio
+import contextlib
+import itertools
+import json
+import os
+import socket
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+
+from plc_interface.client import StationClient
+from plc_interface.client_errors import UnreachableError
+from station.channel.client import ChannelClient
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    BeginReply,
+    Command,
+    CommandDone,
+    CommandName,
+    Line,
+    LineFault,
+    Noted,
+    Open,
+    Outcome,
+    Published,
+    Resume,
+    StationState,
+)
+from station.inspection.states import State
+from station.messages.message import verbatim
+from station.runtime.station import Station
+from station.settings.configuration import Configuration, load_configuration
+from station.settings.plc import line_endpoint
+from station.settings.recipe import load_recipes
+from station.twin.process import Twin, TwinOptions
+
+PATIENCE_S = 60.0
+LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
+NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
+_HOSTS = itertools.count(1)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+async def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+    """Poll until something is so."""
+    deadline_s = time.monotonic() + patience_s
+    while True:
+        value = what()
+        if asyncio.iscoroutine(value):
+            value = await value
+        if value:
+            return value
+        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
+        await asyncio.sleep(0.02)
+
+
+@dataclass
+class LineClient:
+    """What the PLC interface does, by hand."""
+
+    client: ChannelClient
+    ids: Any = field(default_factory=lambda: itertools.count(1))
+
+    async def state(self, *parts: Literal["can", "reject"]) -> StationState:
+        faults = tuple(LineFault(part=part, what=verbatim("it is silent")) for part in parts)
+        return await self.client.request(LINE.model_copy(update={"faults": faults}), StationState, deadline_s=20)
+
+    async def order(self, command: CommandName, argument: int = 0) -> CommandDone:
+        return await self.client.request(Command(command=command, argument=argument), CommandDone, deadline_s=40)
+
+    async def begin(self, trigger_id: int | None = None) -> BeginReply:
+        request = Begin(trigger_id=trigger_id or next(self.ids), encoder=7, lot="LOT 1")
+        return await self.client.request(request, BeginReply, deadline_s=20)
+
+    async def outcome(self, sequence: int | None) -> Outcome:
+        assert sequence is not None
+        return await self.client.request(AwaitOutcome(sequence=sequence), Outcome, deadline_s=PATIENCE_S)
+
+    async def publish(self, outcome: Outcome) -> None:
+        await self.client.request(Published(outcome=outcome), Noted, deadline_s=20)
+        await self.client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
+
+    async def open(self) -> Open:
+        return await self.client.request(Resume(), Open, deadline_s=20)
+
+    async def ready(self) -> StationState:
+        async def look() -> StationState | None:
+            state = await self.state()
+            return state if state.ready else None
+
+        return await eventually(look)
+
+    async def inspect(self) -> Outcome:
+        """One fruit, from a ready station to an acknowledged outcome."""
+        await self.ready()
+        begun = await self.begin()
+        assert begun.refusal is None, await self.state()
+        outcome = await self.outcome(begun.sequence)
+        await self.publish(outcome)
+        return outcome
+
+
+@dataclass
+class Bench:
+    """A simulated bench and the station on it."""
+
+    twin: Twin
+    station: Station
+    line: LineClient
+    configuration: Configuration
+    running: asyncio.Task[None]
+
+    @property
+    def phase(self) -> State:
+        assert self.station.service is not None
+        return self.station.service.state
+
+    def lay(self, kind: str, seed: int = 1, *, bruised: bool = False, x_mm: float = 0.0, y_mm: float = 0.0) -> None:
+        self.twin._lay({"kind": kind, "seed": seed, "bruised": bruised, "x_mm": x_mm, "y_mm": y_mm})
+
+    def at(self, phase: State, do: Callable[[], Any]) -> None:
+        """Do something at the moment at which the cycle enters a phase, once."""
+        service = self.station.service
+        assert service is not None
+        entered = service.entered
+
+        def told(state: State, after: State, took_s: float) -> None:
+            entered(state, after, took_s)
+            if state is phase:
+                service.entered = entered
+                do()
+
+        service.entered = told
+
+    async def reach(self, phase: State) -> None:
+        """Wait for a phase, however short it is."""
+        if self.phase is not phase:
+            reached = asyncio.Event()
+            self.at(phase, reached.set)
+            async with asyncio.timeout(PATIENCE_S):
+                await reached.wait()
+
+    async def choose(self, kind: str) -> None:
+        """A ready station with a recipe; on a bench a person first says that the jaws are clear."""
+        self.twin.world.remove()
+        await eventually(lambda: self.phase in {State.UNKNOWN, State.HELD, State.IDLE})
+        done = await self.line.order(CommandName.RESET)
+        assert done.done, done.why
+        done = await self.line.order(CommandName.CHANGE_RECIPE, NUMBERS[kind])
+        assert done.done, done.why
+        self.lay(kind)
+
+
+def quick_recipes(folder: Path) -> Path:
+    """The shipped recipes with few, hasty steps."""
+    folder.mkdir(exist_ok=True)
+    for name in NUMBERS:
+        values = load_recipes()[name].model_dump(mode="json")
+        limits_mm = [limit["closing_mm"] for limit in values["damage"]["area"]]
+        values["steps"] |= {"number": 4, "result_closings_mm": limits_mm, "closing_limit_mm": 4.5}
+        values["imaging"] |= {"settle_s": 0.02, "frames_per_step": 1, "reference_frames": 3}
+        values["damage"]["growth_mm2_per_mm"] = 60
+        values["damage"].pop("size", None)
+        # The bench's unit is not calibrated: by a usual coverage its scale alone would keep every fruit from PASS.
+        values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
+        values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
+        width = values["expected_width"]
+        width["largest_mm"] = min(width["largest_mm"], 42.0)
+        (folder / f"{name}.yaml").write_text(json.dumps(values))
+    return folder
+
+
+@pytest.fixture
+def settings_file(tmp_path: Path) -> Callable[..., Path]:
+    """Write a station.yaml for addresses of its own; the station's patience is that of a busy machine."""
+
+    def write(**service: Any) -> Path:
+        host = f"127.78.{os.getpid() % 250 + 1}.{next(_HOSTS) % 250 + 1}"
+        values = {
+            "home": str(tmp_path / "home"),
+            "recipes_folder": str(quick_recipes(tmp_path / "recipes")),
+            "arm": {
+                "host": host,
+                "stale_after_s": 1.0,
+                "link_lost_after_s": 4.0,
+                "watchdog_hz": 0.5,
+                "constructor_limit_s": 60.0,
+            },
+            "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+            "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
+            "metrics": {"port": free_port()},
+            "records": {"free_reserve_mb": 1},
+            "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow", **service},
+        }
+        file = tmp_path / "station.yaml"
+        file.write_text(json.dumps(values))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def roomy(settings_file: Callable[..., Path], tmp_path: Path) -> Callable[..., Path]:
+    """The same with a limit for strawberries that a large sound one keeps without its size."""
+
+    def write(**service: Any) -> Path:
+        file, recipe = settings_file(**service), tmp_path / "recipes" / "strawberry.yaml"
+        values = json.loads(recipe.read_text())
+        for limit, area_mm2 in zip(values["damage"]["area"], (115, 140), strict=True):
+            limit["area_mm2"] = area_mm2
+        recipe.write_text(json.dumps(values))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def line_client() -> type[LineClient]:
+    """What the PLC interface does, by hand, over a channel."""
+    return LineClient
+
+
+@pytest.fixture
+def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
+    """Start a simulated bench and a station on it, in this process; both end with the block."""
+
+    @contextlib.asynccontextmanager
+    async def begin(file: Path | None = None, broken: str = "", **service: Any) -> AsyncIterator[Bench]:
+        configuration = load_configuration(file or settings_file(**service), {})
+        twin = Twin(
+            TwinOptions(
+                bench=configuration.service.bench,
+                arm=configuration.arm,
+                gripper=configuration.gripper,
+                camera=configuration.camera.twin,
+                console_port=0,
+            )
+        )
+        await twin.start()
+        station = Station(configuration, broken)
+        started = asyncio.Event()
+        running = asyncio.create_task(station.run(lambda _port: started.set()), name="station")
+        try:
+            await asyncio.wait({running, asyncio.create_task(started.wait())}, return_when=asyncio.FIRST_COMPLETED)
+            if running.done():
+                running.result()
+            endpoint = line_endpoint(configuration.handshake, configuration.home)
+            async with ChannelClient(endpoint, "the station") as client:
+                yield Bench(twin, station, LineClient(client), configuration, running)
+        finally:
+            station.stop()
+            await running
+            await twin.stop()
+
+    return begin
+
+
+@contextlib.asynccontextmanager
+async def armed_interface(file: Path) -> AsyncIterator[StationClient]:
+    """`station plc run` with the patience of a busy machine, and a PLC that is armed."""
+    port = free_port()
+    patience = {"BEGIN_DEADLINE_S": "2.5", "STATION_LOST_AFTER_S": "30", "PLC_HEARTBEAT_TIMEOUT_S": "30"}
+    patient = {f"STATION_HANDSHAKE_{name}": value for name, value in patience.items()}
+    environment = {**os.environ, **patient, "STATION_MODBUS_PORT": str(port)}
+    command = (sys.executable, "-m", "station", "plc", "run", "--config", str(file))
+    process = await asyncio.create_subprocess_exec(*command, env=environment)
+    try:
+        async with contextlib.AsyncExitStack() as stack:
+            async with asyncio.timeout(60):
+                while True:
+                    with contextlib.suppress(UnreachableError):
+                        plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
+                        break
+                    await asyncio.sleep(0.1)
+            await plc.arm()
+            yield plc
+    finally:
+        process.terminate()
+        await process.wait()
+
+
+@pytest.fixture
+def plc_interface() -> Callable[[Path], contextlib.AbstractAsyncContextManager[StationClient]]:
+    """`station plc run` for a station's settings, and a PLC that is armed."""
+    return armed_interface

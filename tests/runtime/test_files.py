@@ -1,0 +1,70 @@
+"""What the home folder keeps: the last good form of every file, whole after a crash in the middle of writing."""
+
+import json
+
+import pytest
+
+from station.runtime.last_good import load_or_last_good
+from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
+from station.runtime.state_files import StateFiles
+from station.settings.problems import SettingsError
+
+
+def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file, tmp_path):
+    file = settings_file()
+    good, broken = load_or_last_good(file, {})
+    assert broken == ""
+    file.write_text("service: {bench: 12}")
+    again, broken = load_or_last_good(file, {"STATION_HOME": str(good.home)})
+    assert again == good
+    assert "service.bench" in broken
+    assert str(file) in broken
+    other = tmp_path / "other.yaml"
+    other.write_text("service: {bench: 12}")
+    with pytest.raises(SettingsError):
+        load_or_last_good(other, {"STATION_HOME": str(good.home)})
+
+
+def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_gone(settings_file, tmp_path):
+    settings_file()
+    folder, kept = tmp_path / "recipes", StateFiles(tmp_path / "home")
+    book = ActiveRecipes(folder, kept)
+    book.read()
+    assert book.numbers == (1, 2, 3)
+    assert book.problems == ()
+    blueberry = book.find(2)
+    assert blueberry is not None
+    assert book.store_active(blueberry, "LOT 1")
+    (folder / "blueberry.yaml").write_text("name: [")
+    (folder / "raspberry.yaml").unlink()
+
+    later = ActiveRecipes(folder, kept)
+    later.read()
+    assert later.numbers == (1, 2)
+    assert later.restored() == (blueberry, "LOT 1")
+    assert any("blueberry.yaml" in str(problem) for problem in later.problems)
+
+
+def test_a_checksum_is_that_of_the_recipe_and_of_nothing_else(settings_file, tmp_path):
+    settings_file()
+    book = ActiveRecipes(tmp_path / "recipes", StateFiles(tmp_path / "home"))
+    book.read()
+    active = book.find(1)
+    assert active is not None
+    assert json.loads(active.snapshot.text) == active.recipe.model_dump(mode="json")
+    other = active.recipe.model_copy(update={"title": "Other"})
+    assert ActiveRecipe.of(other).snapshot.checksum != active.snapshot.checksum
+
+
+def test_a_file_is_there_whole_or_not_at_all(tmp_path):
+    kept = StateFiles(tmp_path)
+    assert kept.read("a/b.json") is None
+    assert kept.write("a/b.json", b"first")
+    before = (tmp_path / "a" / "b.json").stat().st_ino
+    assert kept.write("a/b.json", b"first")
+    assert (tmp_path / "a" / "b.json").stat().st_ino == before, "nothing is written where nothing changes"
+    assert kept.write("a/b.json", b"second")
+    assert kept.read("a/b.json") == b"second"
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["b.json"]
+    (tmp_path / "file").write_bytes(b"")
+    assert not kept.write("file/inside", b"x")

@@ -1,0 +1,145 @@
+"""The sweep to a fruit: closing without a stop, the fingers' width at each frame, and how far they go unseen."""
+
+import asyncio
+import time
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperStoppedError
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.messages import gripper as gripper_messages
+from station.runtime.devices import grip as grip_module
+from station.runtime.devices.grip import MOST_UNSEEN_MM, Cell, Grip, NothingTouchedError, UnseenContactError
+from station.settings.recipe import find_recipe
+
+BLUEBERRY = find_recipe("blueberry")
+START_MM = BLUEBERRY.expected_width.largest_mm
+FRAME_S, FRAME_AGE_S = 1 / 30, 0.05
+
+
+class Fingers:
+    """A gripper and a camera on one clock, which goes on by a frame with every frame."""
+
+    max_width_mm = 53.0
+
+    def __init__(self, fruit_mm: float, stopped_at_mm: float = 0.0) -> None:
+        self.now_s, self.fruit_mm, self.stopped_at_mm = 100.0, fruit_mm, stopped_at_mm
+        self.stops, self.opened_to_mm = 0, []
+        self._from, self._to_mm, self._speed = (self.now_s, START_MM), START_MM, 0.0
+        self._stopped, self._ticked = asyncio.Event(), asyncio.Event()
+
+    def width_at(self, at_s: float) -> float:
+        since_s, from_mm = self._from
+        way = self._speed * max(0.0, at_s - since_s)
+        return max(from_mm - way, self._to_mm, self.stopped_at_mm) if self._to_mm < from_mm else self._to_mm
+
+    async def read(self) -> GripperReading:
+        width_mm = self.width_at(self.now_s)
+        held = self.stopped_at_mm > self._to_mm and width_mm <= self.stopped_at_mm
+        state = ObjectState.CONTACT_CLOSING if held else ObjectState.AT_POSITION
+        return GripperReading(width_mm, 0, 0, state, active=True, fault_code=0, current_a=None, at_s=self.now_s)
+
+    async def move_to_width(self, width_mm: float, speed_mm_s: float, _force_n: float) -> MoveResult:
+        self._stopped.clear()
+        self._from, self._to_mm, self._speed = (self.now_s, self.width_at(self.now_s)), width_mm, speed_mm_s
+        if self._from[1] - width_mm <= 2.0:  # a step is there before the next frame
+            self._from = (0.0, self._from[1])
+        while self.width_at(self.now_s) > max(width_mm, self.stopped_at_mm):
+            self._ticked.clear()
+            await self._ticked.wait()
+            if self._stopped.is_set():
+                raise GripperStoppedError(gripper_messages.STOPPED(), gripper_messages.REMEDY_STOPPED())
+        return MoveResult(width_mm, 0, await self.read())
+
+    async def open(self, width_mm: float | None = None) -> MoveResult:
+        self._from, self._to_mm = (self.now_s, width_mm or self.max_width_mm), width_mm or self.max_width_mm
+        self.opened_to_mm.append(self._to_mm)
+        return MoveResult(self._to_mm, 0, await self.read())
+
+    async def stop(self) -> GripperReading:
+        self.stops += 1
+        self._to_mm = self.width_at(self.now_s)
+        self._from = (self.now_s, self._to_mm)
+        self._stopped.set()
+        self._ticked.set()
+        return await self.read()
+
+    async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
+        captured_s = newer_than_s + FRAME_S
+        self.now_s = max(self.now_s + FRAME_S, captured_s + FRAME_AGE_S)
+        self._ticked.set()
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        return Frame(np.zeros((2, 2, 3), np.uint8), 1, captured_s)
+
+
+@pytest.fixture
+def cell(monkeypatch):
+    def make(fruit_mm: float, stopped_at_mm: float = 0.0) -> tuple[Fingers, Grip, Any]:
+        fingers = Fingers(fruit_mm, stopped_at_mm)
+
+        class Clock:
+            @staticmethod
+            def monotonic() -> float:
+                return fingers.now_s
+
+        monkeypatch.setattr(grip_module, "time", Clock)
+
+        async def touches(step: Any) -> bool:
+            return fingers.width_at(step.last_frame.captured_s) < fruit_mm
+
+        return fingers, Grip(Cell(cast("Any", fingers), cast("Any", fingers), None), BLUEBERRY), touches
+
+    return make
+
+
+def test_the_fingers_close_on_until_a_frame_shows_a_contact_and_each_frame_has_its_own_width(cell):
+    async def scenario():
+        fingers, grip, touches = cell(15.3)
+        met = await grip.sweep(touches)
+        stopped_mm = (await fingers.read()).width_mm
+        assert fingers.stops == 1
+        assert met.clear_mm is not None
+        assert met.width_mm < 15.3 <= met.clear_mm
+        assert met.clear_mm - met.width_mm == pytest.approx(BLUEBERRY.gripper.speed_mm_s * FRAME_S, abs=0.01)
+        assert 15.3 - stopped_mm < MOST_UNSEEN_MM
+        before, start = await grip.onset(met, touches)
+        assert min(fingers.opened_to_mm) > 15.3, "the fine search begins where nothing touches"
+        assert before is not None
+        assert before.move.width_mm >= 15.3 > start.move.width_mm
+        assert before.move.width_mm - start.move.width_mm == pytest.approx(0.4)
+
+    asyncio.run(scenario())
+
+
+def test_fingers_wait_for_a_measurement_that_is_late(cell, monkeypatch):
+    async def scenario():
+        fingers, grip, touches = cell(15.3)
+        monkeypatch.setattr(grip_module, "time", time)
+        fingers.now_s = time.monotonic()
+        pending = []
+
+        async def late(step: Any) -> bool:
+            pending.append(step)
+            while len(pending) == 3 and not fingers.stops:
+                await asyncio.sleep(0.01)
+            return await touches(step)
+
+        met = await grip.sweep(late)
+        assert fingers.stops == 2, "once for the late one, once at the contact"
+        assert met.width_mm < 15.3
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(("stopped_at_mm", "error"), [(14.0, UnseenContactError), (0.0, NothingTouchedError)])
+def test_fingers_that_end_their_way_without_a_contact_say_whether_something_held_them(cell, stopped_at_mm, error):
+    async def scenario():
+        _, grip, touches = cell(0.0, stopped_at_mm)
+        with pytest.raises(error):
+            await grip.sweep(touches)
+
+    asyncio.run(scenario())
