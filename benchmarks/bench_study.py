@@ -25,7 +25,7 @@ from station.studies.failure import interval
 from station.studies.folder import Identity, identity_of
 from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_figures import components_plot, measurements_plot
-from station.studies.gauge_report import tolerance_percents, verdict
+from station.studies.gauge_report import aiag_class, tolerance_percents
 from station.studies.grr import GaugeStudy
 from station.studies.sample import Task
 from station.studies.study import Request, Study, judged, run_study, summary
@@ -230,7 +230,7 @@ def gauge_table(study: GaugeStudy) -> str:
     shown = table(["", "standard deviation, mm²", "% of the total variation", "6 of them, % of the tolerance"], rows)
     facts = "\n".join(f"- {name}: {words}." for name, words in study.facts)
     return (
-        f"{facts}\n\n{shown}\n\n{verdict(gauge)[1]} The interaction is "
+        f"{facts}\n\n{shown}\n\n{aiag_class(gauge)[1]} The interaction is "
         f"{'pooled' if gauge.pooled else 'significant and not pooled'}."
     )
 

@@ -107,15 +107,15 @@ def _name_messages(_logger: Any, _method: str, event: EventDict) -> EventDict:
     """Add the id and the parameters of the messages that were given; several are listed as one."""
     arguments = event.get("positional_args") or ()
     values = arguments.values() if isinstance(arguments, Mapping) else arguments
-    given = [said for value in (*values, *event.values()) if (said := _said(value)) is not None]
+    given = [said for value in (*values, *event.values()) if (said := _message_in(value)) is not None]
     if not given:
         return event
     said = joined(given)
-    written = {name: value if _said(value) is None else str(value) for name, value in event.items()}
+    written = {name: value if _message_in(value) is None else str(value) for name, value in event.items()}
     return {**written, "message": said.id, "parameters": said.model_dump(mode="json")["parameters"]}
 
 
-def _said(value: object) -> Message | None:
+def _message_in(value: object) -> Message | None:
     said = value.message if isinstance(value, StationError) else value
     return said if isinstance(said, Message) else None
 

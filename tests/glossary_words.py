@@ -48,8 +48,7 @@ OTHER_SENSES: dict[str, tuple[str, tuple[str, ...]]] = {
 MEANT: dict[str, tuple[str, ...]] = {
     # the PLC's command `call_off`
     "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
-    "calm": ("station/vision/curvature.py", "docs/robust-constants.md"),  # the constant `calm_trust`
-    "conductor": ("station/runtime/cycle/runner.py",),
+    "calm": ("docs/robust-constants.md",),  # the constant `calm_trust`
     "damaged passed": ("docs/grr.md", "docs/sorting.md"),  # column headings of a result
     "frame": ("plc_interface/modbus/exceptions.py", "plc_interface/modbus/mbap.py"),
     "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
@@ -57,12 +56,8 @@ MEANT: dict[str, tuple[str, ...]] = {
         "docs/alarms.md",  # a person does
         "docs/configuration.md",
         "docs/robust-constants.md",
-        "station/runtime/rpc/restored_inspections.py",
-        "station/twin/digit/optics.py",  # in a table
-        "station/vision/press.py",  # ahead
     ),
     "shot": ("docs/configuration.md", "station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
-    "skirt": ("station/twin/gel.py",),  # of a half-space's surface
     "sound diverted": ("README.md", "docs/sorting.md"),  # column headings of a result
     "stands": ("docs/plc/handshake.md", "docs/robust-constants.md"),
     "witness": ("docs/robust-constants.md",),

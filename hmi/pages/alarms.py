@@ -43,7 +43,7 @@ def _alarms_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     }
 
 
-PARTS = {"alarms.standing": Part("alarms_standing.html.j2", _alarms, _alarms_values)}
+PARTS = {"alarms.not_normal": Part("alarms_standing.html.j2", _alarms, _alarms_values)}
 
 
 @router.get("/alarms")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from station.studies.gauge_design import TwinDesign, study_on_twin
-from station.studies.gauge_report import render, verdict
+from station.studies.gauge_report import aiag_class, render
 from station.studies.gauge_table import read_measurements
 from station.studies.grr import GaugeStudy, analysed, check_folder, store
 from station.studies.workers import stop_on_sigterm
@@ -70,7 +70,7 @@ def grr(
     else:
         study = _on_twin(TwinDesign(fruit, parts, operators, repeats, seed, jobs, dummies), tolerance)
     store(study, render(study), out)
-    click.echo(f"{verdict(study.gauge)[1]} Report: {out / 'report.html'}")
+    click.echo(f"{aiag_class(study.gauge)[1]} Report: {out / 'report.html'}")
 
 
 def _on_twin(design: TwinDesign, tolerance: float | None) -> GaugeStudy:

@@ -103,7 +103,7 @@ class Alarm:
     since_s: float = 0.0
     """When it became active."""
     raised: int = 0
-    """How often since it was forgotten; a chattering alarm counts up and is published once."""
+    """How often since it was last over; a chattering alarm counts up and is published once."""
     raises_s: tuple[float, ...] = ()
     """When, the last three times."""
     quiet_since_s: float | None = None
@@ -115,7 +115,7 @@ class Alarm:
         """Whether it comes and goes too often to be published each time."""
         return len(self.raises_s) == CHATTER_RAISES and now_s - self.raises_s[0] < CHATTER_S
 
-    def forgotten(self, now_s: float) -> bool:
+    def over(self, now_s: float) -> bool:
         """Whether nothing about it matters any more."""
         return self.state == AlarmState.NORMAL and not any(0 <= now_s - raised < CHATTER_S for raised in self.raises_s)
 
@@ -190,22 +190,22 @@ class Alarms:
     def tick(self, now_s: float) -> Self:
         """End what time ends: shelving, and an alarm that no longer chatters. Call it about once a second."""
         ticked = (_ticked(alarm, now_s) for alarm in self.known.values())
-        return type(self)({alarm.id: alarm for alarm in ticked if not alarm.forgotten(now_s)})
+        return type(self)({alarm.id: alarm for alarm in ticked if not alarm.over(now_s)})
 
     @property
-    def standing(self) -> tuple[Alarm, ...]:
+    def not_normal(self) -> tuple[Alarm, ...]:
         """All that are not normal, also those that are shelved, most urgent first: by priority, the older first."""
-        standing = [alarm for alarm in self.known.values() if alarm.state is not AlarmState.NORMAL]
-        return tuple(sorted(standing, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
+        not_normal = [alarm for alarm in self.known.values() if alarm.state is not AlarmState.NORMAL]
+        return tuple(sorted(not_normal, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
 
-    def shown(self) -> tuple[Alarm, ...]:
+    def annunciated(self) -> tuple[Alarm, ...]:
         """What an operator sees, most urgent first."""
-        return tuple(alarm for alarm in self.standing if alarm.state in SHOWN)
+        return tuple(alarm for alarm in self.not_normal if alarm.state in SHOWN)
 
     @property
     def active(self) -> tuple[Alarm, ...]:
         """Of those shown, the ones whose cause is there or that are latched."""
-        return tuple(alarm for alarm in self.shown() if alarm.state in ACTIVE)
+        return tuple(alarm for alarm in self.annunciated() if alarm.state in ACTIVE)
 
     @property
     def word(self) -> int:

@@ -129,16 +129,16 @@ def _box(state: State, arrows: dict[tuple[State, State], list[Event]]) -> str:
         [
             f'<rect x="{left:g}" y="{top:g}" width="{WIDTH_PX}" height="{HEIGHT_PX}" rx="5" stroke="#222" ',
             f'stroke-width="{stroke}" fill="{COLOURS[STATES[state].needs_person]}"/>',
-            _text(left + WIDTH_PX / 2, top + (17 if far else 29), _words(state), 12, "#000"),
+            _text(left + WIDTH_PX / 2, top + (17 if far else 29), _labels(state), 12, "#000"),
             *(
-                _text(left + WIDTH_PX / 2, top + 31 + 12 * line, f"{_words(*events)} → {_words(end)}", 10, "#333")
+                _text(left + WIDTH_PX / 2, top + 31 + 12 * line, f"{_labels(*events)} → {_labels(end)}", 10, "#333")
                 for line, (end, events) in enumerate(far)
             ),
         ]
     )
 
 
-def _words(*names: State | Event) -> str:
+def _labels(*names: State | Event) -> str:
     return ", ".join(name.value.replace("_", " ") for name in names)
 
 
@@ -162,7 +162,7 @@ def _arrow(start: State, end: State, events: list[Event]) -> str:
         middle = (x1 + x2) / 2
         path, label = f"M{x1:g} {y1:g}C{middle:g} {y1:g} {middle:g} {y2:g} {x2:g} {y2:g}", (middle, (y1 + y2) / 2 - 3)
     return f'<path d="{path}" fill="none" stroke="#444" marker-end="url(#tip)"/>' + _text(
-        *label, _words(*events), 10, "#333"
+        *label, _labels(*events), 10, "#333"
     )
 
 

@@ -58,7 +58,7 @@ class AreaAt:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Judgement:
     """The judgement of one press."""
 
     outcome: OutcomeName
@@ -114,7 +114,7 @@ _LATE_START = 0.25
 """Share of the first damage threshold's closing by which the curve may seem to begin after the onset."""
 
 
-def judge(press: Press, recipe: Recipe) -> Verdict:
+def judge(press: Press, recipe: Recipe) -> Judgement:
     """Judge a press. The same for any order of the points, and for areas and limits in any one unit.
 
     Args:
@@ -141,7 +141,7 @@ def judge(press: Press, recipe: Recipe) -> Verdict:
     else:
         partial = areas[-1].area_mm2 is None and not _almost(evidence, recipe)
     order = list(Reason)
-    return Verdict(
+    return Judgement(
         outcome=outcome,
         findings=tuple(sorted(findings, key=lambda finding: order.index(finding.reason))),
         deciding=_deciding(evidence, recipe, proofs),

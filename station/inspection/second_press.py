@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from station.inspection.evidence import AT_MM, LOWER_BOUNDS
-from station.inspection.judge import Verdict
+from station.inspection.judge import Judgement
 from station.inspection.press import Measured, Press
 from station.vocabulary import Reason
 
@@ -18,7 +18,7 @@ FREED_BY_MM = 2.0
 one that rolled."""
 
 
-def needs_second_press(verdict: Verdict) -> bool:
+def needs_second_press(verdict: Judgement) -> bool:
     """Whether another press may decide what is not decided yet. A fault or a size that cannot be is never one.
 
     Args:

@@ -121,7 +121,7 @@ def define(id: str, english: str, **parameters: Kind) -> Definition:  # noqa: A0
     Raises:
         ValueError: the id is taken, or the braces are not the parameters.
     """
-    return _kept(Definition(id, english, parameters))
+    return _registered(Definition(id, english, parameters))
 
 
 def define_plural(id: str, english: str, plural: str, counted: str, **parameters: Kind) -> Definition:  # noqa: A002
@@ -142,7 +142,7 @@ def define_plural(id: str, english: str, plural: str, counted: str, **parameters
         raise TypeError(f"{id}: {counted} is no number among its parameters")
     if missing := parameters.keys() - {counted} - fields(plural):
         raise ValueError(f"{id}: the plural lacks {sorted(missing)}")
-    return _kept(Definition(id, english, parameters, plural, counted))
+    return _registered(Definition(id, english, parameters, plural, counted))
 
 
 def fields(sentence: str) -> set[str]:
@@ -164,7 +164,7 @@ def definitions() -> Iterator[Definition]:
     yield from (_DEFINITIONS[each] for each in sorted(_DEFINITIONS))
 
 
-def _kept(new: Definition) -> Definition:
+def _registered(new: Definition) -> Definition:
     if new.id in _DEFINITIONS:
         raise ValueError(f"{new.id} is defined twice")
     if (found := fields(new.english)) - new.parameters.keys() or new.parameters.keys() - found - {new.counted}:

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from station.inspection.judge import Verdict
+from station.inspection.judge import Judgement
 from station.inspection.press import Flag, Measured, Press
 from station.messages.message import Message, joined
 
@@ -41,7 +41,7 @@ def first_press(measures: Mapping[str, Any]) -> Press | None:
     return Press(onset_mm, uncertainty_mm, measured)
 
 
-def first_press_findings(verdict: Verdict | None) -> Message | None:
+def first_press_findings(verdict: Judgement | None) -> Message | None:
     """Return why the first press did not decide.
 
     Args:

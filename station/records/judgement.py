@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from station.inspection.judge import Verdict
+from station.inspection.judge import Judgement
 from station.inspection.uncertainty import COMPONENTS
 
 _FACTOR, _COMBINED, _SHARE = "coverage_factor", "uncertainty", "uncertainty_"
 _LIMITS = "limit_factor"
 
 
-def judgement_measures(verdict: Verdict) -> dict[str, float]:
+def judgement_measures(verdict: Judgement) -> dict[str, float]:
     """Return what the record stores of a verdict beside its reasons: relative standard uncertainties.
 
     Args:

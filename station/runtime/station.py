@@ -164,7 +164,7 @@ class Station:
         port = await health.start()
         stack.push_async_callback(health.close)
         await self._open_devices(stack, devices, pages)
-        tasks += [self._begin(stack, service.conductor.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
+        tasks += [self._begin(stack, service.runner.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.store_changes(records), "alarms' records")
         self._begin(stack, audit.run(), "audit trail")
         self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, UPKEEP))
@@ -216,7 +216,7 @@ class Station:
         limit_s = self._configuration.service.clean_up_deadline_s
         try:
             async with asyncio.timeout(limit_s):
-                await service.conductor.until(lambda state: STATES[state].may_exit)
+                await service.runner.until(lambda state: STATES[state].may_exit)
         except TimeoutError:
             log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].activity)
 

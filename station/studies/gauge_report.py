@@ -18,7 +18,7 @@ GOOD, BEARABLE = 10.0, 30.0
 """Per cent; AIAG calls a gauge acceptable up to the first and unacceptable beyond the second."""
 
 
-def verdict(gauge: Gauge) -> tuple[str, str]:
+def aiag_class(gauge: Gauge) -> tuple[str, str]:
     """Return AIAG's judgement of such a gauge, as a class of the page's style and in words."""
     grr = gauge.component("GRR")
     percent, of = (
@@ -52,7 +52,7 @@ def render(study: GaugeStudy) -> str:
         study=study,
         gauge=gauge,
         meanings=_MEANINGS,
-        verdict=verdict(gauge),
+        verdict=aiag_class(gauge),
         operators=operators,
         origins=[(one.name, tolerance_percents(one.gauge)) for one in study.origins],
         between=[] if agreed is None else [(a, b, _kappa(kappa)) for a, b, kappa in agreed.between],

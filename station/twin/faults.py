@@ -85,7 +85,7 @@ class FaultBoard:
         """
         return self._active.get(fault, 0.0)
 
-    def take_begun(self) -> frozenset[str]:
+    def take_new(self) -> frozenset[str]:
         """The faults switched on since the last call, also those that are off again."""
         begun = frozenset(self._begun)
         self._begun.clear()

@@ -37,7 +37,7 @@ class Gel:
     thickness_mm: float = 2.27
     modulus_mpa: float = 0.12
     poisson: float = 0.48
-    skirt_reach_mm: float = 4.0
+    outer_reach_mm: float = 4.0
     """Fits the presses of the 6 mm ball best (2.3 to 6 tried)."""
     mm_per_px: float = MM_PER_PX
     """How large the sensor's lens shows it; units differ."""
@@ -55,16 +55,16 @@ class Gel:
         slenderness = np.sqrt(np.asarray(approach_mm, float) * radius_mm) / self.thickness_mm
         return np.asarray(np.polyval(_STIFFENING, np.minimum(slenderness, _SLENDEREST)), np.float64)
 
-    def skirt_reach(self, distance_mm: FloatArray) -> FloatArray:
+    def outer_share(self, distance_mm: FloatArray) -> FloatArray:
         """What the glued underside leaves of a half-space's dent at a distance from the contact's edge.
 
         Args:
             distance_mm: distance outwards from the edge, any shape.
         """
-        return np.exp(-np.square(distance_mm / np.float32(self.skirt_reach_mm)))
+        return np.exp(-np.square(distance_mm / np.float32(self.outer_reach_mm)))
 
 
-def half_space_skirt(ratio_squared: FloatArray) -> FloatArray:
+def half_space_surface(ratio_squared: FloatArray) -> FloatArray:
     """The dent of a half-space outside a paraboloid's contact, over its approach.
 
     Johnson's equation 3.42a; at the edge it has the value 1/2 and the slope of the paraboloid.
@@ -140,5 +140,5 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
     outwards_squared = np.maximum(surface.relative_squared(gap_mm) / at_edge, np.float32(1.0))
     contact_radius_mm = np.float32(np.sqrt(approach_mm * surface.radius_mm))
     beyond_mm = (np.sqrt(outwards_squared) - 1.0) * contact_radius_mm
-    skirt = np.float32(approach_mm) * half_space_skirt(outwards_squared) * gel.skirt_reach(beyond_mm)
+    skirt = np.float32(approach_mm) * half_space_surface(outwards_squared) * gel.outer_share(beyond_mm)
     return np.where(gap_mm < approach_mm / 2, approach_mm - gap_mm, skirt).astype(np.float32)

@@ -49,7 +49,7 @@ def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage
     return resized(np.sqrt(2 * np.sqrt(determinant), dtype=np.float32), (width, height))
 
 
-def calm(response: FloatImage, least_curvature: float, constants: Constants) -> FloatImage:
+def first_background(response: FloatImage, least_curvature: float, constants: Constants) -> FloatImage:
     """A first guess of the background: what curves little more than the calmest twentieth of the frame.
 
     What such places enclose, as a contact's ring does its flat centre, is no background either.

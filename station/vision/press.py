@@ -22,7 +22,7 @@ class PressTracker:
         self._previous = first
         self._ahead: dict[int, tuple[Image, Contact]] = {}
 
-    def look_ahead(self, image: Image) -> None:
+    def prepare_next(self, image: Image) -> None:
         """Measure one frame of the step that comes next, so that `measure_step` has less to do.
 
         Args:

@@ -19,7 +19,7 @@ from station.vision.changed_area import agreement, agreement_of_growth, changed
 from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.contour import change_length
-from station.vision.curvature import calm, curvature, curvature_noise
+from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
 from station.vision.outline import Outline, find_outline
 from station.vision.reference_check import ReferenceCheck
@@ -213,7 +213,7 @@ class RobustMethod:
         Raises:
             ValueError: the image's shape or dtype is not the references'.
         """
-        state = self._begun(image, previous)
+        state = self._start(image, previous)
         difference = state.difference.copy() if on_stage else state.difference
         for stage in self.pipeline:
             stage(state)
@@ -242,10 +242,10 @@ class RobustMethod:
         Raises:
             ValueError: as `measure`.
         """
-        response = self._weak_response(self._begun(image, None))
+        response = self._weak_response(self._start(image, None))
         return response.field, self._weak.threshold * response.compression
 
-    def _begun(self, image: Image, previous: Contact | None) -> State:
+    def _start(self, image: Image, previous: Contact | None) -> State:
         if image.shape != self._shape or image.dtype != np.uint8:
             raise ValueError(
                 f"image {image.shape} {image.dtype} must be uint8 and of the reference's shape {self._shape}"
@@ -264,7 +264,7 @@ class RobustMethod:
 
     def _subtract_background(self, state: State) -> None:
         """Fit the background where the gel hardly curves and nothing touched before, and take it off."""
-        state.calm = calm(
+        state.calm = first_background(
             curvature(state.quarter, _COARSE_STEP, self._constants), self._least_curvature, self._constants
         )
         before = state.before

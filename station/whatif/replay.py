@@ -11,7 +11,7 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from station.inspection.judge import Verdict, early_stop, judge
+from station.inspection.judge import Judgement, early_stop, judge
 from station.inspection.press import Press
 from station.inspection.second_press import needs_second_press, together
 from station.messages import whatif as messages
@@ -137,7 +137,7 @@ def _judged(
     """
     for pressed in range(1, len(presses) + 1):
         then, now = (together(each) for each in zip(*presses[:pressed], strict=True))
-        verdict = _verdict(then, now, own, draft)
+        verdict = _judgement(then, now, own, draft)
         if isinstance(verdict, Message):
             return _undecidable(stored, verdict, faithful=faithful)
         if pressed >= draft.press.attempts or not needs_second_press(verdict):
@@ -145,7 +145,7 @@ def _judged(
     return _undecidable(stored, messages.ANOTHER_PRESS(), faithful=faithful)
 
 
-def _verdict(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Verdict | Message:
+def _judgement(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Judgement | Message:
     """Return the draft's verdict on presses together, or why it is not known."""
     if whole.onset_mm is None:
         sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
@@ -194,7 +194,7 @@ def _fits(onset_mm: float | None, draft: Recipe) -> bool:
     return onset_mm is not None and expected.smallest_mm <= onset_mm <= expected.largest_mm
 
 
-def _decided(stored: StoredPress, verdict: Verdict, *, faithful: bool) -> Replayed:
+def _decided(stored: StoredPress, verdict: Judgement, *, faithful: bool) -> Replayed:
     found = [finding.message for finding in verdict.findings]
     why = joined(found) if found else None
     return Replayed(stored.sequence, stored.lot, stored.before, verdict.outcome, why, faithful)

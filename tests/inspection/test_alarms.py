@@ -67,9 +67,9 @@ def test_the_common_life():
     assert alarms.raise_(LOW, 20.0, verbatim("1 GB left")).get(LOW).detail == verbatim("1 GB left")
     returned = alarms.returned(LOW, 30.0)
     assert returned.get(LOW).state == AlarmState.RETURNED
-    assert [alarm.id for alarm in returned.shown()] == [LOW]
+    assert [alarm.id for alarm in returned.annunciated()] == [LOW]
     assert (returned.active, returned.word) == ((), 0)
-    assert returned.acknowledge(LOW).shown() == ()
+    assert returned.acknowledge(LOW).annunciated() == ()
     assert alarms.acknowledge(LOW).returned(LOW, 30.0).tick(200.0).known == {}
 
 
@@ -88,8 +88,8 @@ def test_a_latched_alarm_stands_until_a_person_resets_it():
 def test_shelving_hides_for_a_time_and_no_longer():
     shelved = Alarms().raise_(LOW, 0.0, None).shelve(LOW, 10.0, 600.0, "anna")
     assert (shelved.get(LOW).state, shelved.get(LOW).shelved_by) == (AlarmState.SHELVED, "anna")
-    assert (shelved.shown(), shelved.word, shelved.error_code) == ((), 0, 0)
-    assert shelved.tick(609.0).shown() == ()
+    assert (shelved.annunciated(), shelved.word, shelved.error_code) == ((), 0, 0)
+    assert shelved.tick(609.0).annunciated() == ()
     back = shelved.tick(611.0).get(LOW)
     assert (back.state, back.shelved_until_s, back.shelved_by) == (AlarmState.UNACKNOWLEDGED, None, "")
     long = Alarms().raise_(LOW, 0.0, None).shelve(LOW, 0.0, 1e9, "anna").get(LOW)
@@ -113,7 +113,7 @@ def test_the_most_urgent_comes_first_then_the_oldest():
     alarms = Alarms()
     for second, alarm in enumerate((LOW, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, STOP)):
         alarms = alarms.raise_(alarm, float(second), None)
-    assert [a.id for a in alarms.shown()] == [STOP, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, LOW]
+    assert [a.id for a in alarms.annunciated()] == [STOP, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, LOW]
     assert alarms.error_code == ALARMS[STOP].number
     assert alarms.word == sum(
         1 << (ALARMS[a].number - 1) for a in (LOW, STOP, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST)

@@ -1,4 +1,4 @@
-"""The conductor: events in their order, actions beside them, and what HALT forgets."""
+"""The runner: events in their order, actions beside them, and what HALT forgets."""
 
 import asyncio
 
@@ -12,7 +12,7 @@ from station.inspection.cycle import Action, Event
 from station.inspection.states import State
 from station.messages.message import verbatim
 from station.records.errors import DiskFullError
-from station.runtime.cycle.runner import Conductor, event_of
+from station.runtime.cycle.runner import CycleRunner, event_of
 from station.runtime.devices.grip import FramesError
 
 
@@ -75,11 +75,11 @@ class Script:
 
 def conduct(script, scenario):
     async def run():
-        conductor = Conductor(script)
-        running = asyncio.create_task(conductor.run())
+        runner = CycleRunner(script)
+        running = asyncio.create_task(runner.run())
         try:
             async with asyncio.timeout(20):
-                await scenario(conductor)
+                await scenario(runner)
         finally:
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
@@ -98,12 +98,12 @@ GETTING_READY = {
 def test_actions_lead_on_and_an_unlisted_event_is_counted(caplog):
     script = Script(GETTING_READY)
 
-    async def scenario(conductor):
-        conductor.post(Event.PLACED)
-        conductor.post(Event.READY)
-        await conductor.until(lambda state: state is State.STOPPED)
-        conductor.post(Event.RESET)
-        await conductor.until(lambda state: state is State.IDLE)
+    async def scenario(runner):
+        runner.post(Event.PLACED)
+        runner.post(Event.READY)
+        await runner.until(lambda state: state is State.STOPPED)
+        runner.post(Event.RESET)
+        await runner.until(lambda state: state is State.IDLE)
 
     conduct(script, scenario)
     assert script.unexpected == [(State.UNKNOWN, Event.PLACED)]
@@ -120,16 +120,16 @@ def test_actions_lead_on_and_an_unlisted_event_is_counted(caplog):
 def test_what_was_halted_ends_with_no_event_and_a_bug_is_a_fault(caplog):
     script = Script({**GETTING_READY, Action.GO_HOME: None})
 
-    async def scenario(conductor):
-        conductor.post(Event.READY)
-        await conductor.until(lambda state: state is State.STOPPED)
-        conductor.post(Event.RESET)
-        await conductor.until(lambda state: state is State.HOMING)
-        conductor.post(Event.GRIPPER_FAULT)
-        await conductor.until(lambda state: state is State.HELD)
+    async def scenario(runner):
+        runner.post(Event.READY)
+        await runner.until(lambda state: state is State.STOPPED)
+        runner.post(Event.RESET)
+        await runner.until(lambda state: state is State.HOMING)
+        runner.post(Event.GRIPPER_FAULT)
+        await runner.until(lambda state: state is State.HELD)
         script.ends[Action.CLOSE_UNFINISHED] = ZeroDivisionError("a bug")
-        conductor.post(Event.READY)
-        await conductor.until(lambda state: state is State.HELD and script.halts == 2)
+        runner.post(Event.READY)
+        await runner.until(lambda state: state is State.HELD and script.halts == 2)
 
     conduct(script, scenario)
     assert script.unexpected == []

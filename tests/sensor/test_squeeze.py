@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from station.twin.clock import ManualClock
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.fruit import Kind, draw_fruit
-from station.twin.gel import MM_PER_PX, Gel, Surface, dent_mm, half_space_skirt
+from station.twin.gel import MM_PER_PX, Gel, Surface, dent_mm, half_space_surface
 from station.twin.squeeze import Squeeze
 from station.twin.world import DIGIT_MM, World
 
@@ -66,7 +66,7 @@ def test_the_dent_goes_over_into_its_skirt_without_a_step(approach_mm):
 def test_hertzs_skirt_has_its_known_values():
     ratio_squared = np.array([1.0, 4.0], np.float32)
     # At twice the radius: (-2·asin(1/2) + √3) / π, by hand.
-    assert half_space_skirt(ratio_squared) == pytest.approx([0.5, (np.sqrt(3) - np.pi / 3) / np.pi], abs=1e-6)
+    assert half_space_surface(ratio_squared) == pytest.approx([0.5, (np.sqrt(3) - np.pi / 3) / np.pi], abs=1e-6)
 
 
 def test_nothing_touches_before_the_onset():

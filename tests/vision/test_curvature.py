@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from station.vision.constants import CONSTANTS
-from station.vision.curvature import calm, curvature, curvature_noise
+from station.vision.curvature import curvature, curvature_noise, first_background
 
 SHAPE = (160, 120)
 ROWS, COLUMNS = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float32)
@@ -39,13 +39,13 @@ def test_a_streak_or_an_even_change_does_not_curve():
 
 def test_calm_is_where_little_curves_and_nothing_encloses_it():
     ring = np.where((AWAY > 25) & (AWAY < 35), 2.0, 0.05).astype(np.float32)
-    found = calm(ring, LEAST, CONSTANTS)
+    found = first_background(ring, LEAST, CONSTANTS)
     assert found[AWAY > 40].mean() > 0.9
     assert found[AWAY < 35].max() == 0
 
 
 def test_an_image_that_curves_nowhere_is_calm_everywhere():
-    assert calm(np.zeros(SHAPE, np.float32), LEAST, CONSTANTS).min() == 1
+    assert first_background(np.zeros(SHAPE, np.float32), LEAST, CONSTANTS).min() == 1
 
 
 def test_the_noise_is_the_median_over_the_background_(background_of):

@@ -200,7 +200,7 @@ def test_a_frame_that_is_measured_ahead_is_not_measured_again(presses, frames):
     ahead, plain = PressTracker(counting, PARAMETERS.least_confidence), one.tracker()
     for step in one.steps[2:5]:
         taken = step.frames[:frames]
-        ahead.look_ahead(taken[0])
+        ahead.prepare_next(taken[0])
         found, expected = ahead.measure_step(taken), plain.measure_step(taken)
         assert (found.area_px, found.confidence, found.flags) == (expected.area_px, expected.confidence, expected.flags)
     assert len(counting.measured) == 3 * (frames + (frames > 1))

@@ -42,7 +42,7 @@ class AlarmCommands:
 
     def active(self) -> tuple[ListedAlarm, ...]:
         """List the same alarms, most urgent first."""
-        return tuple(_listed(alarm) for alarm in self._alarms.alarms.standing)
+        return tuple(_listed(alarm) for alarm in self._alarms.alarms.not_normal)
 
     async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:
         """Acknowledge an alarm.

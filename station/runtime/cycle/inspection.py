@@ -8,7 +8,7 @@ from station.channel.line import Outcome
 from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.evidence import AT_MM
-from station.inspection.judge import Verdict
+from station.inspection.judge import Judgement
 from station.inspection.press import Flag, Measured, Press
 from station.inspection.second_press import together
 from station.messages.message import Message
@@ -65,11 +65,11 @@ class Inspection:
     """Measured, in order."""
     earlier: list[Press] = field(default_factory=list)
     """Presses on this fruit that were inconclusive; `steps` and `seen` are those of the present one."""
-    first_verdict: Verdict | None = None
+    first_verdict: Judgement | None = None
     """On the first press, where it was inconclusive."""
     interruptions: list[Reason] = field(default_factory=list)
     explanation: list[Message] = field(default_factory=list)
-    verdict: Verdict | None = None
+    verdict: Judgement | None = None
     outcome_name: OutcomeName = "NO_RESULT"
     phases_s: dict[str, float] = field(default_factory=dict)
     measures: dict[str, float | int | str | bool | None] = field(default_factory=dict)

@@ -113,7 +113,7 @@ class Performer(Protocol):
         ...
 
 
-class Conductor:
+class CycleRunner:
     """One task takes the events in their order; the actions run beside it.
 
     Args:

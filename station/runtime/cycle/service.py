@@ -23,7 +23,7 @@ from station.runtime.cycle.inspection import Inspection, utc_ms
 from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
 from station.runtime.cycle.registry import InspectionRegistry
-from station.runtime.cycle.runner import Conductor, Happened, Work, event_of
+from station.runtime.cycle.runner import CycleRunner, Happened, Work, event_of
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.health import Liveness
@@ -64,7 +64,7 @@ class Service:
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._devices, self._inspector = devices, inspector
         self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
-        self.conductor = Conductor(self)
+        self.runner = CycleRunner(self)
         self.triggers = RecentTriggers()
         self.registry = InspectionRegistry(records, self.triggers, devices, versions)
         self.pacing = Pacing(configuration, devices.cell)
@@ -88,7 +88,7 @@ class Service:
     @property
     def state(self) -> State:
         """Return the cycle's state."""
-        return self.conductor.state
+        return self.runner.state
 
     # Requests of the line.
 
@@ -127,7 +127,7 @@ class Service:
                 self._resolution_mm,
             )
             self._pending = PendingTrigger(request, now)
-            self.conductor.post(Event.TRIGGER)
+            self.runner.post(Event.TRIGGER)
             return await self._pending.answered()
 
     async def published(self, outcome: Outcome) -> None:
@@ -147,7 +147,7 @@ class Service:
             self.on_published(outcome)
         running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
-            self.conductor.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
+            self.runner.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
 
     # Actions of the cycle: see `Performer`.
 
@@ -224,7 +224,7 @@ class Service:
             self.reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
         if state is State.STOPPED and self.reset_wanted and not (self.stop_requested or self.stop_wanted):
-            self.conductor.post(Event.RESET)
+            self.runner.post(Event.RESET)
 
     def tick(self) -> None:
         """Feed the watchdogs, and give the cycle the events of elapsed time."""
@@ -234,7 +234,7 @@ class Service:
         self._report_late()
         if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
-            self.conductor.post(Event.STOP, messages.STATION_ENDS())
+            self.runner.post(Event.STOP, messages.STATION_ENDS())
 
     def device_changed(self, fault: StationError | None) -> None:
         """Handle a monitor's report that a device's state has changed.
@@ -243,7 +243,7 @@ class Service:
             fault: from now on; None for no fault.
         """
         if fault is not None:
-            self.conductor.post(event_of(fault), message_of(fault))
+            self.runner.post(event_of(fault), message_of(fault))
 
     # The actions.
 
@@ -317,7 +317,7 @@ class Service:
     def _report_late(self) -> None:
         if self._now is None or self._late_in is self.state:
             return
-        found = late_now(self._now, self.state, self.conductor.in_state_s)
+        found = late_now(self._now, self.state, self.runner.in_state_s)
         if found is not None:
             self._late_in = self.state
             took = {"took_s": found.took_s, "limit_s": found.allowed_s}
@@ -325,7 +325,7 @@ class Service:
                 why = messages.INSPECTION_LATE(**took)
             else:
                 why = messages.PHASE_LATE(**took, activity=STATES[self.state].activity)
-            self.conductor.post(found.event, why)
+            self.runner.post(found.event, why)
 
     async def _close_refused(self) -> None:
         with contextlib.suppress(RecordsError):  # the registry still has it, and the next clearing tries again

@@ -126,7 +126,7 @@ class VisionWorker:
         def measure() -> None:
             if self._method is not None:
                 self._tracker = self._tracker or self._new_tracker()
-                self._tracker.look_ahead(frame.image)
+                self._tracker.prepare_next(frame.image)
 
         if self._method is not None:
             self._worker.submit(measure)

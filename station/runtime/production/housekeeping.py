@@ -113,14 +113,14 @@ class Housekeeping:
     async def _recover(self) -> None:
         service = self._service
         await self._try_recovery()
-        entered_s = service.conductor.entered_s
+        entered_s = service.runner.entered_s
         if (
             service.registry.fault is None
             and self._logged_ready_s < entered_s
             and self._devices.healthy_since(entered_s)
         ):
             self._logged_ready_s = time.monotonic()
-            service.conductor.post(Event.READY)
+            service.runner.post(Event.READY)
 
     async def _try_recovery(self) -> None:
         """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""

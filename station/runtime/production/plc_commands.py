@@ -191,7 +191,7 @@ class PlcCommands:
             return message_of(error)
         self.recipe_changing = True
         try:
-            await self._service.conductor.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
+            await self._service.runner.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
             kept = self._lots.choose(found)
             log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
         finally:
@@ -216,8 +216,8 @@ class PlcCommands:
         service.stop_wanted = True
         kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
-            service.conductor.post(Event.STOP, operation.STOPPED_AT_PANEL())
-        reached = await service.conductor.until(lambda state: state in WAITING or not service.stop_wanted)
+            service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
+        reached = await service.runner.until(lambda state: state in WAITING or not service.stop_wanted)
         if reached not in WAITING:
             return messages.STARTED_MEANWHILE()
         if kept:
@@ -246,8 +246,8 @@ class PlcCommands:
         if service.state not in UNJUDGED:
             busy = STATES[service.state].refusal is Refusal.BUSY
             return messages.JUDGED() if busy else None
-        service.conductor.post(Event.CALLED_OFF, operation.CALLED_OFF())
-        await service.conductor.until(lambda state: state not in UNJUDGED)
+        service.runner.post(Event.CALLED_OFF, operation.CALLED_OFF())
+        await service.runner.until(lambda state: state not in UNJUDGED)
         return None
 
     def reset_refusal(self) -> Message | None:
@@ -270,19 +270,19 @@ class PlcCommands:
         service.reset_wanted = True
         self._devices.confirmed_clear = True
         if state is State.LATCHED:
-            service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
+            service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         elif state is State.STOPPED:
-            service.conductor.post(Event.RESET)
+            service.runner.post(Event.RESET)
         else:
             try:
                 await self._devices.restart_program()
             except ArmFault as fault:
                 return message_of(fault)
             if state is State.CARRIED:
-                service.conductor.post(Event.PERSON_CONFIRMED, operation.RESET())
+                service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         tried_s = time.monotonic()
-        reached = await service.conductor.until(
-            lambda now: now is State.IDLE or (now is State.LATCHED and service.conductor.entered_s > tried_s)
+        reached = await service.runner.until(
+            lambda now: now is State.IDLE or (now is State.LATCHED and service.runner.entered_s > tried_s)
         )
         if reached is not State.IDLE:
             return self._activity()

@@ -103,10 +103,10 @@ def _step_reader(record: FullRecord, step: int) -> ReadStep | None:
     if image is None or mask is None:
         return None
 
-    def look() -> tuple[Image, Image]:
+    def read_images() -> tuple[Image, Image]:
         return _read(image, cv2.IMREAD_COLOR), _read(mask, cv2.IMREAD_GRAYSCALE)
 
-    return look
+    return read_images
 
 
 def _read(image: StoredImage, flag: int) -> Image:

@@ -78,7 +78,7 @@ class LineNodes:
         while True:
             self.encoder.tick()
             self.gate.tick()
-            if LineFault.BUS_OFF in self._faults.take_begun():
+            if LineFault.BUS_OFF in self._faults.take_new():
                 self.gate.network.report_bus_off()
             if self._faults.active(CommonFault.GARBAGE) and self._clock.now_s() > garbage_s:
                 garbage_s = self._clock.now_s() + _GARBAGE_S

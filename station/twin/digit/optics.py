@@ -111,12 +111,12 @@ class Optics:
         rows, columns = np.flatnonzero(steep.any(axis=1)), np.flatnonzero(steep.any(axis=0))
         if rows.size:
             box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-            found = self._look_up(slope_x[box], slope_y[box], size[box], self._places[(slice(None), *box)])
+            found = self._tables_at(slope_x[box], slope_y[box], size[box], self._places[(slice(None), *box)])
             coarse[box] = found if gain is None else found * gain
         height, width = SENSOR_SHAPE
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
-    def _look_up(self, slope_x: FloatArray, slope_y: FloatArray, size: npt.NDArray, places: FloatArray) -> FloatArray:
+    def _tables_at(self, slope_x: FloatArray, slope_y: FloatArray, size: npt.NDArray, places: FloatArray) -> FloatArray:
         """Interpolate each place's table at the slopes and add up; slopes beyond the table count as its rim."""
         scale = (_TABLE_SIDE - 1) / (2 * _TABLE_REACH)
         within = np.minimum(1.0, (_TABLE_REACH * 0.999) / np.maximum(size, 1e-9)).astype(np.float32)

@@ -208,7 +208,7 @@ class UrController:
             self._switching = None
         if self._switching is not None:
             return
-        faults, begun = self.faults.snapshot().keys(), self.faults.take_begun()
+        faults, begun = self.faults.snapshot().keys(), self.faults.take_new()
         ended = (self._known_faults | begun) - faults
         if not begun and not ended:
             return
