@@ -21,8 +21,8 @@ from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.actions import Inspector
 from station.runtime.cycle.service import CYCLE, Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.imaging.reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
 from station.runtime.observability.audit_logger import FLUSH_S, AuditLogger

@@ -31,7 +31,7 @@ from station.messages import grip, readiness
 from station.messages.message import verbatim
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
-from station.runtime.imaging.active_calibration import ActiveCalibration
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.imaging.reference import GoldenReference
 from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration

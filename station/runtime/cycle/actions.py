@@ -21,6 +21,7 @@ from station.messages.message import Message, message_of
 from station.records.model import Image
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.inspection import Inspection
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.grip import (
     FRAME_DEADLINE_S,
     Grip,
@@ -30,7 +31,6 @@ from station.runtime.devices.grip import (
     at_once,
 )
 from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.imaging.reference import ALARMS, BadReferenceError
 from station.runtime.imaging.worker import MeasuredStep, VisionWorker
 from station.runtime.observability.metrics import Metrics

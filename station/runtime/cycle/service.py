@@ -24,8 +24,8 @@ from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
 from station.runtime.cycle.registry import InspectionRegistry
 from station.runtime.cycle.runner import CycleRunner, Happened, Work, event_of
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.health import Liveness
 from station.runtime.observability.metrics import Metrics
 from station.runtime.recipes.active import ActiveRecipe

@@ -14,8 +14,8 @@ from station.messages import operation as messages
 from station.messages.message import Message, joined, message_of
 from station.records.errors import RecordsError
 from station.runtime.cycle.service import Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import GRIPPER, DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.observability.health import Liveness
 from station.runtime.observability.metrics import Metrics

@@ -5,8 +5,8 @@ from station.inspection.states import STATES, State
 from station.messages import readiness as messages
 from station.messages.message import Message, joined, message_of
 from station.runtime.cycle.service import Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.health import Dependency, Liveness, Readiness
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PlcCommands

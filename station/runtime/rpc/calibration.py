@@ -36,9 +36,9 @@ from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.calibration_rig import StationRig
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.plc_commands import PlcCommands
 from station.runtime.rpc.worker import PanelWorker

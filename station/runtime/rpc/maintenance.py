@@ -36,8 +36,8 @@ from station.messages.commands import JOGGING
 from station.messages.message import Message
 from station.records.audit import AuditEntry
 from station.runtime.cycle.service import Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import GRIPPER, DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.imaging.reference import GOLDEN, sharpness
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.observability.health import Liveness

@@ -37,8 +37,8 @@ from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.cycle.inspection import utc_ms
 from station.runtime.cycle.service import Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.production.lots import LotManager
 from station.runtime.production.operator_commands import OperatorCommands

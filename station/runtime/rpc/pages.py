@@ -8,8 +8,8 @@ from station.channel.messages import ChannelMessage
 from station.channel.server import Handler
 from station.records.records import Records
 from station.runtime.cycle.service import Service
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.active_calibration import ActiveCalibration
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.observability.health import Liveness
 from station.runtime.production.plc_commands import PlcCommands
