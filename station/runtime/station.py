@@ -15,7 +15,6 @@ from station.inspection.states import STATES
 from station.messages.message import verbatim
 from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
-from station.records.errors import RecordsError
 from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.alarms.manager import AlarmManager
@@ -28,10 +27,12 @@ from station.runtime.imaging.worker import VisionWorker
 from station.runtime.observability.audit_logger import FLUSH_S, AuditLogger
 from station.runtime.observability.health import HealthServer, Liveness
 from station.runtime.observability.metrics import Metrics
+from station.runtime.observability.observability import Observability
 from station.runtime.observability.startup_audit import end_entry, start_entries
 from station.runtime.production.housekeeping import UPKEEP, Housekeeping
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.production import Production
 from station.runtime.production.readiness import Interlock
 from station.runtime.recipes.active import ActiveRecipes
 from station.runtime.rpc.operator import PanelServer
@@ -91,14 +92,10 @@ class Station:
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
         kept, alarms = StateFiles(configuration.home), AlarmManager(metrics)
-        calibrated = ActiveCalibration(configuration, lambda: devices.cell.camera.description.serial)
-        eye = VisionWorker(GoldenReference(kept, calibrated.golden), settings.reference)
-        stack.callback(eye.close)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
         audit = AuditLogger(records)
         stack.push_async_callback(self._note_end, audit)
-        _register_scrapes(metrics, configuration, records, calibrated)
 
         def device_changed(name: str, fault: StationError | None) -> None:
             alarms.set_device_fault(name, devices.monitors[name].reported_fault)
@@ -110,53 +107,36 @@ class Station:
                 metrics.heard(name)
 
         devices = DeviceManager(configuration, device_changed, progress)
-        inspector = Inspector(devices, eye, settings, configuration.arm, alarms, metrics, calibrated)
-        self.service = service = Service(
-            configuration, records, devices, inspector, alarms, metrics, liveness, versions, calibrated
-        )
-        try:
-            await records.reopen()
-            await alarms.restore(records)
-        except RecordsError as error:
-            service.registry.fault = error
+        _register_scrapes(metrics, configuration, records, devices.calibration)
+        vision = VisionWorker(GoldenReference(kept, devices.calibration.golden), settings.reference)
+        stack.callback(vision.close)
+        observability = Observability(self.boot, versions, metrics, liveness, audit)
+        inspector = Inspector(devices, vision, configuration, alarms, metrics)
+        self.service = service = Service(configuration, records, devices, inspector, alarms, observability)
+        await service.registry.reopen(lambda: alarms.restore(records))
         self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
         lots = LotManager(service, book, audit)
         await asyncio.to_thread(lots.restore)
         audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
-        orders = PlcCommands(service, devices, book, lots, audit, metrics, kept)
+        orders = PlcCommands(service, devices, book, lots, kept, observability)
         orders.restore_stop()
-        interlock = Interlock(self.boot, service, devices, orders, book, lots, liveness, calibrated)
+        interlock = Interlock(service, devices, orders, book, lots, observability)
+        production = Production(service, devices, book, lots, orders, interlock)
         alarm_orders = AlarmCommands(alarms, audit)
-        panel = PanelServer(interlock, service, devices, lots, book, orders, records, alarm_orders, audit, calibrated)
+        panel = PanelServer(production, records, alarm_orders, audit)
         upkeep = Housekeeping(
-            service,
-            devices,
-            interlock,
-            orders,
-            book,
-            audit,
-            metrics,
-            liveness,
-            calibrated,
+            configuration,
+            production,
+            observability,
             panel.hmi_fault,
             OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
-            broken=verbatim(self._broken) if self._broken else None,
-            reserve_mb=configuration.records.free_reserve_mb,
-            longest_pause_s=settings.retry_longest_s,
+            verbatim(self._broken) if self._broken else None,
         )
-        line = PlcInterfaceServer(
-            _with_folder(line_endpoint(configuration.handshake, configuration.home)),
-            service,
-            orders,
-            interlock,
-            lots,
-            alarm_orders,
-        )
+        endpoint = _with_folder(line_endpoint(configuration.handshake, configuration.home))
+        line = PlcInterfaceServer(endpoint, production, alarm_orders)
         tasks = [self._begin(stack, line.serve(), "line server")]
-        pages = PanelPages(
-            configuration, records, service, devices, orders, interlock, liveness, calibrated, audit, versions
-        )
+        pages = PanelPages(configuration, records, production, observability)
         await self._serve(stack, panel, pages)
         health = HealthServer(
             configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
@@ -212,7 +192,7 @@ class Station:
         service = self.service
         if service is None:
             return
-        service.stop_requested = True
+        service.end()
         limit_s = self._configuration.service.clean_up_deadline_s
         try:
             async with asyncio.timeout(limit_s):

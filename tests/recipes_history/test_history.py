@@ -70,7 +70,7 @@ def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
     assert problem.id == recipes.FILE_IS_CHANGED.id
     assert str(problem.parameters["changes"]) == f"{LIMIT}: 112.0 → 117.0"
     assert problem.parameters["stays"] == recipes.STAYS(revision=1)
-    assert [entry.action for entry in book.noticed] == ["recipe.file_noticed"]
+    assert [entry.action for entry in book.take_noticed()] == ["recipe.file_noticed"]
     assert "strawberry: revision 1 in force" in station("recipes", "list")[1]
     assert station("recipes", "diff", "strawberry")[1] == f"{LIMIT}: 112.0 → 117.0\n"
     file.write_text("name: [")

@@ -72,7 +72,7 @@ def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench, monkeypa
             active = service.active
             stop = active.recipe.early_stop.model_copy(update={"area_mm2": 40.0})
             recipe = active.recipe.model_copy(update={"early_stop": stop})
-            service.active = type(active).of(recipe)
+            service.set_active(type(active).of(recipe))
             monkeypatch.setattr(cell.station.recipes, "current", lambda active: active)  # the lot begins with this one
             await cell.line.ready()
             outcome = await cell.line.inspect()

@@ -68,7 +68,7 @@ def test_a_stop_while_the_arm_leaves_lets_no_trigger_in(bench):
         async with bench(bench=False) as cell:
             await ready_with_arm(cell)
             await inspected_until_leaving(cell)
-            cell.station.service.stop_wanted = True
+            cell.station.service.stop()
             cell.twin.boards["arm"].clear()
             refused = await cell.line.begin()
             assert refused.refusal is Refusal.NOT_READY

@@ -21,7 +21,6 @@ from station.messages.message import Message, message_of
 from station.records.model import Image
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.inspection import Inspection
-from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.grip import (
     FRAME_DEADLINE_S,
     Grip,
@@ -34,8 +33,7 @@ from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
 from station.runtime.imaging.reference import ALARMS, BadReferenceError
 from station.runtime.imaging.worker import MeasuredStep, VisionWorker
 from station.runtime.observability.metrics import Metrics
-from station.settings.arm import ArmSettings
-from station.settings.service import ServiceSettings
+from station.settings.configuration import Configuration
 from station.vocabulary import Reason
 
 _OPEN_WITHIN_MM = 2.0
@@ -47,25 +45,22 @@ class Inspector:
     """The actions that need the devices. Each ends with an event or a device's `StationError`.
 
     Args:
-        settings: placing, and how old a reference may be.
-        arm: where it waits, and how it may follow a contact.
+        configuration: placing, how old a reference may be, where the arm waits and how it may follow a contact.
         alarms: raised for a reference that cannot serve.
         metrics: counts the frames.
-        calibrated: how noisy the sensor is.
     """
 
     def __init__(
         self,
         devices: DeviceManager,
         vision: VisionWorker,
-        settings: ServiceSettings,
-        arm: ArmSettings,
+        configuration: Configuration,
         alarms: AlarmManager,
         metrics: Metrics,
-        calibrated: ActiveCalibration,
     ) -> None:
-        self._devices, self._vision, self._settings, self._calibrated = devices, vision, settings, calibrated
-        self._alarms, self._metrics, self._arm = alarms, metrics, arm
+        self._devices, self._vision = devices, vision
+        self._settings, self._arm = configuration.service, configuration.arm
+        self._alarms, self._metrics = alarms, metrics
         self._reached: MoveResult | None = None
         self._glanced: MeasuredStep | None = None
         self._goes_on = asyncio.Event()
@@ -143,7 +138,7 @@ class Inspector:
     async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
         """Whether the frames may serve as the reference; where not, the inspection and an alarm have the reason."""
         try:
-            segmentation = gated(now.active.recipe.segmentation, self._calibrated.gate_factor)
+            segmentation = gated(now.active.recipe.segmentation, self._devices.calibration.gate_factor)
             image, looks = await self._vision.take_reference(frames, segmentation)
         except BadReferenceError as error:
             now.interrupt(Reason.REFERENCE_BAD, message_of(error))
@@ -151,8 +146,8 @@ class Inspector:
             self._metrics.reference_refused(error.alarm)
             return False
         now.reference_image = Image("reference", None, image)
-        now.measures["gate_factor"] = self._calibrated.gate_factor  # without it no image can be measured again
-        if self._calibrated.calibration is None:
+        now.measures["gate_factor"] = self._devices.calibration.gate_factor  # without it no image can be measured again
+        if self._devices.calibration.calibration is None:
             now.measures["uncalibrated"] = "allow"
         for alarm in ALARMS:
             self._alarms.clear(alarm)

@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import replace
 
 from station.channel.line import Open, Outcome
@@ -34,14 +34,42 @@ class InspectionRegistry:
         self, records: Records, triggers: RecentTriggers, devices: DeviceManager, versions: Mapping[str, str]
     ) -> None:
         self.records = records
-        self.fault: RecordsError | None = None
-        """Fault of the records, until they were reopened."""
-        self.on_outcome: Callable[[Inspection], None] = lambda _: None
-        """Called with every inspection once its outcome is durable."""
+        self._fault: RecordsError | None = None
+        self._on_outcome: Callable[[Inspection], None] = lambda _: None
         self._triggers, self._devices, self._versions = triggers, devices, versions
         self._begun: list[Inspection] = []
         """Accepted, in order, and perhaps without a durable outcome."""
         self._closing = asyncio.Lock()
+
+    @property
+    def fault(self) -> RecordsError | None:
+        """Return the fault of the records, until they were reopened."""
+        return self._fault
+
+    def listen(self, on_outcome: Callable[[Inspection], None]) -> None:
+        """Call a function with every inspection once its outcome is durable.
+
+        Args:
+            on_outcome: takes the place of the one before.
+        """
+        self._on_outcome = on_outcome
+
+    async def reopen(self, restore: Callable[[], Awaitable[None]] | None = None, reserve_bytes: int = 0) -> None:
+        """Open the records, again after a fault, which ends once they can be read and written.
+
+        Args:
+            restore: reads what another part needs of them.
+            reserve_bytes: with less free space a fault stays.
+        """
+        try:
+            await self.records.reopen()
+            if restore is not None:
+                await restore()
+        except RecordsError as error:
+            self._fault = error
+        else:
+            if self.records.status().free_bytes >= reserve_bytes:
+                self._fault = None
 
     @property
     def running(self) -> Inspection | None:
@@ -61,7 +89,7 @@ class InspectionRegistry:
         try:
             pending.inspection.sequence = await pending.recording
         except RecordsError as error:
-            self.fault = error
+            self._fault = error
             raise
 
     def accepted(self, now: Inspection) -> None:
@@ -82,7 +110,7 @@ class InspectionRegistry:
         try:
             now.standing = await self.records.conclude(now.sequence, signed)
         except RecordsError as error:
-            self.fault = error
+            self._fault = error
             raise
         return Event.RECORDED
 
@@ -94,7 +122,7 @@ class InspectionRegistry:
         """
         if now.standing is not None:
             self._triggers.ended(now.standing)
-            self.on_outcome(now)
+            self._on_outcome(now)
             areas = [seen.contact.area_px * now.mm_per_px**2 for seen in now.seen]
             with inspecting(now.standing.sequence):
                 log_fruit(log, now.standing, now.active.recipe.name, now.record().explanation, areas)

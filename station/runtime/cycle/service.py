@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 
 from station.channel.line import Begin, BeginReply, Outcome
@@ -24,10 +24,8 @@ from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
 from station.runtime.cycle.registry import InspectionRegistry
 from station.runtime.cycle.runner import CycleRunner, Happened, Work, event_of
-from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.health import Liveness
-from station.runtime.observability.metrics import Metrics
+from station.runtime.observability.observability import Observability
 from station.runtime.recipes.active import ActiveRecipe
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
@@ -43,9 +41,7 @@ class Service:
         devices: the devices; gets the start and end of inspections.
         inspector: carries out what needs the devices.
         alarms: raised and cleared by the cycle.
-        liveness: gets the cycle's progress.
-        versions: of the programs, for the records.
-        calibrated: the scale that areas are reported in.
+        observability: gets the cycle's progress and counts; its versions go into the records.
     """
 
     def __init__(
@@ -55,40 +51,109 @@ class Service:
         devices: DeviceManager,
         inspector: Inspector,
         alarms: AlarmManager,
-        metrics: Metrics,
-        liveness: Liveness,
-        versions: Mapping[str, str],
-        calibrated: ActiveCalibration,
+        observability: Observability,
     ) -> None:
-        self._settings, self._calibrated = configuration.service, calibrated
+        self._settings = configuration.service
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._devices, self._inspector = devices, inspector
-        self.alarms, self._metrics, self._liveness = alarms, metrics, liveness
+        self.alarms, self._metrics, self._liveness = alarms, observability.metrics, observability.liveness
         self.runner = CycleRunner(self)
         self.triggers = RecentTriggers()
-        self.registry = InspectionRegistry(records, self.triggers, devices, versions)
+        self.registry = InspectionRegistry(records, self.triggers, devices, observability.versions)
         self.pacing = Pacing(configuration, devices.cell)
-        self.active: ActiveRecipe | None = None
-        """The recipe that the next fruit is inspected with."""
-        self.reset_wanted = self._settings.automatic_reset
+        self._active: ActiveRecipe | None = None
+        self._reset_wanted = self._settings.automatic_reset
         """Whether a stopped station makes itself ready."""
-        self.stop_requested = False
-        """The end of the process was requested."""
-        self.stop_wanted = False
-        """A person has stopped the station, until the next reset."""
-        self.on_published: Callable[[Outcome], None] = lambda _: None
-        """Called once with every outcome that the PLC was given."""
+        self._ending, self._stopped_by_person = False, False
+        self._on_published: Callable[[Outcome], None] = lambda _: None
         self._pending: PendingTrigger | None = None
         self._now: Inspection | None = None
         self._beginning = asyncio.Lock()
         self._background: set[asyncio.Task[None]] = set()
         self._late_in: State | None = None
         self._outcomes = OutcomeMonitor(alarms)
+        self._at_once: Mapping[Action, Callable[[Happened], None]] = {
+            Action.ACCEPT_TRIGGER: lambda _: self._accept(),
+            Action.REFUSE_TRIGGER: self._refuse,
+            Action.CLOSE_AS_NO_RESULT: self._close_as_no_result,
+            Action.PUBLISH: lambda _: self._publish(),
+            # The monitors read for ever, and housekeeping posts the event once all devices are healthy.
+            Action.READ_DEVICES: lambda _: None,
+        }
+        """Actions that take no time."""
+        self._of_station: Mapping[Action, Work] = {
+            Action.OPEN_JAWS: inspector.open_jaws,
+            Action.GO_HOME: inspector.go_home,
+            Action.CHECK_DEVICES: self._check,
+            Action.CLOSE_UNFINISHED: self.registry.close_unfinished,
+            Action.RECOVER_ARM: self._recover_arm,
+            Action.RECORD_TRIGGER: self._record_trigger,
+        }
+        """Actions with or without an inspection."""
+        self._of_inspection: Mapping[Action, Callable[[Inspection], Awaitable[Event | None]]] = {
+            Action.FREE_FRUIT: inspector.free_fruit,
+            Action.CHECK_JAWS: inspector.check_jaws,
+            Action.APPROACH: inspector.approach,
+            Action.CLOSE_TO_ONSET: inspector.close_to_onset,
+            Action.CENTRE: inspector.centre,
+            Action.CLOSE_STEP: inspector.close_step,
+            Action.SETTLE: inspector.settle,
+            Action.CAPTURE: inspector.capture,
+            Action.MEASURE: inspector.measure,
+            Action.JUDGE: inspector.judge,
+            Action.RECORD: self.registry.conclude,
+            Action.PLACE_ACCEPT: inspector.place,
+            Action.PLACE_REJECT: inspector.place,
+        }
+        """Actions of the inspection under way."""
 
     @property
     def state(self) -> State:
         """Return the cycle's state."""
         return self.runner.state
+
+    @property
+    def active(self) -> ActiveRecipe | None:
+        """Return the recipe that the next fruit is inspected with."""
+        return self._active
+
+    def set_active(self, active: ActiveRecipe | None) -> None:
+        """Inspect the next fruit with another recipe; without one no trigger is accepted."""
+        self._active = active
+
+    @property
+    def ending(self) -> bool:
+        """Return whether the end of the process was requested."""
+        return self._ending
+
+    def end(self) -> None:
+        """Accept no trigger any more: the process is about to end."""
+        self._ending = True
+
+    @property
+    def stopped_by_person(self) -> bool:
+        """Return whether a person has stopped the station, until the next reset."""
+        return self._stopped_by_person
+
+    def stop(self) -> None:
+        """Accept no trigger until `allow`: a person has stopped the station."""
+        self._stopped_by_person = True
+
+    def allow(self) -> None:
+        """End a person's stop."""
+        self._stopped_by_person = False
+
+    def request_reset(self) -> None:
+        """Let a stopped station make itself ready."""
+        self._reset_wanted = True
+
+    def listen(self, on_published: Callable[[Outcome], None]) -> None:
+        """Call a function once with every outcome that the PLC was given.
+
+        Args:
+            on_published: takes the place of the one before.
+        """
+        self._on_published = on_published
 
     # Requests of the line.
 
@@ -116,7 +181,7 @@ class Service:
                 request.size_class,
             )
             limits = self.pacing.limits(self.active.recipe)
-            scale = self._calibrated.in_force
+            scale = self._devices.calibration.in_force
             now = Inspection(
                 trigger,
                 self.active,
@@ -144,54 +209,23 @@ class Service:
             known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
             self._metrics.inspection(fruit, outcome, *known)
             self._outcomes.add(outcome)
-            self.on_published(outcome)
+            self._on_published(outcome)
         running = self.registry.running
         if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.runner.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
 
     # Actions of the cycle: see `Performer`.
 
-    def perform(self, action: Action, because: Happened) -> Work | None:  # noqa: C901, PLR0911, PLR0912
+    def perform(self, action: Action, because: Happened) -> Work | None:
         """Carry out an action of the cycle."""
-        match action:
-            case Action.OPEN_JAWS:
-                return self._inspector.open_jaws
-            case Action.GO_HOME:
-                return self._inspector.go_home
-            case Action.CHECK_DEVICES:
-                return self._check
-            case Action.CLOSE_UNFINISHED:
-                return self.registry.close_unfinished
-            case Action.RECOVER_ARM:
-                return self._recover_arm
-            case Action.RECORD_TRIGGER:
-                return self._record_trigger
-            case Action.ACCEPT_TRIGGER:
-                self._accept()
-                return None
-            case Action.REFUSE_TRIGGER:
-                self._refuse(because)
-                return None
-            case Action.READ_DEVICES:  # the monitors read for ever, and `tick` posts the event when all are healthy
-                return None
-            case _:
-                pass
-        now = self._now
-        if now is None:
+        if action in self._at_once:
+            self._at_once[action](because)
+            return None
+        if action in self._of_station:
+            return self._of_station[action]
+        if self._now is None:
             raise RuntimeError(f"{action} without an inspection")
-        match action:
-            case Action.CLOSE_AS_NO_RESULT:
-                self._inspector.close_as_no_result(now, because.event, because.why)
-                return None
-            case Action.RECORD:
-                return partial(self.registry.conclude, now)
-            case Action.PUBLISH:
-                self.registry.deliver(now)
-                return None
-            case Action.PLACE_ACCEPT | Action.PLACE_REJECT:
-                return partial(self._inspector.place, now)
-            case _:
-                return partial(getattr(self._inspector, action.value), now)
+        return partial(self._of_inspection[action], self._now)
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
@@ -219,11 +253,11 @@ class Service:
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
         self._devices.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
-            self.reset_wanted = False
+            self._reset_wanted = False
         if state is State.IDLE:
-            self.reset_wanted = self._settings.automatic_reset
+            self._reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
-        if state is State.STOPPED and self.reset_wanted and not (self.stop_requested or self.stop_wanted):
+        if state is State.STOPPED and self._reset_wanted and not (self._ending or self._stopped_by_person):
             self.runner.post(Event.RESET)
 
     def tick(self) -> None:
@@ -232,7 +266,7 @@ class Service:
         if not self._liveness.stuck():
             self._devices.renew_health(_LEASE_S)
         self._report_late()
-        if self.stop_requested and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+        if self._ending and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
             self.runner.post(Event.STOP, messages.STATION_ENDS())
 
@@ -248,7 +282,7 @@ class Service:
     # The actions.
 
     async def _check(self) -> Event:
-        if self.stop_requested or self.stop_wanted:
+        if self._ending or self._stopped_by_person:
             return Event.STOP
         for fault in (*self._devices.faults.values(), self.registry.fault):
             if fault is not None:
@@ -276,6 +310,16 @@ class Service:
             raise RuntimeError("no trigger is waiting")
         self._now = pending.inspection
         self._take_on(pending)
+
+    def _close_as_no_result(self, because: Happened) -> None:
+        if self._now is None:
+            raise RuntimeError("an outcome without an inspection")
+        self._inspector.close_as_no_result(self._now, because.event, because.why)
+
+    def _publish(self) -> None:
+        if self._now is None:
+            raise RuntimeError("an outcome without an inspection")
+        self.registry.deliver(self._now)
 
     def _refuse(self, because: Happened) -> None:
         """End a trigger without an inspection: refused if it is not durable yet, else accepted and closed."""

@@ -22,6 +22,7 @@ from station.errors import StationError
 from station.messages import camera as camera_messages
 from station.messages import device as device_messages
 from station.messages import gripper as gripper_messages
+from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.grip import FRAME_DEADLINE_S, Cell, FramesError
 from station.runtime.devices.monitor import DeviceMonitor
 from station.settings.configuration import Configuration
@@ -56,13 +57,14 @@ class DeviceManager:
         arm = None if configuration.service.bench else UrArm(configuration.arm)
         self._arm, self._configuration = arm, configuration
         self.cell = Cell(camera_from(configuration.camera), make_gripper(configuration.gripper), arm)
+        self.calibration = ActiveCalibration(configuration, lambda: self.cell.camera.description.serial)
+        """Of the camera in use."""
         self.simulated = (
             configuration.camera.driver != "digit"
             or (arm is not None and configuration.arm.host.startswith("127."))
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
-        self.confirmed_clear = False
-        """A person has confirmed that nothing is between the jaws; valid for one activation."""
+        self._confirmed_clear = False
         self._bad_frames, self._stale_checks = 0, 0
         self._not_activated: StationError | None = None
         checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
@@ -128,7 +130,11 @@ class DeviceManager:
             by_inspection: whether an inspection is under way.
         """
         for name in (CAMERA, GRIPPER):
-            self.monitors[name].in_use = by_inspection
+            self.monitors[name].use(by_inspection=by_inspection)
+
+    def confirm_clear(self) -> None:
+        """Note that a person has confirmed that nothing is between the jaws; valid for one activation."""
+        self._confirmed_clear = True
 
     def report_fault(self, fault: StationError) -> None:
         """Report a fault that a caller met while it worked with a device."""
@@ -221,9 +227,9 @@ class DeviceManager:
         if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
             return
         try:
-            if not self.confirmed_clear:
+            if not self._confirmed_clear:
                 await self._leave_the_nest(reading.width_mm)
-            self.confirmed_clear = False
+            self._confirmed_clear = False
             await self.cell.gripper.activate()
         except StationError as error:
             self._not_activated = error

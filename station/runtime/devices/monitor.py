@@ -49,8 +49,7 @@ class DeviceMonitor:
         self.fault: StationError | None = NoAnswerYetError(messages.NO_ANSWER_YET(device=title))
         self.heard_s: float | None = None
         """Monotonic time of the last check that found the device healthy."""
-        self.in_use = False
-        """True while a caller works with it: it is not checked then, and the caller reports faults."""
+        self._in_use = False
         self._check, self._longest_pause_s = check, longest_pause_s
         self._on_change, self._on_progress = on_change, on_progress
         self._again = asyncio.Event()
@@ -65,6 +64,14 @@ class DeviceMonitor:
     def age_s(self) -> float | None:
         """Return the time since it was last found healthy; None if it never was."""
         return None if self.heard_s is None else time.monotonic() - self.heard_s
+
+    def use(self, *, by_inspection: bool) -> None:
+        """Leave the device to a caller, who reports its faults, or check it again.
+
+        Args:
+            by_inspection: whether a caller works with it.
+        """
+        self._in_use = by_inspection
 
     def report_success(self) -> None:
         """Note that a caller has just worked with the device successfully."""
@@ -84,7 +91,7 @@ class DeviceMonitor:
         """Check until cancelled."""
         pause_s = PERIOD_S
         while True:
-            if self.in_use:
+            if self._in_use:
                 self._on_progress()
             else:
                 try:

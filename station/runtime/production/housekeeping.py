@@ -12,16 +12,10 @@ from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.messages import operation as messages
 from station.messages.message import Message, joined, message_of
-from station.records.errors import RecordsError
-from station.runtime.cycle.service import Service
-from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.devices.manager import GRIPPER, DeviceManager
-from station.runtime.observability.audit_logger import AuditLogger
-from station.runtime.observability.health import Liveness
-from station.runtime.observability.metrics import Metrics
-from station.runtime.production.plc_commands import PlcCommands
-from station.runtime.production.readiness import Interlock
-from station.runtime.recipes.active import ActiveRecipes
+from station.runtime.devices.manager import GRIPPER
+from station.runtime.observability.observability import Observability
+from station.runtime.production.production import Production
+from station.settings.configuration import Configuration
 from station.supervision import restarts
 
 UPKEEP = "upkeep"
@@ -38,49 +32,30 @@ class Housekeeping:
     """One task beside the cycle.
 
     Args:
-        interlock: readiness, for the metrics.
-        plc_commands: raises the line's alarms.
-        recipes: the recipes; read again regularly, because people edit and approve them.
-        audit: gets the findings.
-        metrics: gets the readiness.
-        liveness: gets this task's progress.
-        calibrated: age of the sensor's calibration.
+        configuration: free disk space below which nothing is inspected, and the longest pause between two attempts.
+        production: what is recovered and watched; its recipes are read again, because people edit and approve them.
+        observability: gets this task's progress and findings.
         hmi_fault: returns the fault of the HMI's process; None for none.
         outbox: returns the outbox's delay, None for none.
         broken: error of the configuration at the start; None for none.
-        reserve_mb: free disk space below which nothing is inspected.
-        longest_pause_s: between two attempts to recover something.
     """
 
     def __init__(
         self,
-        service: Service,
-        devices: DeviceManager,
-        interlock: Interlock,
-        plc_commands: PlcCommands,
-        recipes: ActiveRecipes,
-        audit: AuditLogger,
-        metrics: Metrics,
-        liveness: Liveness,
-        calibrated: ActiveCalibration,
+        configuration: Configuration,
+        production: Production,
+        observability: Observability,
         hmi_fault: Callable[[], Message | None],
         outbox: Callable[[], Message | None],
-        *,
         broken: Message | None,
-        reserve_mb: int,
-        longest_pause_s: float,
     ) -> None:
-        self._service, self._devices, self._interlock, self._plc_commands, self._recipes = (
-            service,
-            devices,
-            interlock,
-            plc_commands,
-            recipes,
-        )
-        self._metrics, self._liveness, self._audit, self._calibrated = metrics, liveness, audit, calibrated
-        self._hmi_fault = hmi_fault
-        self._book_at_s, self._outbox = time.monotonic(), outbox
-        self._broken, self._reserve_mb, self._longest_pause_s = broken, reserve_mb, longest_pause_s
+        self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
+        self._plc_commands, self._recipes = production.plc_commands, production.recipes
+        self._metrics, self._liveness, self._audit = observability.metrics, observability.liveness, observability.audit
+        self._hmi_fault, self._outbox, self._broken = hmi_fault, outbox, broken
+        self._book_at_s = time.monotonic()
+        self._reserve_mb = configuration.records.free_reserve_mb
+        self._longest_pause_s = configuration.service.retry_longest_s
         self._logged_ready_s = 0.0
         self._alarms_at_s = 0.0
         self._clock_offset_s = time.time() - time.monotonic()
@@ -107,8 +82,7 @@ class Housekeeping:
         """Read what people changed in the recipes. The current lot does not change."""
         await asyncio.to_thread(self._recipes.refresh)
         self._book_at_s = time.monotonic()
-        noticed, self._recipes.noticed = self._recipes.noticed, []
-        self._audit.log(*noticed)
+        self._audit.log(*self._recipes.take_noticed())
 
     async def _recover(self) -> None:
         service = self._service
@@ -142,16 +116,8 @@ class Housekeeping:
         return isinstance(self._devices.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
 
     async def _reopen_records(self) -> None:
-        service = self._service
-        if service.registry.fault is None:
-            return
-        try:
-            await service.registry.records.reopen()
-            free_mb = service.registry.records.status().free_bytes / _MB
-            if free_mb >= self._reserve_mb:
-                service.registry.fault = None
-        except RecordsError as error:
-            service.registry.fault = error
+        if self._service.registry.fault is not None:
+            await self._service.registry.reopen(reserve_bytes=self._reserve_mb * _MB)
 
     def _update_alarms(self) -> None:
         service, alarms = self._service, self._service.alarms
@@ -172,7 +138,7 @@ class Housekeeping:
             AlarmId.NO_RECIPE,
             None if service.active is not None else messages.NEVER_CHOSEN(),
         )
-        alarms.update(AlarmId.CALIBRATION_OLD, self._calibrated.alarm_detail())
+        alarms.update(AlarmId.CALIBRATION_OLD, self._devices.calibration.alarm_detail())
         alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
         alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
         self._plc_commands.update_line_alarms()

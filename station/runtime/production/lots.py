@@ -38,7 +38,8 @@ class LotManager:
         """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
         remembered = self._recipes.restored()
         if remembered is not None:
-            self._service.active, self.lot = remembered
+            active, self.lot = remembered
+            self._service.set_active(active)
 
     def choose(self, active: ActiveRecipe) -> bool:
         """Set the recipe of the next lot; a lot under way continues with its own.
@@ -47,7 +48,7 @@ class LotManager:
             Whether the choice is stored for a restart.
         """
         self.mismatch = None
-        self._service.active = active
+        self._service.set_active(active)
         return self._recipes.store_active(active, self.lot)
 
     def lot_of(self, named_by_plc: str) -> str:
@@ -86,14 +87,15 @@ class LotManager:
             except StationError as error:
                 why = message_of(error)
                 self.mismatch = messages.REFUSED(lot=lot, why=why) if lot else messages.NAMELESS_REFUSED(why=why)
-                self._service.active, self.lot = None, None
+                self._service.set_active(None)
+                self.lot = None
                 log.warning("%s", self.mismatch)
                 self._audit.log(
                     AuditEntry(STATION, STATION, "lot.refused", f"lot {lot}", "", _audited(active), {"why": str(error)})
                 )
                 return False
             before, self.lot, self.mismatch = self.lot, lot, None
-            self._service.active = now
+            self._service.set_active(now)
             if now.snapshot != active.snapshot:
                 log.info("lot %s begins with revision %s of %s", lot, now.snapshot.revision, now.recipe.name)
             self._audit.log(

@@ -96,9 +96,9 @@ class OperatorCommands:
         conditions = {
             OperatorCommandName.CHOOSE_RECIPE: not self._plc_commands.recipe_changing,
             OperatorCommandName.START: not self._plc_commands.reset_refusal()
-            and (state in WAITING or service.stop_wanted),
-            OperatorCommandName.STOP: not service.stop_wanted
-            and not service.stop_requested
+            and (state in WAITING or service.stopped_by_person),
+            OperatorCommandName.STOP: not service.stopped_by_person
+            and not service.ending
             and state is not State.LATCHED,
             OperatorCommandName.CALL_OFF: state in UNJUDGED,
             OperatorCommandName.RECOVER: bool(self.recoveries),

@@ -1,8 +1,10 @@
 """PLC commands between fruits, and the line's state as the PLC interface reports it."""
 
 import asyncio
+import contextlib
 import logging
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
@@ -17,8 +19,8 @@ from station.messages import operation
 from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.audit_logger import PANEL, PLC, AuditLogger, alarm_entry, command_entry
-from station.runtime.observability.metrics import Metrics
+from station.runtime.observability.audit_logger import PANEL, PLC, alarm_entry, command_entry
+from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
 from station.runtime.recipes.active import ActiveRecipes
 from station.runtime.state_files import StateFiles
@@ -39,9 +41,8 @@ class PlcCommands:
 
     Args:
         lots: gets a chosen recipe.
-        audit: gets every command.
-        metrics: gets the line's signs of life.
         state_files: stores a person's stop for a restart.
+        observability: gets every command, and the line's signs of life.
     """
 
     def __init__(
@@ -50,19 +51,17 @@ class PlcCommands:
         devices: DeviceManager,
         recipes: ActiveRecipes,
         lots: LotManager,
-        audit: AuditLogger,
-        metrics: Metrics,
         state_files: StateFiles,
+        observability: Observability,
     ) -> None:
-        self._service, self._devices, self._recipes, self._metrics = service, devices, recipes, metrics
-        self._lots, self._audit, self._state_files = lots, audit, state_files
+        self._service, self._devices, self._recipes = service, devices, recipes
+        self._lots, self._state_files = lots, state_files
+        self._metrics, self._audit = observability.metrics, observability.audit
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
-        self.kept_manual: Message | None = None
-        """Activity at the panel that needs the mode unchanged."""
-        self.registers_wanted = False
-        """Requests the PLC interface's registers with the next beat."""
+        self._manual_activity: Message | None = None
+        self._registers_wanted = False
         self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
         self._line: Line | None = None
         self._line_at_s: float | None = None
@@ -78,15 +77,43 @@ class PlcCommands:
         """Return the PLC interface's last message; None if there was none."""
         return self._line
 
+    @property
+    def manual_activity(self) -> Message | None:
+        """Return the activity at the panel during which the mode stays; None without one."""
+        return self._manual_activity
+
+    @contextlib.contextmanager
+    def manual(self, activity: Message) -> Iterator[None]:
+        """Keep the mode unchanged while something is moved at the panel.
+
+        Args:
+            activity: for a person who wants another mode meanwhile.
+        """
+        self._manual_activity = activity
+        try:
+            yield
+        finally:
+            self._manual_activity = None
+
+    @property
+    def registers_wanted(self) -> bool:
+        """Return whether the PLC interface's registers are wanted with its next beat."""
+        return self._registers_wanted
+
+    def request_registers(self) -> None:
+        """Request the PLC interface's registers with its next beat."""
+        self._registers_wanted = True
+
     def restore_stop(self) -> None:
         """Restore a person's stop after a restart; it lasts until a reset."""
-        self._service.stop_wanted = self._state_files.read(_STOPPED) == b"yes"
+        if self._state_files.read(_STOPPED) == b"yes":
+            self._service.stop()
 
     def set_line(self, line: Line) -> None:
         """Store the PLC interface's beat."""
         self._line, self._line_at_s = line, time.monotonic()
         if line.registers:
-            self._registers, self.registers_wanted = (line.registers, time.monotonic()), False
+            self._registers, self._registers_wanted = (line.registers, time.monotonic()), False
         self._metrics.heard("plc_interface")
         self._metrics.waiting(line.waiting)
         if line.plc_alive:
@@ -172,8 +199,8 @@ class PlcCommands:
     def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
             return messages.MODE_UNKNOWN(mode=mode)
-        if self.kept_manual is not None and mode != self.mode:
-            return messages.MODE_KEPT(activity=self.kept_manual)
+        if self._manual_activity is not None and mode != self.mode:
+            return messages.MODE_KEPT(activity=self._manual_activity)
         self.mode = mode
         return None
 
@@ -213,11 +240,11 @@ class PlcCommands:
             Why the stop is not complete; None if it is.
         """
         service = self._service
-        service.stop_wanted = True
+        service.stop()
         kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
-        reached = await service.runner.until(lambda state: state in WAITING or not service.stop_wanted)
+        reached = await service.runner.until(lambda state: state in WAITING or not service.stopped_by_person)
         if reached not in WAITING:
             return messages.STARTED_MEANWHILE()
         if kept:
@@ -252,7 +279,7 @@ class PlcCommands:
 
     def reset_refusal(self) -> Message | None:
         """Return why a reset would do nothing now; None if it would work."""
-        if self._service.stop_requested:
+        if self._service.ending:
             return messages.ENDING()
         if stop := self._devices.active_stop:
             return messages.CONFIRM_STOP(stop=message_of(stop))
@@ -263,12 +290,12 @@ class PlcCommands:
         service, state = self._service, self._service.state
         if why_not := self.reset_refusal():
             return why_not
-        service.stop_wanted = False
+        service.allow()
         await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
         if state in {State.IDLE, State.RETREATING_READY}:
             return None
-        service.reset_wanted = True
-        self._devices.confirmed_clear = True
+        service.request_reset()
+        self._devices.confirm_clear()
         if state is State.LATCHED:
             service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         elif state is State.STOPPED:

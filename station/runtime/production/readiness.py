@@ -5,9 +5,9 @@ from station.inspection.states import STATES, State
 from station.messages import readiness as messages
 from station.messages.message import Message, joined, message_of
 from station.runtime.cycle.service import Service
-from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.health import Dependency, Liveness, Readiness
+from station.runtime.observability.health import Dependency, Readiness
+from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PlcCommands
 from station.runtime.recipes.active import ActiveRecipes
@@ -21,36 +21,32 @@ class Interlock:
     """Interlock: checks everything that a trigger needs.
 
     Args:
-        boot: this start of the station.
         plc_commands: the mode, and a recipe change under way.
         lots: why a lot cannot begin.
-        liveness: the progress of tasks.
-        calibrated: whether the sensor is calibrated, and verified where the site requires it.
+        observability: this start of the station, and the progress of its tasks.
     """
 
     def __init__(
         self,
-        boot: str,
         service: Service,
         devices: DeviceManager,
         plc_commands: PlcCommands,
         recipes: ActiveRecipes,
         lots: LotManager,
-        liveness: Liveness,
-        calibrated: ActiveCalibration,
+        observability: Observability,
     ) -> None:
-        self._boot, self._lots, self._calibrated = boot, lots, calibrated
         self._service, self._devices, self._plc_commands = service, devices, plc_commands
-        self._recipes, self._liveness = recipes, liveness
+        self._recipes, self._lots = recipes, lots
+        self._boot, self._liveness = observability.boot, observability.liveness
 
     def refusal(self) -> tuple[Refusal | None, Message | None]:
         """Return why no trigger is accepted, for the PLC and for a person; both None if one is."""
         service, facts = self._service, STATES[self._service.state]
-        if service.stop_requested:
+        if service.ending:
             return Refusal.NOT_READY, messages.ENDING()
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.reason
-        if service.stop_wanted:
+        if service.stopped_by_person:
             return Refusal.NOT_READY, messages.STOPPED_BY_PERSON()
         return self._idle_refusal()
 
@@ -63,7 +59,7 @@ class Interlock:
             return Refusal.RECIPE_CHANGING, messages.RECIPE_CHANGING()
         if service.active is None:
             return Refusal.NOT_READY, self._no_recipe()
-        if why := self._calibrated.refusal():
+        if why := self._devices.calibration.refusal():
             return Refusal.NOT_READY, why
         if self._plc_commands.mode != PRODUCTION:
             return Refusal.NOT_READY, messages.NOT_PRODUCTION()
@@ -98,7 +94,7 @@ class Interlock:
     def _packml(self) -> PackmlState | None:
         """Return the state's own; while an orderly end is under way it is stopping, whatever still runs."""
         facts = STATES[self._service.state]
-        return PackmlState.STOPPING if self._service.stop_requested and not facts.may_exit else facts.packml
+        return PackmlState.STOPPING if self._service.ending and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
         """Return the same for supervisors, with every dependency's age."""

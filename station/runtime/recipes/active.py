@@ -75,8 +75,12 @@ class ActiveRecipes:
         self._signature: Hashable = None
         self.problems: tuple[Message, ...] = ()
         """Problems of the files at the last reading."""
-        self.noticed: list[AuditEntry] = []
-        """Audit entries of drafts and gaps that were found; the caller that queues them empties the list."""
+        self._entries: list[AuditEntry] = []
+
+    def take_noticed(self) -> list[AuditEntry]:
+        """Return the audit entries of drafts and gaps that were found since the last call."""
+        entries, self._entries = self._entries, []
+        return entries
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -194,7 +198,7 @@ class ActiveRecipes:
             entry = AuditEntry(
                 STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", str(state.note or "")[:900], None, told
             )
-            self.noticed.append(entry)
+            self._entries.append(entry)
 
     def _store_controls(self, controls: dict[str, Control]) -> None:
         for name, control in controls.items():

@@ -36,11 +36,9 @@ from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
-from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.calibration_rig import StationRig
-from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
-from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.production import Production
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
@@ -73,8 +71,7 @@ class PanelCalibration:
     """Requests about the calibration, and runs of the procedures of `station.calibration`.
 
     Args:
-        plc_commands: the mode, which must not change during a run.
-        calibrated: the calibration in force.
+        production: its devices close on the ball, in a mode that must not change during a run.
         records: stores the audit entry and the result together.
         audit: gets the start and the cancellation of runs.
         worker: reads and writes files in its thread.
@@ -84,20 +81,13 @@ class PanelCalibration:
     def __init__(
         self,
         configuration: Configuration,
-        devices: DeviceManager,
-        plc_commands: PlcCommands,
-        calibrated: ActiveCalibration,
+        production: Production,
         records: Records,
         audit: AuditLogger,
         worker: PanelWorker,
         refusal: Callable[[], Message | None],
     ) -> None:
-        self._site, self._devices, self._plc_commands, self._calibrated = (
-            configuration,
-            devices,
-            plc_commands,
-            calibrated,
-        )
+        self._site, self._devices, self._plc_commands = configuration, production.devices, production.plc_commands
         self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
@@ -123,21 +113,21 @@ class PanelCalibration:
         serial = self._devices.cell.camera.description.serial
 
         def read() -> tuple[Calibration | None, Verification | None]:
-            calibration = self._calibrated.calibration
+            calibration = self._devices.calibration.calibration
             return calibration, None if calibration is None else self._store.last_verification(calibration)
 
         calibration, verification = await self._worker.do(read)
-        figures, settings = self._calibrated.figures, self._site.calibration
+        figures, settings = self._devices.calibration.figures, self._site.calibration
         return CalibrationState(
             serial=serial,
-            in_use=self._calibrated.in_force.words,
+            in_use=self._devices.calibration.in_force.words,
             calibration=None if calibration is None else self._calibration_view(calibration),
             verification=None if verification is None else self._verification_view(verification),
             age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
             oldest_days=settings.oldest_days,
             verify_every_h=settings.verify_every_h,
-            trouble=self._calibrated.refusal() or self._calibrated.alarm_detail(),
+            trouble=self._devices.calibration.refusal() or self._devices.calibration.alarm_detail(),
             ball_mm=settings.ball_mm,
             run=None if self._run is None else _run_view(self._run),
             run_refused=self._why_not(serial),
@@ -147,7 +137,7 @@ class PanelCalibration:
         """Return a plot of the calibration in force."""
 
         def read() -> Picture:
-            calibration = self._calibrated.calibration
+            calibration = self._devices.calibration.calibration
             record: Calibration | Verification | None = calibration
             if calibration is not None and request.kind == "verification":
                 record = self._store.last_verification(calibration)
@@ -168,9 +158,12 @@ class PanelCalibration:
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "begun")
-        self._plc_commands.kept_manual = _NAMES[request.kind]()
+        undisturbed = contextlib.ExitStack()
+        undisturbed.enter_context(self._plc_commands.manual(_NAMES[request.kind]()))
         self._devices.use(by_inspection=True)
+        undisturbed.callback(lambda: self._devices.use(by_inspection=False))
         run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
+        run.task.add_done_callback(lambda _: undisturbed.close())
         return _run_view(run)
 
     async def go_on(self, _request: ContinueCalibrationRun) -> CalibrationRunView:
@@ -213,8 +206,6 @@ class PanelCalibration:
             run.state, run.result = ("passed", None) if result is None else ("failed", result)
         finally:
             run.request = None
-            self._plc_commands.kept_manual = None
-            self._devices.use(by_inspection=False)
 
     async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
@@ -239,7 +230,7 @@ class PanelCalibration:
         )
 
     async def _verify(self, run: _Run) -> Message | None:
-        calibration = self._calibrated.calibration
+        calibration = self._devices.calibration.calibration
         if calibration is None:
             raise BadInputError(messages.MISSING())
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))

@@ -2,7 +2,6 @@
 
 import asyncio
 import time
-from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -35,14 +34,10 @@ from station.messages import maintenance as messages
 from station.messages.commands import JOGGING
 from station.messages.message import Message
 from station.records.audit import AuditEntry
-from station.runtime.cycle.service import Service
-from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.devices.manager import GRIPPER, DeviceManager
+from station.runtime.devices.manager import GRIPPER
 from station.runtime.imaging.reference import GOLDEN, sharpness
-from station.runtime.observability.audit_logger import AuditLogger
-from station.runtime.observability.health import Liveness
-from station.runtime.production.plc_commands import PlcCommands
-from station.runtime.production.readiness import Interlock
+from station.runtime.observability.observability import Observability
+from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.segmentation import Segmentation
@@ -71,11 +66,8 @@ class PanelMaintenance:
     """Requests of the maintenance page.
 
     Args:
-        plc_commands: the mode, and the PLC interface's report.
-        interlock: the dependencies of an inspection, with ages.
-        liveness: the progress of tasks.
-        calibrated: the scale, and the golden reference.
-        audit: gets every manual motion.
+        production: what is moved, watched and shown.
+        observability: the progress of tasks; gets every manual motion.
         home: folder of the golden reference of a sensor that is not calibrated.
         worker: makes pictures in its thread.
         log: the last lines.
@@ -83,21 +75,16 @@ class PanelMaintenance:
 
     def __init__(
         self,
-        service: Service,
-        devices: DeviceManager,
-        plc_commands: PlcCommands,
-        interlock: Interlock,
-        liveness: Liveness,
-        calibrated: ActiveCalibration,
-        audit: AuditLogger,
+        production: Production,
+        observability: Observability,
         home: Path,
         worker: PanelWorker,
         log: LogRing,
-        versions: Mapping[str, str],
     ) -> None:
-        self._service, self._devices, self._plc_commands, self._interlock = service, devices, plc_commands, interlock
-        self._liveness, self._calibrated, self._audit, self._home = liveness, calibrated, audit, home
-        self._worker, self._log, self._versions = worker, log, dict(versions)
+        self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
+        self._plc_commands, self._home = production.plc_commands, home
+        self._liveness, self._audit = observability.liveness, observability.audit
+        self._worker, self._log, self._versions = worker, log, dict(observability.versions)
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
 
@@ -115,7 +102,7 @@ class PanelMaintenance:
     def refusal(self) -> Message | None:
         """Return why nothing may be moved by hand now, with the remedy; None if it may."""
         service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
-        if service.stop_requested:
+        if service.ending:
             return messages.ENDING()
         if facts.refusal is Refusal.BUSY:
             return messages.BUSY()
@@ -123,8 +110,9 @@ class PanelMaintenance:
             return messages.SET_MANUAL(mode=mode, manual=MANUAL)
         if service.state not in _JOGGED:
             return facts.activity
-        if self._plc_commands.kept_manual is not None and not self._moving.locked():
-            return messages.UNDER_WAY(activity=self._plc_commands.kept_manual)
+        activity = self._plc_commands.manual_activity
+        if activity is not None and not self._moving.locked():
+            return messages.UNDER_WAY(activity=activity)
         return None
 
     async def health(self, _request: GetHealth) -> Health:
@@ -132,7 +120,7 @@ class PanelMaintenance:
         readiness, records, figures = (
             self._interlock.readiness(),
             self._service.registry.records,
-            self._calibrated.figures,
+            self._devices.calibration.figures,
         )
         status = await self._worker.do(records.status)
         return Health(
@@ -181,12 +169,9 @@ class PanelMaintenance:
             if self._moving.locked():
                 raise NotNowError(messages.JOG_MOVING())
             async with self._moving:
-                self._plc_commands.kept_manual = JOGGING()
-                try:
+                with self._plc_commands.manual(JOGGING()):
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
-                finally:
-                    self._plc_commands.kept_manual = None
         self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
@@ -214,7 +199,7 @@ class PanelMaintenance:
     async def registers(self, _request: GetRegisters) -> Registers:
         """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
         asked_s = time.monotonic()
-        self._plc_commands.registers_wanted = True
+        self._plc_commands.request_registers()
         while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
             await asyncio.sleep(0.05)
         told, at_s = self._plc_commands.registers
@@ -240,7 +225,7 @@ class PanelMaintenance:
             shown = image if contact is None else _outlined(image, contact)
         data = cv2.imencode(".jpg", shown, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
         blue, green, red = (_histogram(image[:, :, channel]) for channel in range(3))
-        scale_mm = self._calibrated.in_force.mm_per_px
+        scale_mm = self._devices.calibration.in_force.mm_per_px
         return LiveImage(
             picture=Picture(media_type="image/jpeg", data=data),
             captured_s=frame.captured_s,
@@ -257,7 +242,7 @@ class PanelMaintenance:
 
     def _contact(self, segmentation: Segmentation, image: Image) -> tuple[Contact | None, Message | None]:
         """Return the contact against the golden reference, or why none is measured."""
-        path = self._calibrated.golden() or self._home / GOLDEN
+        path = self._devices.calibration.golden() or self._home / GOLDEN
         try:
             key = (path, path.stat().st_mtime_ns, segmentation)
         except OSError:

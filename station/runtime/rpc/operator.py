@@ -36,15 +36,10 @@ from station.records.errors import RecordsError
 from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.cycle.inspection import utc_ms
-from station.runtime.cycle.service import Service
-from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger
-from station.runtime.production.lots import LotManager
 from station.runtime.production.operator_commands import OperatorCommands
-from station.runtime.production.plc_commands import PlcCommands
-from station.runtime.production.readiness import Interlock
-from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
+from station.runtime.production.production import Production
+from station.runtime.recipes.active import ActiveRecipe
 from station.runtime.rpc.recent_inspections import RecentInspections
 from station.runtime.rpc.restored_inspections import read_recent
 from station.vocabulary import Refusal
@@ -59,40 +54,29 @@ class PanelServer:
     """Channel server for the HMI.
 
     Args:
-        interlock: the state, and why the station is not ready.
-        plc_commands: the PLC interface's last report.
+        production: what is shown and commanded.
         records: gets lots; read for alarms.
         alarms: alarm commands of people.
         audit: gets what people do.
-        calibrated: whether the verification with the ball is due.
     """
 
     def __init__(
         self,
-        interlock: Interlock,
-        service: Service,
-        devices: DeviceManager,
-        lots: LotManager,
-        recipes: ActiveRecipes,
-        plc_commands: PlcCommands,
+        production: Production,
         records: Records,
         alarms: AlarmCommands,
         audit: AuditLogger,
-        calibrated: ActiveCalibration,
     ) -> None:
-        self._interlock, self._service, self._devices, self._lots = interlock, service, devices, lots
-        self._book, self._plc_commands, self._records, self._alarms, self._audit = (
-            recipes,
-            plc_commands,
-            records,
-            alarms,
-            audit,
+        self._interlock, self._service, self._devices = production.interlock, production.service, production.devices
+        self._lots, self._book, self._plc_commands = production.lots, production.recipes, production.plc_commands
+        self._records, self._alarms, self._audit = records, alarms, audit
+        self._operator_commands = OperatorCommands(
+            self._plc_commands, self._service, self._devices, self._lots, records, audit
         )
-        self._calibrated = calibrated
-        self._operator_commands = OperatorCommands(plc_commands, service, devices, lots, records, audit)
         self._inspections = RecentInspections()
         self._heard_s: float | None = None
-        service.registry.on_outcome, service.on_published = self._inspections.add, self._inspections.set_outcome
+        self._service.registry.listen(self._inspections.add)
+        self._service.listen(self._inspections.set_outcome)
         self.handlers: Handlers = {
             GetPanelState: self._state,
             GetRecent: self._recent,
@@ -143,7 +127,7 @@ class PanelServer:
             why_not_ready=line.why_not_ready,
             busy=facts.refusal is Refusal.BUSY,
             needs_person=facts.needs_person,
-            stopping=service.stop_wanted,
+            stopping=service.stopped_by_person,
             simulated=line.simulated,
             recipe=None if active is None else _recipe_name(active),
             lot=self._lots.lot,
@@ -152,7 +136,7 @@ class PanelServer:
             plc_connected=report is not None and report.plc_connected,
             plc_alive=report is not None and report.plc_alive,
             line_trouble=self._plc_commands.line_fault(),
-            check_due=self._calibrated.refusal(),
+            check_due=self._devices.calibration.refusal(),
             alarms=self._alarms.active(),
             devices=tuple(
                 DeviceView(name=name, fault=watch.fault and message_of(watch.fault), age_s=watch.age_s)

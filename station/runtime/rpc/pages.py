@@ -1,19 +1,13 @@
 """Page handlers for Recipes, History and Maintenance, put together for the panel's server."""
 
 import contextlib
-from collections.abc import Mapping
 from typing import Self
 
 from station.channel.messages import ChannelMessage
 from station.channel.server import Handler
 from station.records.records import Records
-from station.runtime.cycle.service import Service
-from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.audit_logger import AuditLogger
-from station.runtime.observability.health import Liveness
-from station.runtime.production.plc_commands import PlcCommands
-from station.runtime.production.readiness import Interlock
+from station.runtime.observability.observability import Observability
+from station.runtime.production.production import Production
 from station.runtime.rpc.calibration import PanelCalibration
 from station.runtime.rpc.history import PanelHistory
 from station.runtime.rpc.jobs import PanelJobs
@@ -29,44 +23,23 @@ class PanelPages:
     """Handlers of these pages; use them inside `async with`, and close before the devices.
 
     Args:
-        plc_commands: the mode.
-        interlock: the dependencies of an inspection.
-        liveness: the progress of tasks.
-        calibrated: the scale.
-        audit: gets everything that a person does.
+        production: what the pages show and move.
+        observability: gets everything that a person does.
     """
 
     def __init__(
         self,
         configuration: Configuration,
         records: Records,
-        service: Service,
-        devices: DeviceManager,
-        plc_commands: PlcCommands,
-        interlock: Interlock,
-        liveness: Liveness,
-        calibrated: ActiveCalibration,
-        audit: AuditLogger,
-        versions: Mapping[str, str],
+        production: Production,
+        observability: Observability,
     ) -> None:
         self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
         history = PanelHistory(records, self._worker, self._jobs)
         recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker, self._jobs)
-        maintenance = PanelMaintenance(
-            service,
-            devices,
-            plc_commands,
-            interlock,
-            liveness,
-            calibrated,
-            audit,
-            configuration.home,
-            self._worker,
-            self._log,
-            versions,
-        )
+        maintenance = PanelMaintenance(production, observability, configuration.home, self._worker, self._log)
         self._ball = PanelCalibration(
-            configuration, devices, plc_commands, calibrated, records, audit, self._worker, maintenance.refusal
+            configuration, production, records, observability.audit, self._worker, maintenance.refusal
         )
         self.handlers: dict[type[ChannelMessage], Handler] = {
             **history.handlers(),

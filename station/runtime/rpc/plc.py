@@ -18,10 +18,7 @@ from station.channel.line import (
 from station.channel.panel import Recover
 from station.channel.server import ChannelServer
 from station.runtime.alarms.commands import AlarmCommands
-from station.runtime.cycle.service import Service
-from station.runtime.production.lots import LotManager
-from station.runtime.production.plc_commands import PlcCommands
-from station.runtime.production.readiness import Interlock
+from station.runtime.production.production import Production
 from station.vocabulary import Refusal
 
 
@@ -30,23 +27,18 @@ class PlcInterfaceServer:
 
     Args:
         endpoint: bound when the server is made.
-        service: the cycle and its outcomes.
-        plc_commands: the PLC's commands, and the line's state.
-        interlock: decides whether a trigger is accepted.
-        lots: freezes the recipe at a lot's first trigger.
+        production: the cycle, its interlock, the lots and the PLC's commands.
         alarms: alarm commands of people.
     """
 
     def __init__(
         self,
         endpoint: str,
-        service: Service,
-        plc_commands: PlcCommands,
-        interlock: Interlock,
-        lots: LotManager,
+        production: Production,
         alarms: AlarmCommands,
     ) -> None:
-        self._service, self._plc_commands, self._interlock, self._lots = service, plc_commands, interlock, lots
+        self._service, self._plc_commands = production.service, production.plc_commands
+        self._interlock, self._lots = production.interlock, production.lots
         self._server = ChannelServer(
             endpoint,
             {
