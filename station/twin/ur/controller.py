@@ -88,8 +88,8 @@ class UrController:
             running: powered and released from the start.
         """
         self.host, self.clock, self.faults = host, clock, faults
-        self.polyscope = (5, int(polyscope.split(".")[1]))
-        self.version = (*self.polyscope, 0, 1202319)
+        self.polyscope: tuple[int, int] = (5, int(polyscope.split(".")[1]))
+        self.version: tuple[int, int, int, int] = (*self.polyscope, 0, 1202319)
         self.version_text = ".".join(map(str, self.version))
         self.serial_number = "20245500001"
         self.speed_slider = 1.0
@@ -111,7 +111,11 @@ class UrController:
         self.safety = Safety(running=running)
         self.script = ControlScript(self.body, self.registers, self.safety)
         self.outputs = output_table(self)
-        self.dashboard = Dashboard(self)
+        self._dashboard = Dashboard(self)
+
+    def answer(self, line: str) -> str:
+        """Return the dashboard's answer to one line."""
+        return self._dashboard.answer(line)
 
     @property
     def joints_rad(self) -> Joints:

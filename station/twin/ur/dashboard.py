@@ -5,13 +5,10 @@ exact words about the first 5 s of a protective stop are unverified on hardware.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from station.twin.ur.interface import Controller
 from station.twin.ur.safety import SafetyMode
 from station.twin.ur.script import RuntimeState
-
-if TYPE_CHECKING:
-    from station.twin.ur.controller import UrController
 
 PORT = 29999
 BANNER = "Connected: Universal Robots Dashboard Server"
@@ -24,7 +21,7 @@ TOO_EARLY = (
 class Dashboard:
     """The answers, without a socket."""
 
-    def __init__(self, controller: "UrController") -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
         safety, script = controller.safety, controller.script
         self._questions: dict[str, Callable[[], str]] = {

@@ -2,13 +2,10 @@
 
 import asyncio
 import contextlib
-from typing import TYPE_CHECKING
 
 from station.twin.faults import CommonFault
 from station.twin.ur import dashboard, primary, rtde
-
-if TYPE_CHECKING:
-    from station.twin.ur.controller import UrController
+from station.twin.ur.interface import Controller
 
 SCRIPT_PORT = 30003
 LONGEST_LINE = 32768
@@ -19,7 +16,7 @@ GARBAGE_LINE = b"\xff\x00\x13 garbage\n"
 class Network:
     """The servers of one controller; they open, cut and close together."""
 
-    def __init__(self, controller: "UrController") -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._servers: list[asyncio.Server] = []
         self._streams: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
@@ -36,7 +33,7 @@ class Network:
         try:
             self._servers.append(
                 await asyncio.get_running_loop().create_server(
-                    lambda: rtde.RtdeConnection(self._controller), host, rtde.PORT
+                    lambda: rtde.RtdeConnection(self._controller, self.connections), host, rtde.PORT
                 )
             )
             for port, serve in (
@@ -80,7 +77,7 @@ class Network:
             await self._say(writer, dashboard.BANNER.encode() + b"\n")
             while line := await reader.readline():
                 text = line.decode("ascii", "replace")
-                answer = self._controller.dashboard.answer(text).encode() + b"\n"
+                answer = self._controller.answer(text).encode() + b"\n"
                 await self._say(writer, GARBAGE_LINE if self._active(CommonFault.GARBAGE) else answer)
                 if text.strip().lower() in {"quit", "shutdown"}:
                     return

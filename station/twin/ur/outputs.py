@@ -5,22 +5,16 @@ voltages, forces) has a constant, believable value.
 """
 
 import re
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
 
+from station.twin.ur.interface import Controller, Getter
 from station.twin.ur.registers import COUNT
 from station.twin.ur.script import RuntimeState
-
-if TYPE_CHECKING:
-    from station.twin.ur.controller import UrController
-
-Getter = Callable[[], tuple[Any, ...]]
 
 JOINT_RUNNING, JOINT_POWER_OFF = 253, 239
 _REGISTER = re.compile(r"output_(int|double)_register_(\d{1,2})")
 
 
-def output(controller: "UrController", name: str) -> tuple[str, Getter] | None:
+def output(controller: Controller, name: str) -> tuple[str, Getter] | None:
     """RTDE type and source of an output; None where this version of the controller has none of that name."""
     match = _REGISTER.fullmatch(name)
     if match is not None and int(match[2]) < COUNT:
@@ -31,7 +25,7 @@ def output(controller: "UrController", name: str) -> tuple[str, Getter] | None:
     return controller.outputs.get(name)
 
 
-def output_table(controller: "UrController") -> dict[str, tuple[str, Getter]]:
+def output_table(controller: Controller) -> dict[str, tuple[str, Getter]]:
     """Every output but the registers, by name: its RTDE type and its source."""
     body, safety, script = controller.body, controller.safety, controller.script
 

@@ -8,14 +8,12 @@ import math
 import random
 import socket
 import struct
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from station.twin.faults import CommonFault
-from station.twin.ur.outputs import Getter, output
+from station.twin.ur.interface import Controller, Getter
+from station.twin.ur.outputs import output
 from station.twin.ur.registers import TYPE_CODES, input_type
-
-if TYPE_CHECKING:
-    from station.twin.ur.controller import UrController
 
 PORT = 30004
 FREQUENCY_HZ = 500.0
@@ -73,10 +71,14 @@ class InputRecipe:
 
 
 class RtdeConnection(asyncio.Protocol):
-    """One client."""
+    """One client.
 
-    def __init__(self, controller: "UrController") -> None:
-        self._controller = controller
+    Args:
+        connections: holds this client while it is connected.
+    """
+
+    def __init__(self, controller: Controller, connections: "set[RtdeConnection]") -> None:
+        self._controller, self._connections = controller, connections
         self._buffer = bytearray()
         self._transport: asyncio.Transport | None = None
         self._inputs: dict[int, InputRecipe] = {}
@@ -101,11 +103,11 @@ class RtdeConnection(asyncio.Protocol):
         self._transport = transport = cast("asyncio.Transport", transport)
         transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         transport.set_write_buffer_limits(high=SEND_BUFFER_BYTES)
-        self._controller.network.connections.add(self)
+        self._connections.add(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget a client and what it claimed."""
-        self._controller.network.connections.discard(self)
+        self._connections.discard(self)
         self._controller.registers.release(self)
         self.lost.set_result(None)
 
