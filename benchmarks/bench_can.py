@@ -17,10 +17,10 @@ from pathlib import Path
 
 import can
 
-from plc_interface.can.counts import further
-from plc_interface.can.errors import LateRejectError
-from plc_interface.can.line_io import LineIo
-from plc_interface.can.link import ORDER, REPORT, open_bus
+from plc_interface.outputs.can.counts import further
+from plc_interface.outputs.can.errors import LateRejectError
+from plc_interface.outputs.can.line_io import LineIo
+from plc_interface.outputs.can.link import ORDER, REPORT, open_bus
 from station.settings.can import CanSettings
 from station.twin.can.faults import line_faults
 from station.twin.can.line import LineNodes

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import psutil
 
-from plc_interface.modbus.image import RegisterImage
-from plc_interface.modbus.server import ModbusServer
-from plc_interface.real_time import request_real_time_priority
+from plc_interface.process.real_time import request_real_time_priority
+from plc_interface.server.image import RegisterImage
+from plc_interface.server.server import ModbusServer
 from station.settings.modbus import ModbusSettings
 
 ROOT = Path(__file__).resolve().parents[1]

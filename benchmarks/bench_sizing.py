@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 import psutil
 
-from plc_interface.codec import WordOrder
 from plc_interface.plc_simulator.nest import TwinNest
 from plc_interface.plc_simulator.program import LineProgram
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
+from plc_interface.registers.codec import WordOrder
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes

@@ -21,11 +21,11 @@ from typing import NamedTuple
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from plc_interface.codec import WordOrder
 from plc_interface.plc_simulator.nest import LaidFruit, TwinNest
 from plc_interface.plc_simulator.program import Decision, LineProgram, Passage
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
+from plc_interface.registers.codec import WordOrder
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection

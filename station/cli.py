@@ -33,7 +33,7 @@ COMMANDS = {
     "hmi": Entry("hmi.command:hmi", "Serve the operators' pages."),
     "line": Entry("plc_interface.plc_simulator.command:line", "Play the line's PLC against the station."),
     "outbox": Entry("station.commands.outbox:outbox", "Publish inspections to other systems, or show the delay."),
-    "plc": Entry("plc_interface.command:plc", "Talk to the line's PLC, and make its documents."),
+    "plc": Entry("plc_interface.process.command:plc", "Talk to the line's PLC, and make its documents."),
     "recipes": Entry("station.commands.recipes:recipes", "Manage recipes, their revisions and approvals."),
     "records": Entry("station.commands.records:records", "Query inspections and their explanations."),
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),

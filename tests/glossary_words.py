@@ -26,12 +26,12 @@ OTHER_SENSES: dict[str, tuple[str, tuple[str, ...]]] = {
     "drift": ("of light, of the reference", ()),
     "elements": ("achenes and drupelets as the method's details name them", ()),
     "form": ("of a page; a text's for one or for several", ()),
-    "frame": ("an image; of a serial line", ("plc_interface/modbus",)),
+    "frame": ("an image; of a serial line", ("plc_interface/server",)),
     "gate": ("reject gate", ("station/vision", "station/calibration")),
     "lease": ("of the arm's health", ("plc_interface",)),
     "line": ("of production, of a text, of a drawing", ()),
     "margin": ("of a time", ("station/inspection",)),
-    "message": ("an id with parameters; of CAN, MQTT, the channel", ("plc_interface/modbus",)),
+    "message": ("an id with parameters; of CAN, MQTT, the channel", ("plc_interface/server",)),
     "order": ("of things in a row", ()),
     "pad": ("of the gripper", ("hmi",)),
     "settle": ("of fruit and gel after a move", ("plc_interface",)),
@@ -50,7 +50,7 @@ MEANT: dict[str, tuple[str, ...]] = {
     "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
     "calm": ("docs/robust-constants.md",),  # the constant `calm_trust`
     "damaged passed": ("docs/grr.md", "docs/sorting.md"),  # column headings of a result
-    "frame": ("plc_interface/modbus/exceptions.py", "plc_interface/modbus/mbap.py"),
+    "frame": ("plc_interface/server/exceptions.py", "plc_interface/server/mbap.py"),
     "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
     "look": (
         "docs/alarms.md",  # a person does

@@ -68,7 +68,7 @@ def test_a_sense_is_meant_outside_of_the_rooms_where_it_cannot_be():
         return glossary_words.meant(glossary_words.Finding(file, 1, "", word))
 
     assert meant("station/vision/press.py", "frame")
-    assert not meant("plc_interface/modbus/server.py", "frame")
-    assert meant("plc_interface/modbus/mbap.py", "frame")
+    assert not meant("plc_interface/server/server.py", "frame")
+    assert meant("plc_interface/server/mbap.py", "frame")
     assert meant("docs/robust.md", "truth")
     assert not meant("station/runtime/cycle/service.py", "crew")

@@ -18,9 +18,9 @@ from typing import Any
 import psutil
 
 from plc_interface.client import StationClient
-from plc_interface.client_errors import ClientError
-from plc_interface.codec import WordOrder
+from plc_interface.client.errors import ClientError
 from plc_interface.plc_simulator.scan import Scanner
+from plc_interface.registers.codec import WordOrder
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from plc_interface.plc_simulator.program import LineProgram, Outputs, Passage, Stage, Values
 from plc_interface.plc_simulator.scan import Scanner
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.map import BY_NAME
 from station.inspection.alarm_table import ALARMS, AlarmId
 
 _SCAN_S = 0.02

@@ -5,7 +5,7 @@ from plc_interface.handshake.journal import COMMAND_RESULT
 from plc_interface.handshake.modes import Command, Link, Signal
 from plc_interface.handshake.state import Fault
 from plc_interface.handshake.work import Effect, Row, Work, row
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.map import BY_NAME
 from station.channel.line import CommandName
 
 _CODES = BY_NAME["command_code"].codes

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.map import BY_NAME
 from station.channel.line import Outcome
 
 COMMAND_RESULT = BY_NAME["command_result"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Result, Service, Trigger
 from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.map import BY_NAME
 from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
 
 Value = int | float | str | None

@@ -7,13 +7,13 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from plc_interface.codec import WordOrder
 from plc_interface.plc_simulator.display import LineDisplay, summary_line
 from plc_interface.plc_simulator.faults import FaultPlan, LineFault
 from plc_interface.plc_simulator.nest import SEVERITIES, Nest, RealNest, TwinNest
 from plc_interface.plc_simulator.program import LineProgram
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
+from plc_interface.registers.codec import WordOrder
 from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from plc_interface.codec import WordOrder, decode, encode, is_invalid
 from plc_interface.plc_simulator.faults import FaultPlan, LineFault
-from plc_interface.register_bits import WRITE_KEY
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.bits import WRITE_KEY
+from plc_interface.registers.codec import WordOrder, decode, encode, is_invalid
+from plc_interface.registers.map import BY_NAME
 
 Values = Mapping[str, int | float | str]
 """Registers by name."""

@@ -8,9 +8,9 @@ from typing import Self
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
-from plc_interface.codec import RegisterValueError, WordOrder, decode, encode
-from plc_interface.register import Register
-from plc_interface.register_map import CONTROL, GROUP_BY_NAME, RESULT, STATUS
+from plc_interface.registers.codec import RegisterValueError, WordOrder, decode, encode
+from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, RESULT, STATUS
+from plc_interface.registers.register import Register
 
 ANSWER_LIMIT_S = 1.0
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # `trouble` holds its errors

@@ -8,13 +8,13 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from plc_interface.codec import WordOrder
 from plc_interface.plc_simulator.display import LineDisplay, summary_line
 from plc_interface.plc_simulator.faults import FaultPlan, LineFault
 from plc_interface.plc_simulator.nest import SEVERITIES, TwinNest
 from plc_interface.plc_simulator.program import LineProgram
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
+from plc_interface.registers.codec import WordOrder
 from station.commands.run import addresses
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError, StationError

@@ -5,7 +5,7 @@ from itertools import chain
 
 import pytest
 
-from plc_interface.register_map import REGISTERS
+from plc_interface.registers.map import REGISTERS
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe
 from station.settings.schema import leaves, schema_of

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import pytest
 
 from plc_interface.client import StationClient
-from plc_interface.client_errors import UnreachableError
+from plc_interface.client.errors import UnreachableError
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,

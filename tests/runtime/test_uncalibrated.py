@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from plc_interface.register_map import BY_NAME
+from plc_interface.registers.map import BY_NAME
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.states import State

@@ -1,0 +1,1 @@
+"""Line outputs: the reject gate on CAN, or none."""

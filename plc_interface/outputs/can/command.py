@@ -1,0 +1,85 @@
+"""`station plc check-can`: check of the CAN bus and its nodes."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from plc_interface.outputs.can import bring_up
+from plc_interface.outputs.can.errors import BringUpError, LineIoError
+from plc_interface.outputs.can.link import CanLink, described
+from station.messages.message import Message
+from station.settings.can import CanSettings
+from station.settings.configuration import load_configuration
+
+_NODE_DEADLINE_S = 3.0
+_STATES = {0: "booting", 4: "stopped", 5: "operational", 127: "pre-operational"}
+_POLL_S = 0.02
+
+
+@click.command("check-can")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def check_can(config: Path | None) -> None:
+    """Read the identity of the CAN nodes; nothing is moved or written. Only while the station is stopped.
+
+    For the interface and for each node it prints the result and what to do. The exit code is 1 if anything is faulty.
+    The station has to be stopped because a bus has one master at a time.
+    """
+    settings = load_configuration(config).can
+    if not settings.enabled:
+        click.echo("CAN is off, the line's PLC diverts; set can.enabled to use it")
+        return
+    counters: Counter[str] = Counter()
+    link = CanLink(settings, counters)
+    faulty: list[Message] = []
+    try:
+        click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
+        for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
+            looked = _check_gate if node.number == settings.gate_node else _check_encoder
+            try:
+                found = looked(link, node, settings)
+            except LineIoError as error:
+                faulty.append(node.name)
+                click.echo(f"{click.style('fault   ', fg='red')}{error}")
+            else:
+                click.echo(f"{click.style('ok      ', fg='green')}{node.name}: {found}")
+    finally:
+        link.close()
+    if faulty:
+        raise LineIoError(f"not usable: {', '.join(map(str, faulty))}")
+
+
+def _check_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return _check_node(link, node, settings, bring_up.gate_pdos)
+
+
+def _check_encoder(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    return f"{_check_node(link, node, settings, bring_up.encoder_pdos)}, count {bring_up.read_position(node)}"
+
+
+def _check_node(
+    link: CanLink,
+    node: bring_up.Node,
+    settings: CanSettings,
+    pdos: Callable[[bring_up.Node, CanSettings], dict[str, bring_up.Pdo]],
+) -> str:
+    """Return heartbeat, identity and mapping as text.
+
+    Raises:
+        LineIoError: no heartbeat, another device, or no answer.
+    """
+    deadline_s = time.monotonic() + _NODE_DEADLINE_S
+    while node.number not in link.beats:
+        link.check()
+        if time.monotonic() > deadline_s:
+            raise BringUpError(bring_up.no_heartbeat(node, settings))
+        time.sleep(_POLL_S)
+    identity = bring_up.verify_identity(node)
+    foreign = bring_up.foreign_mapping(node, pdos(node, settings))
+    mapping = (
+        "another mapping, which the station writes at its start" if foreign else "mapping as the station writes it"
+    )
+    state = link.beats[node.number].state
+    return f"{identity}, heartbeat {_STATES.get(state, f'in state {state}')}, {mapping}"

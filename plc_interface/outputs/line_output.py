@@ -1,0 +1,206 @@
+"""Line outputs: the action on an outcome beside the registers, which is none or the reject gate."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+from plc_interface.outputs.can.counts import ahead
+from plc_interface.outputs.can.errors import (
+    EchoMissingError,
+    InterfaceError,
+    LineIoError,
+    NotReadyError,
+    RejectLostError,
+    RejectRefusedError,
+)
+from plc_interface.outputs.can.line_io import LineIo
+from plc_interface.outputs.pending_rejects_file import PendingRejectFile
+from station.channel.line import LineFault, Outcome
+from station.messages import can as messages
+from station.settings.can import CanSettings
+
+REJECTS_LANE = 1
+_RETRY_S = 0.05
+
+log = logging.getLogger(__name__)
+
+
+class LineOutput(Protocol):
+    """Interface of the outputs for outcomes. Nothing here may wait or raise."""
+
+    async def start(self) -> None:
+        """Start the outputs."""
+        ...
+
+    async def stop(self) -> None:
+        """Let the outputs go to their safe state."""
+        ...
+
+    def publish(self, outcome: Outcome) -> None:
+        """Act on an outcome. The same one may be published again after a restart."""
+        ...
+
+    def renew_health(self, valid_s: float) -> None:
+        """Declare the station healthy for so many seconds more."""
+        ...
+
+    def acknowledge_faults(self) -> None:
+        """Clear the faults whose cause is gone."""
+        ...
+
+    def encoder_count(self) -> int | None:
+        """Return the line's encoder count; None if the PLC's is to be used."""
+        ...
+
+    @property
+    def ready(self) -> bool:
+        """True if a fruit can be diverted; else no inspection is started."""
+        ...
+
+    @property
+    def faults(self) -> tuple[LineFault, ...]:
+        """Return the present faults."""
+        ...
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Return counters for the station's metrics, by names that the register map does not have."""
+        ...
+
+
+class NoOutput:
+    """No output: the line's PLC diverts."""
+
+    ready = True
+    faults: tuple[LineFault, ...] = ()
+    counters: Mapping[str, int] = {}
+
+    async def start(self) -> None:
+        """Do nothing."""
+
+    async def stop(self) -> None:
+        """Do nothing."""
+
+    def publish(self, outcome: Outcome) -> None:
+        """Do nothing: the PLC reads the outcome."""
+
+    def renew_health(self, valid_s: float) -> None:
+        """Do nothing."""
+
+    def acknowledge_faults(self) -> None:
+        """Do nothing."""
+
+    def encoder_count(self) -> int | None:
+        """Return None: the PLC has its own encoder."""
+        return None
+
+
+class RejectGate:
+    """Reject gate: diverts everything that is not PASS, at the count at which it reaches the gate.
+
+    An order is repeated after a loss of the gate, the bus or this process, as long as its count is ahead: the gate
+    takes a repeated order for the same one, and does not actuate at a count that is past.
+    """
+
+    def __init__(self, settings: CanSettings, folder: Path) -> None:
+        """Restore the pending rejects of the run before.
+
+        Args:
+            settings: the bus, and the distance from the nest to the gate.
+            folder: of the journal.
+        """
+        self._io, self._distance = LineIo(settings), settings.distance_counts
+        self._file = PendingRejectFile(folder)
+        self._due = self._file.read()
+        self._rejects: set[asyncio.Task[None]] = set()
+        self.renew_health = self._io.renew_health
+        self.acknowledge_faults = self._io.acknowledge_faults
+
+    async def start(self) -> None:
+        """Start bringing up the bus, and order the pending rejects."""
+        await self._io.start()
+        for sequence, at_count in self._due.items():
+            self._order(sequence, at_count)
+
+    async def stop(self) -> None:
+        """Stop the heartbeat: the gate sets its safe output. The next run orders the pending rejects."""
+        for pending in self._rejects:
+            pending.cancel()
+        await asyncio.gather(*self._rejects, return_exceptions=True)
+        await self._io.stop()
+
+    def publish(self, outcome: Outcome) -> None:
+        """Order a reject actuation for what is not PASS.
+
+        Args:
+            outcome: with the encoder's count at its trigger.
+        """
+        if outcome.outcome != "PASS" and outcome.sequence not in self._due:
+            self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
+            self._file.write(self._due)
+            self._order(outcome.sequence, at_count)
+
+    def _order(self, sequence: int, at_count: int) -> None:
+        pending = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
+        self._rejects.add(pending)
+        pending.add_done_callback(self._rejects.discard)
+
+    async def _divert(self, sequence: int, at_count: int) -> None:
+        logged = ""
+        while not self._is_too_far(sequence, at_count):
+            try:
+                await self._io.divert(sequence, REJECTS_LANE, at_count)
+            except (NotReadyError, InterfaceError, EchoMissingError, RejectLostError) as error:
+                if logged != (logged := type(error).__name__):
+                    log.warning("inspection %d: %s; its shot is ordered until its count is past", sequence, error)
+                await asyncio.sleep(_RETRY_S)
+                continue
+            except LineIoError as error:
+                log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
+            break
+        del self._due[sequence]
+        self._file.write(self._due)
+
+    def _is_too_far(self, sequence: int, at_count: int) -> bool:
+        count = self._io.encoder_count()
+        if count is None or ahead(count.value, at_count) <= self._distance:
+            return False
+        error = RejectRefusedError(sequence, messages.COUNT_TOO_FAR(at_count=at_count, now_count=count.value))
+        log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
+        self._io.give_up(error)
+        return True
+
+    @property
+    def ready(self) -> bool:
+        """True if what is not PASS would be diverted."""
+        return self._io.ready
+
+    def encoder_count(self) -> int | None:
+        """Return the last count of the encoder on the bus."""
+        count = self._io.encoder_count()
+        return None if count is None else count.value
+
+    @property
+    def faults(self) -> tuple[LineFault, ...]:
+        """Return the faults of the bus, its nodes and recent reject actuations."""
+        return (
+            *(LineFault(part="can", what=fault) for fault in self._io.bus_faults),
+            *(LineFault(part="reject", what=fault) for fault in self._io.reject_faults),
+        )
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Return the bus's counters."""
+        return {f"can_{name}": count for name, count in self._io.counters.items()}
+
+
+def make_output(settings: CanSettings, folder: Path) -> LineOutput:
+    """Make the outputs that the settings name.
+
+    Args:
+        settings: of the line's CAN.
+        folder: the journal's, which holds the pending rejects.
+    """
+    return RejectGate(settings, folder) if settings.enabled else NoOutput()

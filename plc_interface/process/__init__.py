@@ -1,0 +1,1 @@
+"""Process of the PLC interface: the handshake joined to registers, journal, station and outputs."""

@@ -1,0 +1,51 @@
+"""`station plc`: the interface to the line's PLC."""
+
+import asyncio
+from pathlib import Path
+
+import click
+
+from plc_interface.outputs.can.command import check_can
+from plc_interface.process.process import serve
+from plc_interface.registers.generate.files import DOCUMENTS, drifted_files, write_files
+from station.errors import StationError
+from station.logs import configure_logging
+from station.settings.configuration import load_configuration
+
+
+@click.group("plc")
+def plc() -> None:
+    """Talk to the line's PLC, and make its documents."""
+
+
+plc.add_command(check_can)
+
+
+@plc.command("run")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def run(config: Path | None) -> None:
+    """Serve the line's PLC until Ctrl-C: registers, handshake, and the reject gate where CAN is enabled.
+
+    The station may start and stop meanwhile: while it does not answer, the PLC reads that and its triggers are refused.
+    """
+    configure_logging("plc")
+    asyncio.run(serve(load_configuration(config)))
+
+
+@plc.command("docs")
+@click.option("--out", type=click.Path(path_type=Path), default=DOCUMENTS, metavar="DIR", show_default="docs/plc")
+@click.option("--check", is_flag=True, help="Write nothing; exit code 1 where a file is not what would be made.")
+def docs(out: Path, check: bool) -> None:  # noqa: FBT001 (click passes arguments by name)
+    """Make the register map's documents, import files for other tools, and the PLC's code."""
+    if not check:
+        written = write_files(out)
+        for path in written:
+            click.echo(f"wrote {path}")
+        if not written:
+            click.echo(f"nothing to write: {out} is what the register map says")
+        return
+    drifted = drifted_files(out)
+    if drifted:
+        names = ", ".join(str(path) for path in drifted)
+        raise StationError(f"not what the register map says: {names}; run `station plc docs`")
+    click.echo(f"{out} is what the register map says")

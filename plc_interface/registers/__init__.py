@@ -1,0 +1,1 @@
+"""Register map: the one table of registers, its encoding, and what is generated from it."""

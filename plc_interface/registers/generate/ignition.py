@@ -1,0 +1,56 @@
+"""Ignition's tags as JSON: one folder for each block.
+
+Ignition's documentation, "Modbus Addressing": one-based addresses; HR signed and HRUS unsigned 16-bit, HRI and HRUI
+32-bit, HRUI_64 unsigned 64-bit, HRF float, HRS text with its length in characters.
+"""
+
+import json
+from typing import Any
+
+from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.map import GROUPS
+from plc_interface.registers.register import Access, Kind, Register
+
+DEVICE = "FruitStation"
+DESIGNATORS = {
+    Kind.U16: ("HRUS", "Int4"),
+    Kind.BITS: ("HRUS", "Int4"),
+    Kind.I16: ("HR", "Int2"),
+    Kind.U32: ("HRUI", "Int8"),
+    Kind.BITS32: ("HRUI", "Int8"),
+    Kind.I32: ("HRI", "Int4"),
+    Kind.U64: ("HRUI_64", "Int8"),
+    Kind.F32: ("HRF", "Float4"),
+    Kind.TEXT: ("HRS", "String"),
+}
+
+
+def ignition() -> str:
+    """The file `ignition-tags.json`."""
+    folders = [
+        {"name": group.name, "tagType": "Folder", "tags": [_tag(register) for register in group.registers]}
+        for group in GROUPS
+    ]
+    root = {
+        "name": DEVICE,
+        "tagType": "Folder",
+        "documentation": f"{MADE_BY} {UNTESTED} The device has one-based addressing and not the reverse word order.",
+        "tags": folders,
+    }
+    return json.dumps(root, indent=1, ensure_ascii=False) + "\n"
+
+
+def _tag(register: Register) -> dict[str, Any]:
+    designator, data_type = DESIGNATORS[register.kind]
+    length = f":{2 * register.words}" if register.kind is Kind.TEXT else ""
+    return {
+        "name": register.name,
+        "tagType": "AtomicTag",
+        "valueSource": "opc",
+        "opcServer": "Ignition OPC UA Server",
+        "opcItemPath": f"ns=1;s=[{DEVICE}]{designator}{register.address + 1}{length}",
+        "dataType": data_type,
+        "readOnly": register.access is Access.READ_ONLY,
+        "engUnit": register.unit,
+        "documentation": register.meaning,
+    }

@@ -1,0 +1,139 @@
+"""Structured Text (IEC 61131-3 ed. 3) without a vendor's extensions: data types, function block, example."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from plc_interface.registers.bits import COMMAND_CODES, OUTCOME_CODES, WRITE_KEY
+from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, map_checksum
+from plc_interface.registers.register import Kind, Register
+
+STATUS, RESULT, CONTROL = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"], GROUP_BY_NAME["control"]
+_TYPES = {
+    Kind.U16: "UINT",
+    Kind.I16: "INT",
+    Kind.U32: "UDINT",
+    Kind.I32: "DINT",
+    Kind.BITS: "WORD",
+    Kind.BITS32: "DWORD",
+}
+_PREFIXES = {"result_reasons": "reason_"}
+_WITHOUT_NAMES = {"alarms"}
+"""Flags whose names say no more than their numbers."""
+
+
+def field_name(register: Register) -> str:
+    """Return the member's name in its data type."""
+    return register.name.removeprefix("result_")
+
+
+def bit_fields(register: Register) -> list[tuple[str, int, str]]:
+    """Return name, number and meaning of each flag that becomes a member of its own."""
+    if register.name in _WITHOUT_NAMES:
+        return []
+    prefix = _PREFIXES.get(register.name, "")
+    return [(prefix + bit.name, bit.number, bit.meaning) for bit in register.bits]
+
+
+def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
+    """Return name, type and comment of each member, without floats: the hundredths hold the same value."""
+    for register in registers:
+        comment = (register.meaning + (f", {register.unit}" if register.unit else "")).replace("²", "2")
+        name = field_name(register)
+        if register.kind is Kind.U64:
+            yield f"{name}_high", "UDINT", f"{comment}, upper half"
+            yield f"{name}_low", "UDINT", f"{comment}, lower half"
+        elif register.kind in _TYPES:
+            yield name, _TYPES[register.kind], comment
+        for flag, _, meaning in bit_fields(register):
+            yield flag, "BOOL", meaning
+
+
+def data_types() -> str:
+    """The file with the data types of status and result."""
+    parts = [_head("Data types")]
+    for group, name in ((STATUS, "ST_FruitStationStatus"), (RESULT, "ST_FruitStationResult")):
+        rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(group.registers)]
+        parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT", "END_TYPE", ""]))
+    return "\n".join(parts)
+
+
+def function_block() -> str:
+    """The file with the function block."""
+    return _render("fb_fruit_station.st.j2", "Function block")
+
+
+def example() -> str:
+    """The file with the example program."""
+    return _render("example.st.j2", "Example program")
+
+
+def _head(what: str) -> str:
+    return (
+        f"(* {what} for the fruit-inspection station, register map version {MAP_VERSION}, "
+        f"checksum 16#{map_checksum():08X}.\n   {MADE_BY} {UNTESTED} *)\n"
+    )
+
+
+def _render(template: str, what: str) -> str:
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701 (Structured Text, not HTML)
+    )
+    return environment.get_template(template).render(
+        head=_head(what),
+        first=STATUS.address,
+        last=RESULT.address + RESULT.words - 1,
+        reads=STATUS.words + RESULT.words,
+        writes=CONTROL.words,
+        lot_words=BY_NAME["lot"].words,
+        control_bits=BY_NAME["control"].bits,
+        change_recipe=next(number for number, code in COMMAND_CODES.items() if code.name == "change_recipe"),
+        outcome_pass=next(number for number, code in OUTCOME_CODES.items() if code.name == "PASS"),
+        write_key=WRITE_KEY,
+        decoding=list(_decoding()),
+        at=lambda name: BY_NAME[name].address - STATUS.address,
+        to=lambda name: BY_NAME[name].address - CONTROL.address,
+    )
+
+
+def _decoding() -> Iterator[str]:
+    for group, variable in ((STATUS, "status"), (RESULT, "seen")):
+        for register in group.registers:
+            yield from _decode(register, variable)
+
+
+def _decode(register: Register, variable: str) -> Iterator[str]:
+    """Return statements that fill the members of one register."""
+    target, place = f"{variable}.{field_name(register)}", register.address - STATUS.address
+    match register.kind:
+        case Kind.U16 | Kind.I16:
+            yield f"{target} := WORD_TO_{_TYPES[register.kind]}(station[{place}]);"
+        case Kind.BITS:
+            yield f"{target} := station[{place}];"
+        case Kind.U32 | Kind.I32:
+            yield f"words := {_join(f'{place} + one', f'{place + 1} - one')};"
+            yield f"{target} := DWORD_TO_{_TYPES[register.kind]}(words);"
+        case Kind.BITS32:
+            yield f"{target} := {_join(f'{place} + one', f'{place + 1} - one')};"
+        case Kind.U64:
+            yield f"words := {_join(f'{place} + three', f'{place + 1} + one')};"
+            yield f"{target}_high := DWORD_TO_UDINT(words);"
+            yield f"words := {_join(f'{place + 2} - one', f'{place + 3} - three')};"
+            yield f"{target}_low := DWORD_TO_UDINT(words);"
+        case _:
+            return
+    digits = 4 * register.words
+    for flag, number, _ in bit_fields(register):
+        yield f"{variable}.{flag} := ({target} AND 16#{1 << number:0{digits}X}) <> 16#{0:0{digits}X};"
+
+
+def _join(high: str, low: str) -> str:
+    """Return two registers as one DWORD; `one` and `three` are 0 if the high word comes first."""
+    return f"SHL(WORD_TO_DWORD(station[{high}]), 16) OR WORD_TO_DWORD(station[{low}])"

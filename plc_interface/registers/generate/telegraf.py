@@ -1,0 +1,54 @@
+"""Telegraf's Modbus input: every register but the control block, as fields of a measurement for each block.
+
+Telegraf's documentation, "Modbus Input Plugin", configuration type `request`.
+"""
+
+from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.map import GROUPS
+from plc_interface.registers.register import Kind
+
+TYPES = {
+    Kind.U16: "UINT16",
+    Kind.BITS: "UINT16",
+    Kind.I16: "INT16",
+    Kind.U32: "UINT32",
+    Kind.BITS32: "UINT32",
+    Kind.I32: "INT32",
+    Kind.U64: "UINT64",
+    Kind.F32: "FLOAT32",
+    Kind.TEXT: "STRING",
+}
+
+
+def telegraf() -> str:
+    """The file `telegraf.conf`."""
+    lines = [
+        f"# {MADE_BY} {UNTESTED}",
+        '# High word first; where the station is configured for the low word first write byte_order = "CDAB" and leave',
+        "# out the UINT64 fields.",
+        "[[inputs.modbus]]",
+        '  name = "fruit-station"',
+        '  controller = "tcp://127.0.0.1:5020"',
+        '  timeout = "1s"',
+        '  configuration_type = "request"',
+    ]
+    for group in GROUPS:
+        if group.name == "control":
+            continue
+        lines += [
+            "",
+            "  [[inputs.modbus.request]]",
+            "    slave_id = 1",
+            '    byte_order = "ABCD"',
+            '    register = "holding"',
+            f'    measurement = "fruit_station_{group.name}"',
+            "    fields = [",
+        ]
+        for register in group.registers:
+            length = f", length = {register.words}" if register.kind is Kind.TEXT else ""
+            lines.append(
+                f'      {{ address = {register.address}, name = "{register.name}", '
+                f'type = "{TYPES[register.kind]}"{length} }},'
+            )
+        lines.append("    ]")
+    return "\n".join([*lines, ""])

@@ -1,0 +1,138 @@
+"""The Modbus TCP server."""
+
+import asyncio
+import errno
+import socket
+import ssl
+from functools import partial
+
+from pymodbus.framer import FramerType
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+from pymodbus.transport import CommParams, CommType
+
+from plc_interface.server.connection import Connection
+from plc_interface.server.connection_manager import ConnectionManager
+from plc_interface.server.image import RegisterImage
+from plc_interface.server.peer import Peer
+from plc_interface.server.request_handler import OnWrite
+from plc_interface.server.statistics import Statistics
+from plc_interface.server.tls import server_context
+from plc_interface.server.write_lock import OnWriter
+from station.errors import StationError
+from station.settings.modbus import ModbusSettings
+
+BACKLOG = 128
+"""Connections that wait in the kernel to be taken."""
+
+
+class ModbusServerError(StationError):
+    """The server cannot be started."""
+
+
+class Listener(ModbusTcpServer):
+    """Accepts connections on one port."""
+
+    def __init__(
+        self, manager: ConnectionManager, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None
+    ) -> None:
+        self._manager = manager
+        if context is not None:
+            self.tls_setup = CommParams(comm_name="modbus over TLS", comm_type=CommType.TLS, sslctx=context)
+        nothing = SimDevice(0, [SimData(0, datatype=DataType.REGISTERS)])  # the image is read instead
+        super().__init__(nothing, framer=FramerType.SOCKET, address=(host, port))
+        times = {"ssl_handshake_timeout": handshake_s, "ssl_shutdown_timeout": handshake_s} if context else {}
+        self._listen = partial(
+            self.loop.create_server, self._connection, host, port, ssl=context, backlog=BACKLOG, **times
+        )
+
+    async def open(self) -> None:
+        """Listen; OSError if it cannot."""
+        self.is_listener = True
+        self.transport = await self._listen()  # type: ignore[assignment]  # pymodbus stores its listener there too
+
+    def _connection(self) -> Connection:
+        """Make a connection that pymodbus does not register: it would retain those that fail in the TLS handshake."""
+        return Connection(self, self._manager)
+
+
+class ModbusServer:
+    """Serves a register image to the line's PLC, and with TLS on a second port."""
+
+    def __init__(self, settings: ModbusSettings, image: RegisterImage, on_write: OnWrite, on_writer: OnWriter) -> None:
+        """Nothing is served before `start`. Made, started and stopped on one event loop.
+
+        Args:
+            settings: addresses, clients and limits.
+            image: the registers; commit to it on this event loop alone.
+            on_write: called with whole fields, after every check and before they are in the image; may refuse them with
+                an exception code. It runs between request and response and must not wait.
+            on_writer: called when the right to write is granted or withdrawn.
+        """
+        self._settings = settings
+        self._manager = ConnectionManager(settings, image, on_write, on_writer)
+        self._listeners: list[Listener] = []
+
+    @property
+    def statistics(self) -> Statistics:
+        """Counters since the server was made."""
+        return self._manager.statistics
+
+    @property
+    def connections(self) -> int:
+        """Number of connected clients."""
+        return self._manager.connections
+
+    @property
+    def writer(self) -> Peer | None:
+        """The client with the right to write, if any."""
+        return self._manager.write_lock.holder
+
+    async def start(self) -> None:
+        """Listen on the port, and on the second one where TLS is enabled.
+
+        Raises:
+            StationError: a port in use or without the right to it, an address that is not ours, a bad certificate.
+        """
+        settings, tls = self._settings, self._settings.tls
+        context = server_context(tls) if tls.enabled else None
+        await self._listen("modbus", settings.port, None)
+        try:
+            if context is not None:
+                await self._listen("modbus.tls", tls.port, context)
+        except StationError:
+            await self.stop()
+            raise
+        self._manager.open()
+
+    async def stop(self) -> None:
+        """Close the ports and every connection. Idempotent."""
+        for listener in self._listeners:
+            await listener.shutdown()
+        self._listeners.clear()
+        self._manager.close()
+        await asyncio.sleep(0)
+
+    async def _listen(self, section: str, port: int, context: ssl.SSLContext | None) -> None:
+        host = self._settings.host
+        listener = Listener(self._manager, host, port, self._settings.frame_timeout_s, context)
+        try:
+            await listener.open()
+        except OSError as error:
+            raise ModbusServerError(why_not(section, host, port, error)) from error
+        self._listeners.append(listener)
+
+
+def why_not(section: str, host: str, port: int, error: OSError) -> str:
+    """Describe why a port cannot be served, and what to do."""
+    place = f"Modbus TCP cannot be served on {host}, port {port}"
+    if error.errno == errno.EADDRINUSE:
+        return f"{place}: another program listens there: stop it (ss -ltnp names it), or set {section}.port"
+    if error.errno == errno.EACCES:
+        return (
+            f"{place}: ports below 1024 need a right: give the service CAP_NET_BIND_SERVICE (systemd: "
+            f"AmbientCapabilities=), or set {section}.port"
+        )
+    if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
+        return f"{place}: this machine has no such address: set modbus.host to one that `ip address` shows"
+    return f"{place}: {error.strerror or error}: set modbus.host and {section}.port to where it can be"

@@ -1,0 +1,407 @@
+"""The table by itself: corners that are hard to reach from outside, and what is made from it."""
+
+import pytest
+
+from plc_interface.handshake import actions as do
+from plc_interface.handshake import events as ev
+from plc_interface.handshake.document import DOCUMENT, document
+from plc_interface.handshake.journal import Journal
+from plc_interface.handshake.modes import Arming, Inspection, Link, Result, Signal, Trigger
+from plc_interface.handshake.state import Fault
+from plc_interface.handshake.table import REGIONS
+from plc_interface.handshake.view import line, result_values, view
+from plc_interface.registers.map import BY_NAME
+from station.channel.line import BeginReply, LineFault, Open, Reason, Refusal
+from station.messages.message import verbatim
+
+
+def test_every_signal_and_every_mode_has_its_row():
+    rows = [row for rows in REGIONS.values() for row in rows]
+    assert {row.signal for row in rows} == set(Signal)
+    for region, of_region in REGIONS.items():
+        assert {row.mode for row in of_region} == set(region)
+        reached = {of_region[0].mode}
+        while more := {row.next for row in of_region if row.mode in reached} - reached:
+            reached |= more
+        assert reached == set(region)
+
+
+def test_a_row_behind_one_without_a_condition_would_never_be_taken():
+    for rows in REGIONS.values():
+        closed = set()
+        for row in rows:
+            assert (row.mode, row.signal) not in closed
+            if row.guard is None:
+                closed.add((row.mode, row.signal))
+
+
+def test_every_guard_and_effect_says_in_the_document_what_it_is():
+    for rows in REGIONS.values():
+        for row in rows:
+            assert all(part.__doc__ for part in (*row.effects, *([row.guard] if row.guard else [])))
+
+
+def test_the_document_shows_the_table_as_it_is():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert document(text) == text, "run python -m plc_interface.handshake.document"
+
+
+def test_a_pair_that_is_not_listed_changes_nothing_and_is_counted(bench):
+    made = bench()
+    made.armed()
+    made.state.timers = {Signal.RESULT_DEADLINE: made.now_s}
+    before = made.state.inspection
+    made.feed(ev.Tick)
+    assert (made.state.unlisted, made.state.inspection) == (1, before)
+    assert "not foreseen" in made.of(do.Log)[-1].text
+
+
+@pytest.mark.parametrize(
+    ("name", "reasons", "changes"),
+    [
+        ("PASS", (), {"trigger_id": 8}),
+        ("PASS", (Reason.SATURATED,), {}),
+        ("PASS", (), {"late": True}),
+        ("FAIL", (), {}),
+    ],
+)
+def test_an_outcome_that_contradicts_itself_is_no_outcome(bench, name, reasons, changes):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome(name, *reasons, **changes))
+    (shown,) = made.state.queue
+    assert (shown.sequence, shown.trigger_id, shown.outcome) == (41, 7, "NO_RESULT")
+    assert shown.reasons == (Reason.INTERNAL_FAULT,)
+    assert shown.area_mm2 is None
+    assert made.state.journal.verdicts == (shown,)
+
+
+def test_a_sequence_given_twice_is_refused(bench):
+    made = bench(Journal(highest=41))
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
+    assert (made.state.inspection, made.state.last_refusal) == (Inspection.NONE, Refusal.NOT_READY)
+    assert made.state.trigger is Trigger.ANSWERED
+
+
+def test_an_inspection_that_the_station_does_not_know_any_more_is_no_result(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.Beat, made.station_state(boot="2"))
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
+    assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
+    assert made.state.link is Link.UP
+
+
+def test_an_outcome_that_comes_late_is_answered_with_what_stands(bench):
+    made = bench()
+    made.run()
+    for passed_s in (0.9, 0.9, 0.5):
+        made.now_s += passed_s
+        made.feed(ev.Beat, made.station_state())
+    (late,) = made.state.queue
+    assert (late.outcome, late.reasons, late.late) == ("NO_RESULT", (Reason.LATE,), True)
+    assert late.duration_ms == 2300
+    actions = made.feed(ev.OutcomeReceived, made.outcome())
+    assert [action.outcome for action in actions if isinstance(action, do.NotifyPublished)] == [late]
+    assert made.state.queue == (late,)
+    made.feed(ev.OutcomeNoted, 41)
+    assert made.state.journal.verdicts == ()
+
+
+def test_what_the_interface_says_by_itself_is_on_the_disk_before_anything_else(bench):
+    made = bench()
+    made.run()
+    made.now_s += 10.0
+    first, *rest = made.feed(ev.Tick)
+    assert isinstance(first, do.SaveJournal)
+    assert first.durable
+    assert first.journal.verdicts == made.state.queue
+    assert not any(isinstance(action, do.SaveJournal) for action in rest)
+
+
+def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    actions = made.feed(ev.BeginFailed, made.state.pending.number)
+    assert isinstance(actions[0], do.SaveJournal)
+    assert actions[0].durable
+    assert (made.state.last_refusal, made.state.link) == (Refusal.STATION_LOST, Link.RESUMING)
+    made.feed(ev.BeginAnswered, 1, BeginReply(sequence=41, deadline_s=1.0))
+    assert made.state.running is None
+    actions = made.link(Open(running=(41, 7), outcomes=()))
+    told, taken = [action for action in actions if not isinstance(action, do.SaveJournal | do.Log)]
+    assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.NotifyAcknowledged(41))
+    assert view(made.state)["result_sequence"] == 0
+    assert made.state.journal.acknowledged == 41
+
+
+def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_online(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(refusal=Refusal.BUSY))
+    assert (made.state.last_refusal, made.state.link) == (Refusal.BUSY, Link.UP)
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=(41, 6), outcomes=()))
+    assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
+    assert (made.state.queue, made.state.journal.acknowledged) == ((), 41)
+
+
+def test_the_answer_to_another_begin_accepts_nothing(bench):
+    made = bench()
+    made.armed("buffer_results")
+    made.write("enable", "trigger", trigger_id=7)
+    first = made.state.pending.number
+    made.feed(ev.BeginFailed, first)
+    made.link()
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=8)
+    made.feed(ev.BeginAnswered, first, BeginReply(sequence=41, deadline_s=1.0))
+    assert (made.state.running, made.state.pending.trigger_id, made.state.stale) == (None, 8, 1)
+
+
+def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.RequestFailed, "a note was lost")
+    made.feed(ev.Beat, made.station_state())
+    asked_before = made.state.open_request
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
+    made.feed(ev.OpenAnswered, asked_before, Open(running=None, outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
+    made.link(Open(running=(41, 7), outcomes=()))
+    assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
+
+
+def test_what_is_hidden_is_acknowledged_only_behind_what_still_waits(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    made.write("enable", "buffer_results")
+    made.write("enable", "buffer_results", "trigger", trigger_id=8)
+    made.feed(ev.BeginFailed, made.state.pending.number)
+    made.link(Open(running=(42, 8), outcomes=made.state.queue))
+    assert (made.state.journal.hidden, made.of(do.NotifyAcknowledged)) == ((42,), [])
+    made.write("enable", acknowledged_sequence=41)
+    assert [action.sequence for action in made.of(do.NotifyAcknowledged)] == [41, 42]
+    assert made.state.journal.hidden == ()
+
+
+def test_a_trigger_that_a_restart_interrupts_is_refused_and_what_it_began_is_never_shown(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    again = bench(made.of(do.SaveJournal)[-1].journal)
+    assert (again.state.last_refusal, again.state.last_refused_id) == (Refusal.STATION_LOST, 7)
+    again.link(Open(running=(41, 7), outcomes=()))
+    assert (again.state.queue, again.state.running, again.state.journal.acknowledged) == ((), None, 41)
+
+
+def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench):
+    made = bench()
+    made.run()
+    made.now_s += 1.5
+    made.feed(ev.Tick)
+    assert Signal.RESULT_DEADLINE not in made.state.timers
+    told = made.link(Open(running=(41, 7), outcomes=()))
+    assert [action.outcome for action in told if isinstance(action, do.NotifyPublished)] == list(made.state.queue)
+
+
+def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
+    made = bench()
+    made.feed(ev.WriterGranted)
+    ended = made.outcome("FAIL", Reason.AREA_OVER_LIMIT, sequence=40, trigger_id=6)
+    made.link(Open(running=(41, 7), outcomes=(ended,)))
+    seen = view(made.state)
+    assert (seen["result_sequence"], seen["result_trigger_id"], seen["accepted_trigger_id"]) == (40, 6, 7)
+    assert [action.sequence for action in made.of(do.RequestOutcome)] == [41]
+    made.feed(ev.OutcomeReceived, made.outcome())
+    assert [outcome.sequence for outcome in made.state.queue] == [40, 41]
+
+
+def test_a_doubled_command_of_the_run_before_is_not_carried_out_again(bench):
+    executing = BY_NAME["command_result"].code("executing")
+    made = bench(Journal(command_sequence=5, command_result=executing))
+    made.armed()
+    made.write("enable", "execute_command", command_code=3, command_sequence=5)
+    assert made.of(do.RequestCommand) == []
+    assert view(made.state)["command_result"] == BY_NAME["command_result"].code("timed_out")
+
+
+def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.WriterWithdrawn)
+    made.feed(ev.WriterGranted)
+    assert made.state.arming is Arming.DISARMED
+    made.write("enable", "trigger")
+    assert made.state.trigger is Trigger.ANSWERED
+    assert (made.state.last_refusal, made.state.counters["count_triggers"]) == (None, 1)
+
+
+def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid_fall(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    made.write("enable")
+    made.feed(ev.PlcWrote, made.inputs, frozenset())
+    assert made.state.result is Result.PUBLISHED
+    made.write("enable", acknowledged_sequence=41)
+    assert made.state.result is Result.EMPTY
+    made.write("enable", "acknowledge")
+    assert made.state.result is Result.TAKEN
+    made.write("enable")
+    assert made.state.result is Result.EMPTY
+
+
+def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    made.write("enable", "acknowledge")
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+    made.write("enable", acknowledged_sequence=41 << 16)
+    assert made.state.counters["count_communication"] == 2
+    assert (made.state.result, made.of(do.NotifyAcknowledged)) == (Result.PUBLISHED, [])
+    made.write("enable", "clear_error")
+    assert made.state.faults == ()
+    assert len(made.of(do.ClearFaults)) == 1
+
+
+@pytest.mark.parametrize("lost", ["writer", "heartbeat", "interface"])
+def test_an_enable_left_high_over_a_loss_never_arms_again(bench, lost):
+    made = bench()
+    made.armed()
+    if lost == "writer":
+        made.feed(ev.WriterWithdrawn)
+        made.feed(ev.WriterGranted)
+    elif lost == "heartbeat":
+        made.write("enable", plc_heartbeat=1)
+        made.now_s += made.settings.plc_heartbeat_timeout_s
+        made.feed(ev.Tick)
+    else:
+        made = bench(made.state.journal)
+        made.feed(ev.WriterGranted)
+        made.write("enable")
+    made.link(boot="2")
+    for trigger_id in (7, 8):
+        made.write("enable")
+        made.write("enable", "trigger", trigger_id=trigger_id)
+        assert (made.state.last_refusal, made.state.last_refused_id) == (Refusal.NOT_ENABLED, trigger_id)
+    assert made.of(do.RequestBegin) == []
+    made.write()
+    made.write("enable")
+    assert made.state.arming is Arming.ARMED
+
+
+def test_a_lost_station_gives_one_outcome_and_what_it_says_later_does_not_replace_it(bench):
+    made = bench()
+    made.run()
+    made.now_s += made.settings.station_lost_after_s
+    made.feed(ev.Tick)
+    (lost,) = made.state.queue
+    assert (lost.sequence, lost.outcome, lost.reasons) == (41, "NO_RESULT", (Reason.STATION_LOST,))
+    assert made.of(do.ForwardOutcome) == [do.ForwardOutcome(lost)]
+    made.feed(ev.OutcomeReceived, made.outcome())
+    made.link(Open(running=None, outcomes=(made.outcome(),)), boot="2")
+    made.feed(ev.OutcomeReceived, made.outcome())
+    assert made.state.queue == (lost,)
+    assert view(made.state)["result_outcome"] == BY_NAME["result_outcome"].code("NO_RESULT")
+    assert made.of(do.ForwardOutcome) == [do.ForwardOutcome(lost)]
+    assert {action.outcome for action in made.of(do.NotifyPublished)} == {lost}
+    made.write("enable", acknowledged_sequence=41)
+    made.feed(ev.OutcomeReceived, made.outcome())
+    assert made.state.queue == ()
+
+
+def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while_it_still_runs(bench):
+    made = bench()
+    made.run()
+    made.now_s += made.settings.station_lost_after_s
+    made.feed(ev.Tick)
+    made.write("enable", acknowledged_sequence=41)
+    made.actions.clear()
+    made.link(Open(running=(41, 7), outcomes=()))
+    told = [action for action in made.actions if isinstance(action, do.NotifyPublished | do.NotifyAcknowledged)]
+    assert [type(action) for action in told] == [do.NotifyPublished, do.NotifyAcknowledged]
+    assert told[-1] == do.NotifyAcknowledged(41)
+
+
+def status(made):
+    word = view(made.state)["status"]
+    assert isinstance(word, int)
+    return BY_NAME["status"].names(word)
+
+
+def test_a_trigger_is_accepted_only_while_its_fruit_could_be_diverted(bench):
+    made = bench()
+    made.armed()
+    made.feed(ev.OutputChanged, False)
+    made.write("enable", "trigger", trigger_id=7)
+    assert made.of(do.RequestBegin) == []
+    assert made.state.last_refusal is Refusal.NOT_READY
+    assert "trigger_ready" not in status(made)
+    made.feed(ev.OutputChanged, True)
+    assert "trigger_ready" in status(made)
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=7)
+    assert len(made.of(do.RequestBegin)) == 1
+
+
+def test_timers_that_ran_out_together_go_in_a_fixed_order(bench):
+    made = bench()
+    made.run()
+    made.now_s += 60.0
+    made.feed(ev.Tick)
+    assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
+    assert made.state.link is Link.LOST
+    assert made.state.trigger is Trigger.STUCK
+    assert made.state.timers == {}
+
+
+def test_values_beyond_their_registers_are_shown_at_the_bound(bench):
+    outcome = bench().outcome(area_mm2=1e12, closing_mm=-1e6, area_px=2**40)
+    shown = result_values(outcome)
+    assert shown["result_area_mm2_x100"] == 2**31 - 1
+    assert shown["result_closing_mm_x100"] == -(2**15) + 1
+    assert shown["result_area_px"] == 2**32 - 2
+
+
+def test_counters_wrap_round(bench):
+    made = bench()
+    made.state.counters = {**made.state.counters, "count_missed": 2**32 - 1}
+    made.armed()
+    made.write("enable", "trigger", trigger_id=0)
+    assert made.state.counters["count_missed"] == 0
+
+
+GATE_LOST = LineFault(part="can", what=verbatim("the gate is lost"))
+
+
+def test_the_station_is_told_of_the_line(bench):
+    made = bench()
+    made.armed()
+    told = line(made.state, {"count_bad_requests": 3}, (GATE_LOST,))
+    assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
+    assert told.counters["count_bad_requests"] == 3
+    assert told.faults == (GATE_LOST,)
+
+
+def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.WriterWithdrawn)
+    assert made.state.pending is not None
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
+    assert made.state.trigger is Trigger.HELD
+    made.feed(ev.WriterGranted)
+    made.write("trigger", trigger_id=7)
+    assert (made.state.trigger, made.state.unlisted) == (Trigger.ANSWERED, 0)
+    made.now_s += made.settings.handshake_timeout_s
+    made.feed(ev.Tick)
+    assert made.state.trigger is Trigger.STUCK
+    assert Fault.TRIGGER_NOT_RESET in made.state.faults

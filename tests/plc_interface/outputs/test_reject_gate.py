@@ -1,0 +1,144 @@
+"""Outcomes become shots of the gate, over losses of the gate, the bus and the interface."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from plc_interface.outputs.line_output import NoOutput, RejectGate, make_output
+from station.messages import can as messages
+from station.settings.can import CanSettings
+from station.twin.faults import CommonFault
+
+LEASE_S = 40.0
+
+
+def outcome(sequence, name, encoder):
+    """What the gate looks at."""
+    return SimpleNamespace(sequence=sequence, outcome=name, encoder=encoder)
+
+
+@pytest.fixture
+def gated(on_bus, tmp_path):
+    """Run a scenario with a gate; `rig.gate` may be stopped and made anew, as by a restart of the interface."""
+
+    def play(scenario, **settings):
+        async def whole(rig):
+            rig.faults.set(CommonFault.STUCK)
+
+            async def start():
+                rig.gate = RejectGate(rig.settings, tmp_path)
+                await rig.gate.start()
+                rig.gate.renew_health(LEASE_S)
+                await rig.until(lambda: rig.gate.ready)
+                await rig.until(lambda: rig.gate.encoder_count() == rig.nodes.encoder.count)
+
+            rig.restart = start
+            await start()
+            try:
+                await scenario(rig)
+            finally:
+                await rig.gate.stop()
+
+        on_bus(whole, start=False, **({"distance_counts": 1500} | settings))
+
+    return play
+
+
+def fired(rig):
+    return [(shot.sequence, shot.lane) for shot in rig.nodes.gate.fired]
+
+
+def armed(rig, *sequences):
+    return rig.until(lambda: set(rig.nodes.gate._armed) == set(sequences))
+
+
+def test_what_is_not_pass_is_shot_into_the_rejects_and_pass_is_not(gated):
+    async def scenario(rig):
+        count = rig.gate.encoder_count()
+        for sequence, name in ((1, "PASS"), (2, "FAIL"), (3, "PASS"), (4, "NO_RESULT")):
+            rig.gate.publish(outcome(sequence, name, count - sequence))
+        await armed(rig, 2, 4)
+        assert {shot.at_count for shot in rig.nodes.gate._armed.values()} == {count + 1498, count + 1496}
+        rig.run_belt()
+        await rig.until(lambda: rig.gate.counters.get("can_shots_fired") == 2)
+        assert sorted(fired(rig)) == [(2, 1), (4, 1)]
+        assert rig.gate.faults == ()
+
+    gated(scenario)
+
+
+def test_an_outcome_that_comes_again_is_one_shot(gated):
+    async def scenario(rig):
+        count = rig.gate.encoder_count()
+        for _ in range(2):
+            rig.gate.publish(outcome(5, "FAIL", count))
+        await armed(rig, 5)
+        rig.run_belt()
+        await rig.until(lambda: rig.gate.counters.get("can_shots_fired") == 1)
+        assert fired(rig) == [(5, 1)]
+        assert rig.gate.faults == ()
+
+    gated(scenario)
+
+
+def test_a_shot_of_an_outcome_given_while_the_gate_is_away_is_fired_once_it_is_back(gated):
+    """As after a loss of the station: no heartbeat, the gate is safe, and NO_RESULT stands."""
+
+    async def scenario(rig):
+        count = rig.gate.encoder_count()
+        rig.gate.publish(outcome(6, "FAIL", count))
+        await armed(rig, 6)
+        rig.gate.renew_health(0.0)
+        await rig.until(lambda: not rig.gate.ready and not rig.nodes.gate.operational)
+        assert rig.nodes.gate.output == rig.settings.safe_output
+        rig.gate.publish(outcome(7, "NO_RESULT", count))
+        rig.gate.renew_health(LEASE_S)
+        await armed(rig, 6, 7)
+        rig.run_belt()
+        await rig.until(lambda: len(fired(rig)) == 2)
+        assert sorted(fired(rig)) == [(6, 1), (7, 1)]
+
+    gated(scenario)
+
+
+def test_a_shot_outlives_the_interface(gated):
+    async def scenario(rig):
+        rig.gate.publish(outcome(8, "FAIL", rig.gate.encoder_count()))
+        await armed(rig, 8)
+        await rig.gate.stop()
+        await rig.until(lambda: not rig.nodes.gate.operational)
+        await rig.restart()
+        rig.gate.publish(outcome(8, "FAIL", rig.gate.encoder_count()))
+        await armed(rig, 8)
+        rig.run_belt()
+        await rig.until(lambda: rig.gate.counters.get("can_shots_fired") == 1)
+        assert fired(rig) == [(8, 1)]
+        rig.faults.set(CommonFault.STUCK)
+        await rig.gate.stop()
+        await rig.restart()
+        assert rig.gate._due == {}
+
+    gated(scenario)
+
+
+@pytest.mark.parametrize(("off", "why"), [(-1501, messages.COUNT_PAST), (1, messages.COUNT_TOO_FAR)])
+def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, off, why):
+    async def scenario(rig):
+        rig.gate.publish(outcome(9, "FAIL", rig.gate.encoder_count() + off))
+        await rig.until(lambda: rig.gate.faults)
+        (fault,) = rig.gate.faults
+        assert fault.part == "reject"
+        assert fault.what.parameters["sequence"] == 9
+        assert why.id in fault.what.ids()
+        await rig.until(lambda: not rig.gate._due)
+        assert fired(rig) == []
+        assert rig.gate.counters["can_shots_failed"] == 1
+
+    gated(scenario)
+
+
+def test_shots_on_the_disk_that_cannot_be_read_stop_nothing(tmp_path):
+    (tmp_path / "shots.json").write_text('{"1": null}')
+    settings = CanSettings(enabled=True)
+    assert make_output(settings, tmp_path)._due == {}  # type: ignore[attr-defined]
+    assert isinstance(make_output(CanSettings(enabled=False), tmp_path), NoOutput)

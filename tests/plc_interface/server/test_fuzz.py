@@ -1,0 +1,274 @@
+"""Three thousand frames that are wrong in one known way each, and what has to come of them.
+
+A good client beside them is served all the while, the log stays small, and tshark, where there is one, finds nothing
+malformed in what the server sends.
+"""
+
+import contextlib
+import os
+import random
+import shutil
+import socket
+import struct
+import subprocess
+import threading
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from plc_interface.registers.map import BY_NAME
+
+FRAMES = 3000
+SEED = 20_260_701
+LOG_BYTES = 100_000
+LINE_HEAD_BYTES = 60
+"""Time, level and name before a line's text."""
+GOOD = struct.pack(">BHH", 3, BY_NAME["reference_u16"].address, 1)
+GOOD_ANSWER = bytes([3, 2, 0x12, 0x34])
+CLOSED = 0
+"""Instead of an exception code: the connection has to end."""
+UNIT = 1
+KNOWN = (1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43)
+GAP = 60
+"""A register that the map does not have."""
+
+
+class Malformed(NamedTuple):
+    """One thing to send on a connection that expects a new frame."""
+
+    kind: str
+    data: bytes
+    code: int
+    """The exception code that has to answer it, or CLOSED."""
+    half_close: bool = False
+    """The client ends its side behind it."""
+
+
+def _frame(
+    source: random.Random, message: bytes, *, protocol: int = 0, length: int | None = None, unit: int = UNIT
+) -> bytes:
+    size = len(message) + 1 if length is None else length
+    return struct.pack(">HHHB", source.getrandbits(16), protocol, size, unit) + message
+
+
+def _read(source: random.Random) -> bytes:
+    return struct.pack(">BHH", source.choice((3, 4)), 100, source.randint(1, 20))
+
+
+def wrong_protocol(source: random.Random) -> Malformed:
+    return Malformed("protocol", _frame(source, _read(source), protocol=source.randint(1, 65_535)), CLOSED)
+
+
+def wrong_length(source: random.Random) -> Malformed:
+    length = source.choice((0, 1, 255, 256, source.randint(257, 65_535)))
+    return Malformed("length", _frame(source, _read(source), length=length), CLOSED)
+
+
+def truncated(source: random.Random) -> Malformed:
+    whole = _frame(source, _read(source))
+    return Malformed("truncated", whole[: source.randint(1, len(whole) - 1)], CLOSED, half_close=True)
+
+
+def length_beyond_what_comes(source: random.Random) -> Malformed:
+    return Malformed(
+        "too long a length", _frame(source, _read(source), length=source.randint(7, 254)), CLOSED, half_close=True
+    )
+
+
+def garbage(source: random.Random) -> Malformed:
+    data = bytearray(source.randbytes(source.randint(7, 400)))
+    data[2] |= 1  # else a few of them would be fit to be read
+    return Malformed("garbage", bytes(data), CLOSED)
+
+
+def unknown_function(source: random.Random) -> Malformed:
+    function = source.choice([code for code in range(256) if code not in KNOWN])
+    return Malformed("function", _frame(source, bytes([function]) + source.randbytes(source.randint(0, 252))), 1)
+
+
+def unknown_unit(source: random.Random) -> Malformed:
+    unit = source.choice([each for each in range(256) if each != UNIT])
+    return Malformed("unit", _frame(source, _read(source), unit=unit), 11)
+
+
+def wrong_size(source: random.Random) -> Malformed:
+    function = source.choice((1, 2, 3, 4, 5, 6, 22))
+    right = 7 if function == 22 else 5
+    size = source.choice([each for each in range(1, 30) if each != right])
+    return Malformed("size", _frame(source, bytes([function]) + bytes(size - 1)), 3)
+
+
+def wrong_count(source: random.Random) -> Malformed:
+    function, most = source.choice(((1, 2000), (2, 2000), (3, 125), (4, 125)))
+    count = source.choice((0, source.randint(most + 1, 65_535)))
+    return Malformed("count", _frame(source, struct.pack(">BHH", function, 100, count)), 3)
+
+
+def wrong_byte_count(source: random.Random) -> Malformed:
+    count = source.randint(1, 20)
+    told = source.choice([each for each in range(256) if each != 2 * count])
+    return Malformed("byte count", _frame(source, struct.pack(">BHHB", 16, 0, count, told) + bytes(2 * count)), 3)
+
+
+def unmapped(source: random.Random) -> Malformed:
+    address = source.randint(GAP - 3, GAP)
+    function = source.choice((3, 4, 6, 22))
+    rest = {3: (8,), 4: (8,), 6: (1,), 22: (0, 1)}[function]
+    return Malformed("address", _frame(source, struct.pack(f">BH{len(rest)}H", function, address, *rest)), 2)
+
+
+def read_only(source: random.Random) -> Malformed:
+    return Malformed("read only", _frame(source, struct.pack(">BHH", 6, source.randint(100, 161), 1)), 2)
+
+
+def half_written(source: random.Random) -> Malformed:
+    return Malformed("half", _frame(source, struct.pack(">BHH", 6, source.choice((2, 3, 8, 9, 10, 25)), 1)), 3)
+
+
+KINDS = (
+    wrong_protocol,
+    wrong_length,
+    truncated,
+    length_beyond_what_comes,
+    garbage,
+    unknown_function,
+    unknown_unit,
+    wrong_size,
+    wrong_count,
+    wrong_byte_count,
+    unmapped,
+    read_only,
+    half_written,
+)
+
+
+class Capture:
+    """What a server sent, as a file for tshark: no right to listen on a network is needed.
+
+    Source: libpcap's file format 2.4 with link type 101, raw IP.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.port, self.frames = port, 0
+        self._records: list[bytes] = []
+        self._sequence = 1
+
+    def add(self, frame: bytes) -> None:
+        tcp = struct.pack(">HHIIBBHHH", self.port, 40_000, self._sequence, 1, 5 << 4, 0x18, 65_535, 0, 0)
+        addresses = b"\x0a\0\0\1\x0a\0\0\2"
+        packet = struct.pack(">BBHHHBBH", 0x45, 0, 40 + len(frame), 0, 0, 64, 6, 0) + addresses + tcp + frame
+        self._records.append(struct.pack("<IIII", 0, self.frames, len(packet), len(packet)) + packet)
+        self._sequence += len(frame)
+        self.frames += 1
+
+    def judged(self, file: Path, expression: str) -> list[str]:
+        """The lines that tshark prints of the packets for which the expression holds."""
+        file.write_bytes(struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65_535, 101) + b"".join(self._records))
+        command = ["tshark", "-r", str(file), "-o", f"mbtcp.tcp.port:{self.port}", "-Y", expression]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
+        return printed.stdout.splitlines()
+
+
+class GoodClient(threading.Thread):
+    """Asks the same question over and over, and wants the right answer each time."""
+
+    def __init__(self, wire) -> None:
+        super().__init__(name="good client", daemon=True)
+        self.wire, self.answers, self.wrong = wire, 0, None
+        self.enough = threading.Event()
+
+    def run(self) -> None:
+        try:
+            while not self.enough.is_set():
+                assert self.wire.ask(GOOD) == GOOD_ANSWER
+                self.answers += 1
+        except (AssertionError, OSError) as error:
+            self.wrong = error
+
+
+@pytest.fixture
+def serving(serve):
+    return serve()
+
+
+@pytest.fixture
+def good_client(serving, connect):
+    client = GoodClient(connect(serving, "127.0.0.2"))
+    client.start()
+    yield client
+    client.enough.set()
+    client.join(20.0)
+
+
+def in_parts(source: random.Random, data: bytes) -> list[bytes]:
+    """The same bytes, cut at random places."""
+    cuts = sorted(source.randint(0, len(data)) for _ in range(source.choice((0, 0, 1, 3))))
+    return [data[begin:end] for begin, end in zip([0, *cuts], [*cuts, len(data)], strict=True) if begin < end]
+
+
+def play(frames, serving, connect):
+    """Send malformed frames, alone or glued to a good one, whole or in parts; what the server sent is captured."""
+    source, capture, wire = random.Random(SEED), Capture(serving.settings.port), connect(serving)
+
+    def answered(transaction: int, unit: int, message: bytes) -> None:
+        got = wire.receive()
+        capture.add(struct.pack(">HHHB", got[0], 0, len(got[2]) + 1, got[1]) + got[2])
+        assert got == (transaction, unit, message)
+
+    for number in range(frames):
+        bad = KINDS[number % len(KINDS)](source)
+        glued = source.random() < 0.3
+        with contextlib.suppress(OSError) if bad.code == CLOSED else contextlib.nullcontext():
+            for part in in_parts(source, wire.request(GOOD) + bad.data if glued else bad.data):
+                wire.send(part)
+            if bad.half_close:
+                wire.socket.shutdown(socket.SHUT_WR)
+        if glued:
+            answered(wire.transaction, UNIT, GOOD_ANSWER)
+        if bad.code == CLOSED:
+            assert wire.is_closed(), bad
+            wire.close()
+            wire = connect(serving)
+        else:
+            transaction, _, _, unit, function = struct.unpack_from(">HHHBB", bad.data)
+            answered(transaction, unit, bytes([function | 0x80, bad.code]))
+    return capture
+
+
+def test_each_gets_its_exception_or_the_end(serving, good_client, connect, caplog):
+    play(FRAMES, serving, connect)
+    assert not serving.writes
+    assert good_client.wrong is None
+    assert good_client.answers > 100
+    ends_quietly = [kind for kind in KINDS if kind in {truncated, length_beyond_what_comes}]
+    assert serving.server.statistics.bad_requests >= FRAMES * (len(KINDS) - len(ends_quietly)) // len(KINDS)
+    assert sum(len(record.getMessage()) + LINE_HEAD_BYTES for record in caplog.records) < LOG_BYTES
+    assert any(line.startswith("lines left out") for line in caplog.messages)
+
+
+def test_tshark_finds_nothing_malformed_in_the_answers(serving, connect, tmp_path):
+    if shutil.which("tshark") is None:
+        assert os.environ.get("CI") != "true", "tshark is missing, and CI=true says that nothing may be"
+        pytest.skip("tshark is missing on this machine")
+    capture = play(20 * len(KINDS), serving, connect)
+    wire = connect(serving)
+    good = [
+        GOOD,
+        struct.pack(">BHH", 1, 0, 9),
+        struct.pack(">BHH", 4, 100, 62),
+        struct.pack(">BHH", 6, 26, 0x5AFE),
+        struct.pack(">BHHBBB", 15, 0, 9, 2, 1, 0),
+        struct.pack(">BHHBHH", 16, 0, 2, 4, 1, 9),
+        struct.pack(">BHHH", 22, 0, 0xFFFF, 0),
+        struct.pack(">BHHHHBH", 23, 100, 62, 1, 1, 2, 9),
+        bytes([43, 14, 2, 0]),
+    ]
+    for message in good:
+        answer = wire.ask(message)
+        assert answer[0] == message[0]
+        capture.add(struct.pack(">HHHB", wire.transaction, 0, len(answer) + 1, 1) + answer)
+    assert len(capture.judged(tmp_path / "good.pcap", "modbus")) == capture.frames
+    assert capture.judged(tmp_path / "good.pcap", "_ws.malformed") == []
+    capture.add(struct.pack(">HHHBB", 1, 0, 2, 1, 3))
+    assert len(capture.judged(tmp_path / "bad.pcap", "_ws.malformed")) == 1
