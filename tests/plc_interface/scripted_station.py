@@ -1,0 +1,163 @@
+"""A scripted station behind its channel, and waiting for what it does."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+from station.channel.line import (
+    Acknowledged,
+    AwaitOutcome,
+    Begin,
+    BeginReply,
+    Command,
+    CommandDone,
+    Line,
+    Noted,
+    Open,
+    Outcome,
+    PackmlState,
+    Published,
+    Reason,
+    Refusal,
+    Resume,
+    StationState,
+)
+from station.channel.server import ChannelServer
+
+PATIENCE_S = 30.0
+
+
+async def until(condition: Callable[[], Any], what: str = "") -> Any:
+    """Poll, with a deadline, until a condition gives something true."""
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not (met := condition()):
+        assert time.monotonic() < deadline_s, f"never came: {what or condition}"
+        await asyncio.sleep(0.01)
+    return met
+
+
+class ScriptedStation:
+    """Answers the channel as a station does. Its records outlive its process; a test says how it judges."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.endpoint = endpoint
+        self.boots = 0
+        self.begun: dict[int, Begin] = {}
+        self.outcomes: dict[int, Outcome] = {}
+        self.published: dict[int, Outcome] = {}
+        self.acknowledged = 0
+        self.running: int | None = None
+        self.lines: list[Line] = []
+        self.commands: list[Command] = []
+        self.healthy = True
+        self.refusal: Refusal | None = None
+        self.deadline_s = 60.0
+        self.command_gate = asyncio.Event()
+        self.command_gate.set()
+        self.command_done = CommandDone(done=True, why=None)
+        self.deaf = False
+        self._task: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        self.boots += 1
+        if self.running is not None:
+            self.finish("NO_RESULT", Reason.STATION_LOST)
+        handlers = {
+            Begin: self._begin,
+            AwaitOutcome: self._await,
+            Published: self._published,
+            Acknowledged: self._acknowledged,
+            Resume: self._resume,
+            Line: self._line,
+            Command: self._command,
+        }
+        server = ChannelServer(self.endpoint, handlers)
+        self._task = asyncio.create_task(server.serve(), name="scripted station")
+
+    async def die(self) -> None:
+        """As if killed: nothing is answered any more."""
+        if self._task:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+
+    def finish(self, name: str = "PASS", *reasons: Reason, **changes: Any) -> Outcome:
+        """End the running inspection."""
+        assert self.running is not None
+        sequence, self.running = self.running, None
+        begin = self.begun[sequence]
+        measured = name != "NO_RESULT"
+        values: dict[str, Any] = {
+            "sequence": sequence,
+            "trigger_id": begin.trigger_id,
+            "outcome": name,
+            "reasons": reasons,
+            "late": False,
+            "partial": not measured,
+            "simulated": True,
+            "area_mm2": 12.34 if measured else None,
+            "area_px": 567 if measured else None,
+            "closing_mm": 1.5 if measured else None,
+            "confidence": 0.9 if measured else None,
+            "recipe_number": 3,
+            "recipe_checksum": 0x12345678,
+            "began_utc_ms": 1_700_000_000_000,
+            "ended_utc_ms": 1_700_000_000_900,
+            "duration_ms": 900,
+            "encoder": begin.encoder,
+            "lot": begin.lot,
+            "fruit_length_mm_x10": begin.fruit_length_mm_x10,
+            "size_class": begin.size_class,
+        }
+        self.outcomes[sequence] = Outcome.model_validate(values | changes)
+        return self.outcomes[sequence]
+
+    async def _begin(self, request: Begin) -> BeginReply:
+        await until(lambda: not self.deaf)
+        if self.refusal or self.running:
+            return BeginReply(refusal=self.refusal or Refusal.BUSY)
+        sequence = max(self.begun, default=100) + 1
+        self.begun[sequence] = request
+        self.running = sequence
+        return BeginReply(sequence=sequence, deadline_s=self.deadline_s)
+
+    async def _await(self, request: AwaitOutcome) -> Outcome:
+        return await until(lambda: self.outcomes.get(request.sequence))
+
+    async def _published(self, request: Published) -> Noted:
+        self.published[request.outcome.sequence] = request.outcome
+        if self.running == request.outcome.sequence:
+            self.running = None
+        return Noted()
+
+    async def _acknowledged(self, request: Acknowledged) -> Noted:
+        self.acknowledged = max(self.acknowledged, request.sequence)
+        return Noted()
+
+    async def _resume(self, _request: Resume) -> Open:
+        stands = self.outcomes | self.published
+        running = (self.running, self.begun[self.running].trigger_id) if self.running else None
+        ended = tuple(stands[sequence] for sequence in sorted(stands) if sequence > self.acknowledged)
+        return Open(running=running, outcomes=ended)
+
+    async def _line(self, request: Line) -> StationState:
+        self.lines.append(request)
+        return StationState(
+            boot=f"boot {self.boots}",
+            healthy=self.healthy,
+            ready=self.running is None,
+            why_not_ready=None,
+            packml_state=PackmlState.EXECUTE,
+            mode=1,
+            recipe_number=3,
+            recipe_checksum=0x12345678,
+            error_code=0,
+            alarms=0b101,
+            simulated=True,
+        )
+
+    async def _command(self, request: Command) -> CommandDone:
+        self.commands.append(request)
+        await self.command_gate.wait()
+        return self.command_done
