@@ -1,30 +1,24 @@
 """One client's connection: bytes in, responses out, in order."""
 
 import asyncio
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
-from pymodbus.server.base import ModbusBaseServer
-from pymodbus.server.requesthandler import ServerRequestHandler
-
+from plc_interface.server.connection_manager import ConnectionManager
 from plc_interface.server.exceptions import MalformedFrameError, Trouble
 from plc_interface.server.mbap import LONGEST_FRAME, framed, frames
 from plc_interface.server.peer import Peer
-
-if TYPE_CHECKING:
-    from plc_interface.server.connection_manager import ConnectionManager
 
 _BUFFER_BYTES = 4 * LONGEST_FRAME
 """Taken from the kernel at one time. What a client sends beyond it waits there, so that others have their turn."""
 
 
-class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
-    """Answers one client's requests where their bytes arrive, without a task or an await between.
+class Connection(asyncio.BufferedProtocol):
+    """Answers one client's requests where their bytes arrive, without a task or an await between."""
 
-    pymodbus' own path from bytes to response is replaced, see decision 12.
-    """
+    _transport: asyncio.Transport
+    """Set once it is connected."""
 
-    def __init__(self, listener: ModbusBaseServer, manager: "ConnectionManager") -> None:
-        super().__init__(listener, None, None, None)
+    def __init__(self, manager: ConnectionManager) -> None:
         self._manager = manager
         self._buffer = bytearray(_BUFFER_BYTES)
         self._view = memoryview(self._buffer)
@@ -41,15 +35,14 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the client, or close the connection."""
-        super().connection_made(transport)
+        self._transport = cast("asyncio.Transport", transport)
         self.heard_s = self._manager.now_s()
-        self.peer = self._manager.admit(self, cast("asyncio.Transport", transport))
+        self.peer = self._manager.admit(self, self._transport)
         if self.peer is None:
             self.drop()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Handle the end of the connection."""
-        super().connection_lost(exc)
         self._end(f"its connection was lost: {exc}" if exc else "it has disconnected")
 
     def drop(self, trouble: Trouble | None = None, why: str = "") -> None:
@@ -64,12 +57,11 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         if trouble is not None:
             self._manager.note(trouble, self.peer, f"{why}: its connection is closed")
         self._end("")
-        transport = cast("asyncio.Transport | None", self.transport)
-        # read before it is closed: a TLS transport that is closed twice has lost its buffer
-        stuck = transport is not None and (transport.is_closing() or transport.get_write_buffer_size() > 0)
-        self.close()
-        if transport is not None and stuck:
-            transport.abort()
+        # A client that does not take its responses would keep an orderly close waiting.
+        if self._transport.is_closing() or self._transport.get_write_buffer_size() > 0:
+            self._transport.abort()
+        else:
+            self._transport.close()
 
     def get_buffer(self, sizehint: int) -> memoryview:
         """Return the buffer for the next bytes."""
@@ -93,7 +85,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         except MalformedFrameError as error:
             malformed = str(error)
         if answers and not self._ended:
-            cast("asyncio.WriteTransport", self.transport).write(b"".join(answers))
+            self._transport.write(b"".join(answers))
         if malformed:
             self.drop(Trouble.MALFORMED_FRAME, malformed)
             return
@@ -116,7 +108,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
     def pause_writing(self) -> None:
         """Read no more requests while the client does not take its responses."""
         self.stalled_since_s = self._manager.now_s()
-        cast("asyncio.ReadTransport", self.transport).pause_reading()
+        self._transport.pause_reading()
 
     def resume_writing(self) -> None:
         """Go on reading."""
@@ -124,7 +116,7 @@ class Connection(ServerRequestHandler, asyncio.BufferedProtocol):
         if self.unfinished_since_s is not None:
             self.unfinished_since_s = self._manager.now_s()
         if not self._ended:
-            cast("asyncio.ReadTransport", self.transport).resume_reading()
+            self._transport.resume_reading()
 
     def _end(self, why: str) -> None:
         if not self._ended:

@@ -6,11 +6,6 @@ import socket
 import ssl
 from functools import partial
 
-from pymodbus.framer import FramerType
-from pymodbus.server import ModbusTcpServer
-from pymodbus.simulator import DataType, SimData, SimDevice
-from pymodbus.transport import CommParams, CommType
-
 from plc_interface.server.connection import Connection
 from plc_interface.server.connection_manager import ConnectionManager
 from plc_interface.server.image import RegisterImage
@@ -30,32 +25,6 @@ class ModbusServerError(StationError):
     """The server cannot be started."""
 
 
-class Listener(ModbusTcpServer):
-    """Accepts connections on one port."""
-
-    def __init__(
-        self, manager: ConnectionManager, host: str, port: int, handshake_s: float, context: ssl.SSLContext | None
-    ) -> None:
-        self._manager = manager
-        if context is not None:
-            self.tls_setup = CommParams(comm_name="modbus over TLS", comm_type=CommType.TLS, sslctx=context)
-        nothing = SimDevice(0, [SimData(0, datatype=DataType.REGISTERS)])  # the image is read instead
-        super().__init__(nothing, framer=FramerType.SOCKET, address=(host, port))
-        times = {"ssl_handshake_timeout": handshake_s, "ssl_shutdown_timeout": handshake_s} if context else {}
-        self._listen = partial(
-            self.loop.create_server, self._connection, host, port, ssl=context, backlog=BACKLOG, **times
-        )
-
-    async def open(self) -> None:
-        """Listen; OSError if it cannot."""
-        self.is_listener = True
-        self.transport = await self._listen()  # type: ignore[assignment]  # pymodbus stores its listener there too
-
-    def _connection(self) -> Connection:
-        """Make a connection that pymodbus does not register: it would retain those that fail in the TLS handshake."""
-        return Connection(self, self._manager)
-
-
 class ModbusServer:
     """Serves a register image to the line's PLC, and with TLS on a second port."""
 
@@ -71,7 +40,7 @@ class ModbusServer:
         """
         self._settings = settings
         self._manager = ConnectionManager(settings, image, on_write, on_writer)
-        self._listeners: list[Listener] = []
+        self._listeners: list[asyncio.Server] = []
 
     @property
     def statistics(self) -> Statistics:
@@ -108,16 +77,24 @@ class ModbusServer:
     async def stop(self) -> None:
         """Close the ports and every connection. Idempotent."""
         for listener in self._listeners:
-            await listener.shutdown()
+            listener.close()
         self._listeners.clear()
         self._manager.close()
         await asyncio.sleep(0)
 
     async def _listen(self, section: str, port: int, context: ssl.SSLContext | None) -> None:
-        host = self._settings.host
-        listener = Listener(self._manager, host, port, self._settings.frame_timeout_s, context)
+        host, connection = self._settings.host, partial(Connection, self._manager)
+        deadline_s = self._settings.frame_timeout_s if context else None
         try:
-            await listener.open()
+            listener = await asyncio.get_running_loop().create_server(
+                connection,
+                host,
+                port,
+                backlog=BACKLOG,
+                ssl=context,
+                ssl_handshake_timeout=deadline_s,
+                ssl_shutdown_timeout=deadline_s,
+            )
         except OSError as error:
             raise ModbusServerError(why_not(section, host, port, error)) from error
         self._listeners.append(listener)

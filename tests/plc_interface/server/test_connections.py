@@ -149,6 +149,9 @@ class TestTime:
         deaf.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         deaf.socket.setblocking(False)
         request = deaf.request(struct.pack(">BHH", 3, 128, 30))
+        members = serving.wait(lambda: dict(serving.server._manager._members))
+        (member,) = (member for peer, member in members.items() if peer.address == "127.0.0.9")
+        servers_end = member._transport.get_extra_info("socket")
         sent = 0
 
         def shout():
@@ -160,6 +163,7 @@ class TestTime:
 
         eventually(shout)
         serving.wait(lambda: serving.server.connections == 1)
+        assert serving.call(servers_end.fileno) == -1, "it does not wait for them to be taken"
 
     def test_a_client_that_shouts_waits_for_its_turn(self, serve, connect):
         serving = serve()

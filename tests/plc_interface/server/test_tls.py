@@ -145,11 +145,14 @@ class TestRoles:
         assert serving.server.statistics.troubles[Trouble.NOT_ALLOWED] == 1
 
     def test_one_that_closes_while_the_server_ends_does_not_keep_it(self, serving, dial, authority):
-        """A TLS transport that was closed once is closed again."""
-        dial(*authority.issue("line-plc", "writer")).read(REFERENCE, 1)
+        """Its TLS connection, closed once, would wait for the client's own goodbye."""
+        plc = dial(*authority.issue("line-plc", "writer"))
+        plc.read(REFERENCE, 1)
         (member,) = serving.server._manager._members.values()
-        serving.call(lambda: (member.transport.close(), serving.server._manager.close()))
-        serving.wait(lambda: member.transport is None)
+        sock = serving.call(member._transport.get_extra_info, "socket")
+        serving.call(lambda: (member._transport.close(), serving.server._manager.close()))
+        assert serving.call(sock.fileno) == -1
+        assert is_parted_from(plc)
         assert serving.server.connections == 0
 
     def test_pipelined_requests_over_tls(self, dial, authority):
