@@ -10,7 +10,7 @@ from pymodbus.pdu import ModbusPDU
 
 from plc_interface.client.errors import ReferencesError, RequestRefusedError, UnreachableError
 from plc_interface.registers.codec import WordOrder, decode, encode, is_invalid
-from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, REFERENCES, map_checksum
+from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, GROUPS, MAP_VERSION, REFERENCES, map_checksum
 from plc_interface.registers.register import Register
 
 EXCEPTIONS = {
@@ -96,10 +96,11 @@ class RegisterLink:
         """
         begin, end = GROUP_BY_NAME[first], GROUP_BY_NAME[last or first]
         words = await self._read(begin.address, end.address + end.words - begin.address)
-        registers = begin.registers if begin is end else (*begin.registers, *end.registers)
+        groups = GROUPS[GROUPS.index(begin) : GROUPS.index(end) + 1]
         return {
             register.name: self._value(register, words[register.address - begin.address :][: register.words])
-            for register in registers
+            for group in groups
+            for register in group.registers
         }
 
     async def write(self, values: Mapping[str, float | str]) -> None:
@@ -126,11 +127,11 @@ class RegisterLink:
             )
 
     async def check_references(self) -> None:
-        """Compare the reference registers and the map's version and checksum.
+        """Compare the reference registers and the map's version; where its checksum is another, its extent.
 
         Raises:
             ReferencesError: names the cause: another word order, swapped bytes, an address that is off by one, another
-                version of the map.
+                version of the map, a map that has less than this client's.
         """
         group = GROUP_BY_NAME["identity"]
         count = BY_NAME["reference_u64"].end - group.address
@@ -149,11 +150,21 @@ class RegisterLink:
             raise ReferencesError(f"{self._where}: {fault}")
         said = {name: self._value(BY_NAME[name], words[BY_NAME[name].address - group.address :][: BY_NAME[name].words])
                 for name in ("map_version", "map_checksum")}  # fmt: skip
-        if said != {"map_version": MAP_VERSION, "map_checksum": map_checksum()}:
+        if said["map_version"] != MAP_VERSION:
             raise ReferencesError(
-                f"{self._where} has version {said['map_version']} of the map with checksum "
-                f"{said['map_checksum']:08X}, this client has {MAP_VERSION} with {map_checksum():08X}: update one"
+                f"{self._where} has version {said['map_version']} of the map, this client has {MAP_VERSION}: update one"
             )
+        if said["map_checksum"] != map_checksum():
+            await self._check_blocks()
+
+    async def _check_blocks(self) -> None:
+        """Check that a map of the same version has every register of this client's: it may only have more."""
+        for group in GROUPS:
+            if await self._try_read(group.address, group.words) is None:
+                raise ReferencesError(
+                    f"{self._where} has an older map, without all registers {group.address} to "
+                    f"{group.address + group.words - 1}: update the station"
+                )
 
     def _difference(self, words: Sequence[int]) -> str:
         """Describe the error of the references in the identity block's words; empty for none."""

@@ -15,6 +15,7 @@ from plc_interface.client.errors import (
 )
 from plc_interface.client.inspection_result import InspectionResult, published_result
 from plc_interface.client.register_link import RegisterLink
+from plc_interface.registers.alarms import active_alarms
 from plc_interface.registers.bits import WRITE_KEY
 from plc_interface.registers.codec import WordOrder
 from plc_interface.registers.map import BY_NAME, COUNTERS
@@ -73,12 +74,16 @@ class StationClient(RegisterLink):
         await self.write({"write_key": 0})
 
     async def scan(self) -> dict[str, Any]:
-        """Read status and result block with one request, by register names."""
-        return await self.read_groups("status", "result")
+        """Read status, result block and alarms with one request, by register names."""
+        return await self.read_groups("status", "more_alarms")
 
     async def status(self) -> frozenset[str]:
         """Return the names of the status bits that are set."""
         return STATUS.names(await self.read("status"))
+
+    async def alarms(self) -> tuple[int, ...]:
+        """Return the numbers of the active alarms, ascending."""
+        return active_alarms(await self.scan())
 
     async def pending_result(self) -> InspectionResult | None:
         """Return the result that waits for its acknowledgement, or None."""

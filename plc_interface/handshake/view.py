@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Result, Service, Trigger
 from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
+from plc_interface.registers.alarms import alarm_values
 from plc_interface.registers.map import BY_NAME
 from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
 
@@ -57,7 +58,7 @@ def _status(state: State) -> dict[str, Value]:
         "free_places": max(0, state.places - taken),
         "waiting_results": len(state.queue),
         "error_code": station.error_code if station else STATION_LOST_CODE,
-        "alarms": station.alarms if station else 0,
+        **alarm_values(station.alarms if station else 0),
         "last_refusal": _REFUSALS.code(state.last_refusal.value) if state.last_refusal else 0,
         "last_refused_trigger_id": state.last_refused_id,
         "latched_lot_checksum": lot_checksum(journal.lot),

@@ -9,12 +9,12 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
 from plc_interface.registers.codec import RegisterValueError, WordOrder, decode, encode
-from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, RESULT, STATUS
+from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, MORE_ALARMS, RESULT, STATUS
 from plc_interface.registers.register import Register
 
 ANSWER_LIMIT_S = 1.0
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # `trouble` holds its errors
-_READ = (*STATUS, *RESULT)
+_READ = (*STATUS, *RESULT, *MORE_ALARMS)
 _FIRST = GROUP_BY_NAME["status"].address
 
 
@@ -49,7 +49,7 @@ class Scanner:
             self._client = None
 
     async def exchange(self, outputs: Mapping[str, int | str]) -> dict[str, int | float | str] | None:
-        """Write the control block and read status and result.
+        """Write the control block and read status, result and alarms.
 
         Args:
             outputs: every register of the control block, by name.
@@ -71,7 +71,7 @@ class Scanner:
 
     async def _exchanged(self, written: Sequence[int]) -> Sequence[int]:
         client = await self._connected()
-        count = RESULT[-1].end - _FIRST
+        count = _READ[-1].end - _FIRST
         if self._one_round_trip:
             answer = await client.readwrite_registers(
                 read_address=_FIRST, read_count=count, write_address=0, values=written, device_id=self._unit

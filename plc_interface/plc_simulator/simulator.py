@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from plc_interface.plc_simulator.nest import LaidFruit, Nest
-from plc_interface.plc_simulator.program import Decision, LineProgram, Passage
+from plc_interface.plc_simulator.program import Decision, LineProgram, Passage, Values
 from plc_interface.plc_simulator.scan import Scanner
+from plc_interface.registers.alarms import active_alarms
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ class LineSimulator:
             if self._program.cut_wanted:
                 self._scanner.cut()
             inputs = await self._scanner.exchange(outputs)
-            self.on_scan(self._scanner.trouble or self._program.stage.value)
+            self.on_scan(self._scanner.trouble or self._activity(inputs))
             for passage in self._program.take_passages():
                 if fruit is not None:
                     self.summary.add(passage, fruit)
@@ -107,3 +108,7 @@ class LineSimulator:
             due_s = max(due_s + self._pace.scan_s, time.monotonic())
             await asyncio.sleep(max(0.0, due_s - time.monotonic()))
         return self.summary
+
+    def _activity(self, inputs: Values | None) -> str:
+        alarms = ", ".join(map(str, active_alarms(inputs))) if inputs else ""
+        return f"{self._program.stage.value}; active alarms: {alarms}" if alarms else self._program.stage.value

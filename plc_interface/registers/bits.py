@@ -82,7 +82,10 @@ _REASONS: Mapping[Reason, str] = {
 REASON_BITS = _bits(*((reason.value, _REASONS[reason]) for reason in Reason))
 """In the order of `Reason`, bit 0 first."""
 
-ALARM_BITS = _bits(*((f"alarm_{number}", f"Alarm {number} is active") for number in range(1, 33)))
+ALARM_BITS, MORE_ALARM_BITS = (
+    _bits(*((f"alarm_{number}", f"Alarm {number} is active") for number in range(first, first + 32)))
+    for first in (1, 33)
+)
 
 _REFUSALS: Mapping[Refusal, str] = {
     Refusal.NOT_ENABLED: "Enable is off",

@@ -15,6 +15,7 @@ from plc_interface.registers.bits import (
     COMMAND_RESULT_CODES,
     CONTROL_BITS,
     FLAG_BITS,
+    MORE_ALARM_BITS,
     OUTCOME_CODES,
     PACKML_MODE_CODES,
     PACKML_STATE_CODES,
@@ -29,9 +30,9 @@ from station.channel.line import CommandName
 MAP_VERSION = 1
 """Raised with every change that an integrator has to follow; `map_checksum` changes with any change.
 
-A map that only grows has the same version: no register moves, the new ones follow those of their block, and a program
-that neither reads nor writes them works as before. Where the result block grows, another copy of the sequence ends it,
-so that a torn read of the new registers is found as well.
+A map that only grows has the same version: no register moves or changes, new ones follow those of their block or are a
+block of their own, and a program that neither reads nor writes them works as before. What is added to the result ends
+with another copy of the sequence, so that a torn read of it is found as well.
 """
 
 RO, RW = Access.READ_ONLY, Access.READ_WRITE
@@ -90,7 +91,7 @@ STATUS = (
     _u32("active_recipe_checksum", 110, "CRC-32 of the active recipe's canonical JSON, 0 for none"),
     _u16("waiting_results", 112, "Results not acknowledged, including the published one", high=QUEUE_PLACES),
     _u16("error_code", 113, "Number of the active alarm of the highest priority; 0: none; 1000: station lost"),
-    Register("alarms", 114, Kind.BITS32, RO, "", None, None, "Active alarms", bits=ALARM_BITS),
+    Register("alarms", 114, Kind.BITS32, RO, "", None, None, "Active alarms 1 to 32", bits=ALARM_BITS),
     Register("last_refusal", 116, Kind.U16, RO, "", 0, 10, "Reason of the last refused trigger", codes=REFUSAL_CODES),
     _u16("last_refused_trigger_id", 117, "The id of that trigger"),
     _u32("writer_ipv4", 118, "IPv4 address of the client that may write, first octet highest; 0 for none"),
@@ -126,6 +127,11 @@ RESULT = (
     _u16("result_size_class", 159, "The fruit's size class that this inspection was given; 0: none"),
     _u32("result_sequence_end", 160, "As result_sequence, for who reads the size too: where they differ read again"),
 )  # fmt: skip
+
+MORE_ALARMS = (
+    Register("alarms_33_to_64", 162, Kind.BITS32, RO, "", None, None, "Active alarms 33 to 64", bits=MORE_ALARM_BITS),
+)
+"""Right behind the result, so that one read still gets everything for a scan."""
 
 COUNTERS = (
     _u32("count_triggers", 200, "Triggers seen, accepted or refused"),
@@ -200,6 +206,7 @@ GROUPS = (
     Group("control", "Control block", CONTROL),
     Group("status", "Status block", STATUS),
     Group("result", "Result block", RESULT),
+    Group("more_alarms", "Further alarms", MORE_ALARMS),
     Group("counters", "Counters", COUNTERS),
     Group("identity", "Identity", IDENTITY),
 )

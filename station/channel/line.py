@@ -186,7 +186,7 @@ class StationState(ChannelMessage):
     recipe_checksum: int = Field(ge=0, lt=2**32)
     error_code: int = Field(ge=0, le=65_535)
     """The number of the active alarm of the highest priority, 0 for none."""
-    alarms: int = Field(ge=0, lt=2**32)
+    alarms: int = Field(ge=0, lt=2**64)
     """Bit n is set while the alarm with number n + 1 is active."""
     simulated: bool
     registers_wanted: bool = False

@@ -64,10 +64,6 @@ class AlarmId(StrEnum):
     OUTBOX_BEHIND = "outbox_behind"
 
 
-WORD_BITS = 32
-"""The alarm word's; what has a higher number concerns no line."""
-
-
 class Provocation(NamedTuple):
     """What makes an alarm come in a test."""
 
@@ -81,7 +77,7 @@ class AlarmRow(NamedTuple):
     """One alarm as its document and the panel show it."""
 
     number: int
-    """The PLC's error code; up to `WORD_BITS` also bit number - 1 of its alarm word. Never given to another alarm."""
+    """The PLC's error code, and from 1 the bit in its alarm registers. Never given to another alarm."""
     priority: Priority
     texts: AlarmTexts
     provoked_by: tuple[Provocation, ...]

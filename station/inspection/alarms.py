@@ -7,7 +7,7 @@ from typing import Any, Self
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from station.inspection.alarm_table import ALARMS, WORD_BITS, AlarmId, urgency
+from station.inspection.alarm_table import ALARMS, AlarmId, urgency
 from station.messages.message import Message, message_in
 
 LONGEST_SHELVED_S = 8 * 3600.0
@@ -82,7 +82,7 @@ LATCHED_LIFE: dict[tuple[AlarmState, AlarmEvent], AlarmState] = {
 """That of a latched one: it is never shelved, and only a person's reset after the cause is gone ends it."""
 
 ACTIVE = (N.UNACKNOWLEDGED, N.ACKNOWLEDGED, N.LATCHED_UNACKNOWLEDGED, N.LATCHED)
-"""In the PLC's alarm word."""
+"""In the PLC's alarm registers."""
 SHOWN = (*ACTIVE, N.RETURNED)
 """In an operator's list."""
 CAUSED = (N.UNACKNOWLEDGED, N.ACKNOWLEDGED, N.SHELVED)
@@ -209,9 +209,8 @@ class Alarms:
 
     @property
     def word(self) -> int:
-        """The PLC's 32 bits: bit n for an active alarm with number n + 1."""
-        numbers = (ALARMS[alarm.id].number for alarm in self.active)
-        return sum(1 << (number - 1) for number in numbers if number <= WORD_BITS)
+        """The PLC's alarm registers as one number: bit n for an active alarm with number n + 1."""
+        return sum(1 << ALARMS[alarm.id].number - 1 for alarm in self.active)
 
     @property
     def error_code(self) -> int:

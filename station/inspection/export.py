@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from station.inspection.alarm_table import ALARMS, PRIORITIES, WORD_BITS, AlarmId, Priority
+from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
 from station.inspection.alarms import (
     CHATTER_RAISES,
     CHATTER_S,
@@ -49,8 +49,8 @@ What tests prove by walking through everything that the table can lead to, with 
 ALARM = f"""# Alarms
 
 {MADE}
-An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and bit number - 1 of the PLC's
-alarm word is set while it is active; a number above {WORD_BITS} has no bit there.
+An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and its bit is set while it is
+active: bit number - 1 of the register `alarms`, or for the numbers from 33 on bit number - 33 of `alarms_33_to_64`.
 """
 
 

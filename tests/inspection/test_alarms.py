@@ -42,11 +42,6 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
     assert counts[0] + counts[1] <= len(ALARMS) / 3
 
 
-def test_an_alarm_beyond_the_words_bits_is_the_error_code_and_no_bit():
-    alarms = Alarms().raise_(AlarmId.OUTBOX_BEHIND, 1.0, None)
-    assert (alarms.word, alarms.error_code) == (0, ALARMS[AlarmId.OUTBOX_BEHIND].number)
-
-
 def test_what_provokes_an_alarm_is_a_fault_that_the_twin_has():
     boards = {board.device: board.known for board in (arm_faults(), gripper_faults(), digit_faults())}
     named = {provocation for row in ALARMS.values() for provocation in row.provoked_by}

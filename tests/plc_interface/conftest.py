@@ -45,6 +45,8 @@ class Rig:
         self.first_sequence = 0x00010001
         self.answers = True
         """The station answers beats."""
+        self.alarms: set[int] = set()
+        """Numbers of the active ones."""
         self.refusal: Refusal | None = None
         self.outcome: dict[str, Any] = {}
         self.command_fails = ""
@@ -78,7 +80,8 @@ class Rig:
                 now(),
                 StationState(
                     boot="one", healthy=True, ready=True, why_not_ready=None, packml_state=PackmlState.EXECUTE, mode=1,
-                    recipe_number=3, recipe_checksum=0xCAFE, error_code=0, alarms=0, simulated=True,
+                    recipe_number=3, recipe_checksum=0xCAFE, error_code=0, simulated=True,
+                    alarms=sum(1 << number - 1 for number in self.alarms),
                 ),
             )
         )  # fmt: skip

@@ -153,7 +153,7 @@ class ScriptedStation:
             recipe_number=3,
             recipe_checksum=0x12345678,
             error_code=0,
-            alarms=0b101,
+            alarms=1 << 63 | 1 << 32 | 0b101,
             simulated=True,
         )
 

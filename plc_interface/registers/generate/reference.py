@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Iterator
 
+from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY
 from plc_interface.registers.map import GROUPS, MAP_VERSION, REGISTERS, bit_address, map_checksum
 from plc_interface.registers.register import Kind, Register
@@ -108,7 +109,7 @@ def _row(register: Register) -> str:
 
 
 def _details(register: Register) -> Iterator[str]:
-    if register.bits and register.name != "alarms":
+    if register.bits and register not in ALARMS:
         yield from (f"### Bits of `{register.name}`", "")
         coils = register.kind is Kind.BITS
         yield from (

@@ -5,12 +5,14 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.bits import COMMAND_CODES, OUTCOME_CODES, WRITE_KEY
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, map_checksum
 from plc_interface.registers.register import Kind, Register
 
 STATUS, RESULT, CONTROL = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"], GROUP_BY_NAME["control"]
+MORE_ALARMS = GROUP_BY_NAME["more_alarms"]
 _TYPES = {
     Kind.U16: "UINT",
     Kind.I16: "INT",
@@ -20,8 +22,6 @@ _TYPES = {
     Kind.BITS32: "DWORD",
 }
 _PREFIXES = {"result_reasons": "reason_"}
-_WITHOUT_NAMES = {"alarms"}
-"""Flags whose names say no more than their numbers."""
 
 
 def field_name(register: Register) -> str:
@@ -30,8 +30,8 @@ def field_name(register: Register) -> str:
 
 
 def bit_fields(register: Register) -> list[tuple[str, int, str]]:
-    """Return name, number and meaning of each flag that becomes a member of its own."""
-    if register.name in _WITHOUT_NAMES:
+    """Return name, number and meaning of each flag that becomes a member of its own; alarms have only numbers."""
+    if register in ALARMS:
         return []
     prefix = _PREFIXES.get(register.name, "")
     return [(prefix + bit.name, bit.number, bit.meaning) for bit in register.bits]
@@ -54,8 +54,9 @@ def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
 def data_types() -> str:
     """The file with the data types of status and result."""
     parts = [_head("Data types")]
-    for group, name in ((STATUS, "ST_FruitStationStatus"), (RESULT, "ST_FruitStationResult")):
-        rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(group.registers)]
+    status = (*STATUS.registers, *MORE_ALARMS.registers)
+    for registers, name in ((status, "ST_FruitStationStatus"), (RESULT.registers, "ST_FruitStationResult")):
+        rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(registers)]
         parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT", "END_TYPE", ""]))
     return "\n".join(parts)
 
@@ -89,8 +90,8 @@ def _render(template: str, what: str) -> str:
     return environment.get_template(template).render(
         head=_head(what),
         first=STATUS.address,
-        last=RESULT.address + RESULT.words - 1,
-        reads=STATUS.words + RESULT.words,
+        last=MORE_ALARMS.address + MORE_ALARMS.words - 1,
+        reads=MORE_ALARMS.address + MORE_ALARMS.words - STATUS.address,
         writes=CONTROL.words,
         lot_words=BY_NAME["lot"].words,
         control_bits=BY_NAME["control"].bits,
@@ -104,7 +105,7 @@ def _render(template: str, what: str) -> str:
 
 
 def _decoding() -> Iterator[str]:
-    for group, variable in ((STATUS, "status"), (RESULT, "seen")):
+    for group, variable in ((STATUS, "status"), (RESULT, "seen"), (MORE_ALARMS, "status")):
         for register in group.registers:
             yield from _decode(register, variable)
 

@@ -6,6 +6,7 @@ first, because its numbers are aligned in each block. Texts then have their char
 
 from xml.etree import ElementTree as ET
 
+from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind, Register
@@ -120,7 +121,7 @@ def _documentation(parent: ET.Element, text: str) -> None:
 
 def _comment(register: Register) -> str:
     comment = register.meaning + (f", {register.unit}" if register.unit else "")
-    if register.bits and register.name != "alarms":
+    if register.bits and register not in ALARMS:
         comment += "; bits: " + ", ".join(f"{bit.number} {bit.name}" for bit in register.bits)
     return comment
 

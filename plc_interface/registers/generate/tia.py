@@ -7,6 +7,7 @@ numbers become two, because the S7-1200 has none.
 
 from collections.abc import Iterator
 
+from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind, Register
@@ -52,7 +53,7 @@ def tia() -> str:
 
 def _rows(register: Register) -> Iterator[str]:
     comment = register.meaning + (f", {register.unit}" if register.unit else "")
-    if register.bits and register.name != "alarms":
+    if register.bits and register not in ALARMS:
         comment += "; " + ", ".join(f"X{bit.number} {bit.name}" for bit in register.bits)
     match register.kind:
         case Kind.U64:

@@ -16,7 +16,8 @@ from plc_interface.client.errors import (
     UnreachableError,
 )
 from plc_interface.registers.codec import RegisterValueError, WordOrder
-from plc_interface.registers.map import REFERENCES
+from plc_interface.registers.map import BY_NAME, REFERENCES
+from plc_interface.server.exceptions import illegal_address
 from station.channel.line import Refusal
 
 HOST = "127.0.0.1"
@@ -266,14 +267,47 @@ def test_swapped_bytes_another_map_and_no_station_at_all_are_told_apart(serve, m
             with pytest.raises(ReferencesError, match="bytes of each register are swapped"):
                 await StationClient(HOST, rig.port).connect()
             monkeypatch.setattr(rig.image, "registers", read)
-            rig.image.commit({"map_checksum": 1})
-            with pytest.raises(ReferencesError, match="checksum 00000001, this client has"):
+            rig.image.commit({"map_version": 2})
+            with pytest.raises(ReferencesError, match="version 2 of the map, this client has 1"):
                 await StationClient(HOST, rig.port).connect()
             rig.image.commit(dict.fromkeys(set(REFERENCES) - {"reference_text"}, 0))
             with pytest.raises(ReferencesError, match="no fruit station"):
                 await StationClient(HOST, rig.port).connect()
 
     asyncio.run(main())
+
+
+def test_a_map_of_the_same_version_may_have_more_than_the_client_knows_and_not_less(serve, monkeypatch):
+    async def main():
+        async with serve() as rig:
+            rig.image.commit({"map_checksum": 1})
+            async with StationClient(HOST, rig.port) as client:
+                await client.arm()
+                grown = await client.inspect(7)
+            read, end = rig.image.registers, BY_NAME["alarms_33_to_64"].address
+
+            def older(address, count):
+                if address <= end < address + count:
+                    raise illegal_address("not in this map")
+                return read(address, count)
+
+            monkeypatch.setattr(rig.image, "registers", older)
+            with pytest.raises(ReferencesError, match="older map, without all registers 162 to 163: update"):
+                await StationClient(HOST, rig.port).connect()
+            return grown
+
+    assert asyncio.run(main()).trigger_id == 7
+
+
+def test_the_numbers_of_all_active_alarms(serve):
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            before = await client.alarms()
+            rig.alarms = {1, 32, 33, 64}
+            rig.beat()
+            return before, await client.alarms()
+
+    assert asyncio.run(main()) == ((), (1, 32, 33, 64))
 
 
 def test_nobody_there_and_a_link_that_breaks(serve, unused_port):

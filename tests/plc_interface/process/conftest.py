@@ -88,8 +88,8 @@ class Plc:
         assert not answer.isError()
         return self._decoded((*status.registers, *result.registers), status.address, answer.registers)
 
-    async def counters(self) -> dict[str, Any]:
-        group = GROUP_BY_NAME["counters"]
+    async def group(self, name: str) -> dict[str, Any]:
+        group = GROUP_BY_NAME[name]
         answer = await self._client.read_input_registers(group.address, count=group.words)
         return self._decoded(group.registers, group.address, answer.registers)
 

@@ -24,6 +24,7 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
             assert {"online", "inspecting", "acquiring", "simulated", "writer_owned"} <= seen["status"]
             assert (seen["accepted_trigger_id"], seen["packml_state"], seen["active_recipe"]) == (4711, "execute", 3)
             assert seen["alarms"] == {"alarm_1", "alarm_3"}
+            assert (await plc.group("more_alarms"))["alarms_33_to_64"] == {"alarm_33", "alarm_64"}
             assert seen["result_deadline_ms"] == 60_300
             station.finish("FAIL", Reason.AREA_OVER_LIMIT, Reason.EARLY_STOP)
             first = await plc.wait("result_valid", without="inspecting")
@@ -50,14 +51,14 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
             assert ("toggle" in second["status"]) != ("toggle" in first["status"])
             await plc.write(acknowledged_sequence=102)
             await plc.wait(without="result_valid", free_places=8)
-            counters = await plc.counters()
+            counters = await plc.group("counters")
             assert {name: counters[f"count_{name}"] for name in ("triggers", "pass", "fail", "missed")} == {
                 "triggers": 2,
                 "pass": 1,
                 "fail": 1,
                 "missed": 0,
             }
-            assert station.published == station.outcomes
+            await eventually(lambda: station.published == station.outcomes)
             assert station.lines[-1].counters["count_pass"] == 1
 
     asyncio.run(scenario())
@@ -118,7 +119,7 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell):
                 ("station_lost", 8),
                 ("station_lost", 9),
             ]
-            counters = await plc.counters()
+            counters = await plc.group("counters")
             assert (counters["count_missed"], counters["count_overrun"], counters["count_accepted"]) == (11, 1, 1)
             await plc.set("clear_error")
             seen = await plc.read()
@@ -200,7 +201,7 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually):
                 line.EXECUTE_NOT_RESET.id,
                 line.LATCH_NOT_RESET.id,
             }
-            assert (await plc.counters())["count_communication"] == 4
+            assert (await plc.group("counters"))["count_communication"] == 4
 
     asyncio.run(scenario())
 
@@ -228,7 +229,7 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             assert (await again.trigger(3))["last_refusal"] == "not_enabled"
             await again.arm("buffer_results")
             await again.trigger(4)
-            assert (await again.counters())["count_communication"] == 2
+            assert (await again.group("counters"))["count_communication"] == 2
 
     asyncio.run(scenario())
 
@@ -300,7 +301,7 @@ def test_a_result_that_comes_too_late_is_not_shown(cell, eventually):
             station.finish("PASS")
             await eventually(lambda: "which stands" in made.log.read_text())
             assert (await plc.read())["result_outcome"] == "NO_RESULT"
-            assert (await plc.counters())["count_late"] == 1
+            assert (await plc.group("counters"))["count_late"] == 1
 
     asyncio.run(scenario())
 
@@ -369,9 +370,9 @@ def test_commands_are_carried_out_once(cell):
             await plc.wait(without="online")
             assert (await order(2, 0, 5))["command_result"] == "station_lost"
             assert len(station.commands) == 3
-            before = await plc.counters()
+            before = await plc.group("counters")
             await plc.set("reset_counters")
-            after = await plc.counters()
+            after = await plc.group("counters")
             assert after["counters_epoch"] == before["counters_epoch"] + 1
             assert after["counters_reset_utc_ms"] > before["counters_reset_utc_ms"] > 1_700_000_000_000
 

@@ -7,10 +7,12 @@ from itertools import pairwise
 import pytest
 
 from plc_interface.registers import map as register_map
+from plc_interface.registers.alarms import ALARMS, active_alarms, alarm_values
 from plc_interface.registers.codec import encode
 from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, GROUPS, REFERENCES, REGISTERS, bit_address, map_checksum
 from plc_interface.registers.register import Access, Kind
 from station.channel.line import CommandName, PackmlState, Reason, Refusal
+from station.inspection.alarm_table import ALARMS as STATION_ALARMS
 
 LARGEST_READ, LARGEST_WRITE, LARGEST_WRITE_OF_FC23 = 125, 123, 121
 
@@ -27,9 +29,10 @@ def test_a_block_has_no_gap_so_that_it_can_be_read_as_one(group):
 
 
 def test_one_scan_is_one_request():
-    status, result = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"]
+    status, result, alarms = (GROUP_BY_NAME[name] for name in ("status", "result", "more_alarms"))
     assert status.address + status.words == result.address
-    assert status.words + result.words <= LARGEST_READ
+    assert result.address + result.words == alarms.address
+    assert status.words + result.words + alarms.words <= LARGEST_READ
     assert GROUP_BY_NAME["control"].words <= min(LARGEST_WRITE, LARGEST_WRITE_OF_FC23)
 
 
@@ -44,19 +47,15 @@ def test_the_result_begins_and_ends_with_its_sequence():
     assert result[0].kind is result[-1].kind is Kind.U32
 
 
-def test_what_programs_of_version_1_read_and_write_stays_where_it_was():
-    """Blocks have no gap, so that the first and the last of the registers first published hold those between."""
-    assert register_map.MAP_VERSION == 1
-    published = {
-        "control": (0, "write_key", 26),
-        "status": (100, "station_boots", 127),
-        "result": (128, "result_sequence_again", 156),
-        "counters": (200, "counters_reset_utc_ms", 224),
-        "identity": (240, "station_heartbeat_ms", 270),
+def test_every_alarm_of_the_station_has_its_bit():
+    names = [bit.name for register in ALARMS for bit in register.bits]
+    assert {f"alarm_{row.number}" for row in STATION_ALARMS.values()} <= set(names)
+    every = {row.number for row in STATION_ALARMS.values()}
+    values = alarm_values(sum(1 << number - 1 for number in every))
+    assert {name for register in ALARMS for name in register.names(values[register.name])} == {
+        f"alarm_{number}" for number in every
     }
-    for name, (begin, last, address) in published.items():
-        group = GROUP_BY_NAME[name]
-        assert (group.address, BY_NAME[last].address) == (begin, address)
+    assert active_alarms(values) == tuple(sorted(every))
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)

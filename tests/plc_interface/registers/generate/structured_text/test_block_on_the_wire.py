@@ -7,7 +7,7 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from plc_interface.registers.codec import WordOrder
-from plc_interface.registers.map import GROUP_BY_NAME, RESULT, STATUS
+from plc_interface.registers.map import GROUP_BY_NAME, MORE_ALARMS, STATUS
 from station.channel.line import Reason, Refusal
 
 SCAN_S = 0.01
@@ -19,7 +19,7 @@ class Loop:
 
     def __init__(self, plc, client):
         self.plc, self.client = plc, client
-        self.read = STATUS[0].address, RESULT[-1].end - STATUS[0].address
+        self.read = STATUS[0].address, MORE_ALARMS[-1].end - STATUS[0].address
 
     async def scan(self, **inputs):
         plc = self.plc
@@ -68,6 +68,11 @@ def test_fruits_recipe_refusal_and_a_station_that_dies(serve, make_plc, no_conta
 
             await loop.until("recipe_done", change_recipe=True, recipe_number=12)
             assert rig.commands == [("change_recipe", 12)]
+
+            rig.alarms = {1, 33, 40}
+            rig.beat()
+            await loop.scan()
+            assert (block["status"]["alarms"], block["status"]["alarms_33_to_64"]) == (1, 1 << 7 | 1)
 
             rig.refusal = Refusal.RECORDS_FULL
             await loop.until("ready")
