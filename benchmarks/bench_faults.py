@@ -39,7 +39,7 @@ async def run_scenario(
         with tempfile.TemporaryDirectory(prefix="faults-") as name:
             folder = Path(name)
             try:
-                async with running(folder, next(numbers), scenario.fault) as rig:
+                async with running(folder, next(numbers), scenario) as rig:
                     while left:
                         rows.append(await play(rig, scenario, left.pop(0)))
                         print(told(rows[-1]), flush=True)

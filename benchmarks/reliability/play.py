@@ -59,8 +59,12 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
         wire.forget_alarms()
         if phase is Phase.APPROACH:
             await rig.watch_arm()
+        if phase is Phase.LEAVING:
+            await _sound_fruit(rig)
+            passages_before += 1
+        accepted_now = len(wire.accepted)
         await rig.lay_and_trigger()
-        await _disturb(rig, scenario, phase, accepted_before, passages_before)
+        await _disturb(rig, scenario, phase, accepted_now, passages_before)
         cleared_s = time.monotonic()
         await _sure(lambda: len(wire.passages) > passages_before, lambda: f"the line gets no outcome ({wire.standing})")
         await _recover(rig, scenario, row, cleared_s, wrong)
@@ -79,6 +83,7 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
         row.skipped = str(error)
     finally:
         await rig.unwatch_arm()
+        await rig.hurry()
         asking.cancel()
         await asyncio.gather(asking, return_exceptions=True)
         if scenario.fault is not None:
@@ -93,6 +98,22 @@ class _Stuck(Exception):  # noqa: N818 (no error of the program's)
     """The row cannot go on."""
 
 
+async def _sound_fruit(rig: Rig) -> None:
+    """Inspect a good fruit, up to where the next trigger would be accepted while the arm leaves slowly."""
+    wire, before = rig.wire, len(rig.wire.passages)
+    await rig.lay_and_trigger()
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            await rig.leave_slowly()
+    except TimeoutError:
+        raise _Stuck("the fruit before gets no outcome") from None
+    await _sure(lambda: len(wire.passages) > before and wire.ready, lambda: f"not ready after it ({wire.standing})")
+    if wire.passages[-1].decision.value != "PASS":
+        raise _Stuck(f"the fruit before is {wire.passages[-1].decision}")
+    if not wire.completing:
+        raise _Stuck("the arm has left before the next trigger")
+
+
 async def _disturb(rig: Rig, scenario: Scenario, phase: Phase, accepted_before: int, passages_before: int) -> None:
     if scenario.fault is None:
         return
@@ -105,6 +126,7 @@ async def _disturb(rig: Rig, scenario: Scenario, phase: Phase, accepted_before: 
     await rig.begin(scenario.fault)
     await asyncio.sleep(scenario.lasts_s)
     await rig.end(scenario.fault)
+    await rig.hurry()
 
 
 async def _recover(rig: Rig, scenario: Scenario, row: Row, since_s: float, wrong: list[str]) -> None:

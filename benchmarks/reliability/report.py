@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from .play import Row
-from .scenario import ClockFault, DeviceFault, DiskFault, NestFault, Phase, ProcessFault, Scenario
+from .scenario import ClockFault, DeviceFault, DiskFault, NestFault, Phase, PlcFault, ProcessFault, Scenario
 
 _ELSEWHERE = re.compile(r"/tmp/[^/ ]+/")
 _HEAD = """# Effect of faults on the fruit
@@ -22,8 +22,12 @@ inspection, as visible from outside, ends it, and then inspects a good fruit. A 
 - the station was ready again by itself, or stayed stopped, gave the reason, and was ready after the given commands,
 - the next fruit, a good one, got PASS.
 
-Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm moves; *stepping*: the fruit is
-deformed by 0.5 mm; *releasing*: the PLC reads the result. Scenarios and their expected results:
+Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm moves, and the reference is taken on
+the way; *closing*: the jaws close without a stop until they touch the fruit; *stepping*: the fruit is deformed by
+0.5 mm, in *sweep* while the jaws close on without a stop (`steps.measured: while_closing`); *releasing*: the PLC reads
+the result, and the arm leaves; *leaving*: the PLC has read its next trigger as accepted while the arm leaves the fruit
+before; the outcome is the second fruit's. So that faults meet these moments, the arm leaves ten times as slowly there,
+and the jaws close three times as slowly in *sweep*. Scenarios and their expected results:
 `tests/reliability/scenarios`. The station works with a quick recipe of 6 steps and a patience of 5; times are from the
 fault's end, or the last command, to ready for a trigger, on a machine with other work.
 
@@ -74,6 +78,10 @@ def _line(row: Row, scenario: Scenario) -> str:
 
 
 def _named(scenario: Scenario) -> str:
+    return f"{_fault(scenario)}, in *sweep*" if scenario.measured == "while_closing" else _fault(scenario)
+
+
+def _fault(scenario: Scenario) -> str:
     fault = scenario.fault
     if isinstance(fault, DeviceFault):
         amount = "" if fault.amount == 1.0 else f" {fault.amount:g}"
@@ -85,6 +93,9 @@ def _named(scenario: Scenario) -> str:
         return f"records' disk {fault.disk.replace('_', '-')}, {scenario.lasts_s:g} s"
     if isinstance(fault, ClockFault):
         return f"clock {fault.step_s:+g} s, {scenario.lasts_s:g} s"
+    if isinstance(fault, PlcFault):
+        what = "is away" if fault.plc == "lost" else "writes nonsense"
+        return f"the PLC {what}, {scenario.lasts_s:g} s"
     return "the fruit falls out" if isinstance(fault, NestFault) else "none"
 
 

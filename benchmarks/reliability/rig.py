@@ -28,7 +28,7 @@ from station.supervision.supervisor import Supervisor
 from station.twin.console import ask
 
 from .clock import CannotDoError, ShiftedClock
-from .scenario import ClockFault, DeviceFault, DiskFault, Fault, NestFault, Phase, ProcessFault
+from .scenario import ClockFault, DeviceFault, DiskFault, Fault, NestFault, Phase, PlcFault, ProcessFault, Scenario
 from .wire import Wire
 
 LOOPBACK = "127.0.0.1"
@@ -42,6 +42,10 @@ _MARKS = {
     "arm": "-m station.devices.arm.process",
 }
 _DEFORMED_MM = 0.5
+_CLOSED_BY_MM = 0.5
+_LEAVES_SLOWER = 9.0
+_SWEEPS_SLOWER = 2.0
+"""A sweep takes 0.15 s, in which a busy machine neither sees the phase nor measures enough frames for a PASS."""
 _JAWS_OPEN_MM = 50.0
 _START_S = 120.0
 
@@ -102,6 +106,16 @@ class Rig:
             await self._moving
         self._watching = self._moving = None
 
+    async def leave_slowly(self) -> None:
+        """Wait for the result, and have the arm take ten times as long for its way from the fruit."""
+        while not self.wire.result_valid:
+            await asyncio.sleep(0.01)
+        await self.twin(do="set", device="arm", fault="slow", amount=_LEAVES_SLOWER)
+
+    async def hurry(self) -> None:
+        """Have the arm move as ever. Idempotent."""
+        await self.twin(do="clear", device="arm", fault="slow")
+
     async def reached(self, phase: Phase, accepted_before: int) -> bool:
         """Whether the cycle has got to a phase.
 
@@ -115,6 +129,9 @@ class Rig:
             return self._moving is not None and self._moving.done()
         if phase is Phase.STEPPING:
             return (await self.twin(do="state"))["closing_mm"] > _DEFORMED_MM
+        if phase is Phase.CLOSING:
+            around_mm = self.recipe.expected_width.largest_mm + self.configuration.arm.jaw_clearance_mm
+            return (await self.twin(do="state"))["width_mm"] < around_mm - _CLOSED_BY_MM
         return phase is not Phase.RELEASING or self.wire.result_valid
 
     async def begin(self, fault: Fault) -> None:
@@ -134,6 +151,8 @@ class Rig:
             self.clock.step(fault.step_s)
         elif isinstance(fault, NestFault):
             await self.twin(do="remove")
+        elif isinstance(fault, PlcFault):
+            self.wire.disturb(fault.plc)
         elif fault.disk == "full":
             with contextlib.suppress(OSError), self._ballast.open("wb", buffering=0) as ballast:
                 while True:
@@ -154,6 +173,8 @@ class Rig:
             self.clock.step(0)
         elif isinstance(fault, NestFault):
             return
+        elif isinstance(fault, PlcFault):
+            self.wire.disturb(None)
         elif fault.disk == "full":
             self._ballast.unlink(missing_ok=True)
         else:
@@ -254,11 +275,11 @@ def _free_ports(count: int) -> list[int]:
         return [probe.getsockname()[1] for probe in probes]
 
 
-def _quick_recipes(folder: Path) -> Path:
+def _quick_recipes(folder: Path, measured: str) -> Path:
     """The shipped recipe with few steps: the matrix is about faults, not about fruit."""
     folder.mkdir()
     values = load_recipes()[FRUIT].model_dump(mode="json")
-    values["steps"] |= {"number": 6, "result_closings_mm": [3], "closing_limit_mm": 6.0}
+    values["steps"] |= {"number": 6, "result_closings_mm": [3], "closing_limit_mm": 6.0, "measured": measured}
     values["imaging"] |= {"settle_s": 0.05, "frames_per_step": 2}
     values["damage"]["growth_mm2_per_mm"] = 60
     # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
@@ -272,13 +293,13 @@ def _quick_recipes(folder: Path) -> Path:
 
 
 @contextlib.asynccontextmanager
-async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterator[Rig]:
+async def running(folder: Path, number: int, scenario: Scenario) -> AsyncIterator[Rig]:
     """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
 
     Args:
         folder: an empty one.
         number: another one for each station that this process starts.
-        fault: what will be played; for some the station is prepared.
+        scenario: what will be played; the station is prepared for it.
 
     Raises:
         CannotDoError: the fault's disk or clock cannot be had.
@@ -289,7 +310,7 @@ async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterat
     file = folder / "station.yaml"
     values = {
         "home": str(folder / "home"),
-        "recipes_folder": str(_quick_recipes(folder / "recipes")),
+        "recipes_folder": str(_quick_recipes(folder / "recipes", scenario.measured)),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
         "hmi": {"port": hmi},
@@ -311,12 +332,12 @@ async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterat
     logs.mkdir()
     rig = Rig(configuration, file, console)
     environment = {**os.environ, "STATION_HOME": str(folder / "home"), "OMP_NUM_THREADS": "1"}
-    if isinstance(fault, ClockFault):
+    if isinstance(scenario.fault, ClockFault):
         environment |= rig.clock.build()
     programs = [twin_program(file, console, 1, logs), *station_programs(file, logs)]
     supervisor = Supervisor([replace(each, start_limit_s=_START_S) for each in programs], environment)
     ended, ready = asyncio.Event(), asyncio.Event()
-    if isinstance(fault, DiskFault):
+    if isinstance(scenario.fault, DiskFault):
         await rig.mount_records()
     supervising = asyncio.create_task(supervisor.run(ready.set, ended), name="supervisor")
     waiting = asyncio.create_task(ready.wait())
@@ -326,6 +347,8 @@ async def running(folder: Path, number: int, fault: Fault | None) -> AsyncIterat
         if supervising.done():
             await supervising
         await rig.twin(do="remove")
+        if scenario.measured == "while_closing":
+            await rig.twin(do="set", device="gripper", fault="slow", amount=_SWEEPS_SLOWER)
         await rig.choose_recipe()
         scanning = asyncio.create_task(rig.wire.run(), name="scanning")
         yield rig

@@ -18,11 +18,18 @@ class Phase(StrEnum):
     TRIGGER = "trigger"
     """The PLC has seen its trigger accepted."""
     APPROACH = "approach"
-    """The arm moves towards the fruit, by its controller's RTDE."""
+    """The arm moves towards the fruit, by its controller's RTDE; the reference is taken on this way."""
+    CLOSING = "closing"
+    """The jaws close without a stop, and do not touch the fruit yet, by the twin."""
     STEPPING = "stepping"
     """The jaws have deformed the fruit by half a millimetre, by the twin."""
     RELEASING = "releasing"
     """The PLC sees the result; the jaws open."""
+    LEAVING = "leaving"
+    """The PLC has seen its next trigger accepted while the arm leaves the fruit before, which has got PASS."""
+
+
+_EVERY_FRUIT = (Phase.TRIGGER, Phase.APPROACH, Phase.STEPPING, Phase.RELEASING)
 
 
 class _Checked(BaseModel):
@@ -68,7 +75,15 @@ class NestFault(_Checked):
     kind: Literal["nest"] = "nest"
 
 
-Fault = DeviceFault | ProcessFault | DiskFault | ClockFault | NestFault
+class PlcFault(_Checked):
+    """The line's PLC."""
+
+    kind: Literal["plc"] = "plc"
+    plc: Literal["lost", "nonsense"]
+    """`lost`: it cuts its connection and is away. `nonsense`: it sets every bit, with numbers that there are not."""
+
+
+Fault = DeviceFault | ProcessFault | DiskFault | ClockFault | NestFault | PlcFault
 
 
 class Expected(_Checked):
@@ -87,7 +102,9 @@ class Scenario(_Checked):
     """None for a fruit that nothing happens to."""
     lasts_s: float = 3.0
     """Then it is taken back."""
-    phases: tuple[Phase, ...] = tuple(Phase)
+    phases: tuple[Phase, ...] = _EVERY_FRUIT
+    measured: Literal["at_rest", "while_closing"] = "at_rest"
+    """The recipe's `steps.measured`."""
     expected: Expected
     expected_in: dict[Phase, Expected] = {}
     """Where a phase differs."""

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from plc_interface.plc_simulator.program import LineProgram, Outputs, Passage, Stage, Values
 from plc_interface.plc_simulator.scan import Scanner
@@ -12,6 +12,8 @@ from station.inspection.alarm_table import ALARMS, AlarmId
 
 _SCAN_S = 0.02
 _RESET_SEQUENCES = 1000
+_NO_RECIPE = 999
+_NO_SEQUENCE = 2**32 - 1
 
 
 class Shown(NamedTuple):
@@ -37,6 +39,7 @@ class Wire:
         self._fruit = self._resetting = self._stopping = False
         self._resets = 0
         self._inputs: Values | None = None
+        self._disturbed: Literal["lost", "nonsense"] | None = None
         self.accepted: list[int] = []
         """Every trigger id that the station accepted, in order."""
         self.shown: dict[int, set[Shown]] = {}
@@ -66,6 +69,12 @@ class Wire:
         return self._now("result_valid")
 
     @property
+    def completing(self) -> bool:
+        """Whether the arm still leaves the last fruit."""
+        codes = BY_NAME["packml_state"].codes
+        return self._inputs is not None and codes[int(self._inputs["packml_state"])].name == "completing"
+
+    @property
     def standing(self) -> str:
         """Where the PLC's program is and what the station's status bits are, in words."""
         if self._inputs is None:
@@ -84,6 +93,14 @@ class Wire:
     def trigger(self) -> None:
         """Have the fruit in the nest inspected; the line has to be ready."""
         self._fruit = True
+
+    def disturb(self, how: Literal["lost", "nonsense"] | None) -> None:
+        """Have the PLC be away, or write nonsense.
+
+        Args:
+            how: None to have it be itself again.
+        """
+        self._disturbed = how
 
     async def reset(self) -> bool:
         """Give the PLC's reset command. Whether it was carried out."""
@@ -111,7 +128,11 @@ class Wire:
                 outputs = self._program.scan(
                     self._inputs, time.monotonic(), fruit_in_nest=self._fruit, recipe=0, encoder=7
                 )
-                self._inputs = await self._scanner.exchange(self._with_reset(outputs))
+                if self._disturbed == "lost":
+                    self._scanner.cut()
+                    self._inputs = None
+                else:
+                    self._inputs = await self._scanner.exchange(self._with_nonsense(self._with_reset(outputs)))
                 if self._inputs is not None:
                     self._note(self._inputs)
                 for passage in self._program.take_passages():
@@ -131,6 +152,19 @@ class Wire:
             "command_code": BY_NAME["command_code"].code("reset"),
             "command_argument": 0,
             "command_sequence": _RESET_SEQUENCES + self._resets,
+        }
+
+    def _with_nonsense(self, outputs: Outputs) -> Outputs:
+        if self._disturbed is None:
+            return outputs
+        control = BY_NAME["control"]
+        return {
+            **outputs,
+            "control": control.flags(bit.name for bit in control.bits),
+            "trigger_id": 0,
+            "acknowledged_sequence": _NO_SEQUENCE,
+            "command_code": BY_NAME["command_code"].code("change_recipe"),
+            "command_argument": _NO_RECIPE,
         }
 
     def _now(self, bit: str) -> bool:
