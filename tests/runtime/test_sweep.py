@@ -28,6 +28,7 @@ class Fingers:
     def __init__(self, fruit_mm: float, stopped_at_mm: float = 0.0) -> None:
         self.now_s, self.fruit_mm, self.stopped_at_mm = 100.0, fruit_mm, stopped_at_mm
         self.stops, self.opened_to_mm = 0, []
+        self.answers_in_s = 0.0
         self._from, self._to_mm, self._speed = (self.now_s, START_MM), START_MM, 0.0
         self._stopped, self._ticked = asyncio.Event(), asyncio.Event()
 
@@ -37,10 +38,11 @@ class Fingers:
         return max(from_mm - way, self._to_mm, self.stopped_at_mm) if self._to_mm < from_mm else self._to_mm
 
     async def read(self) -> GripperReading:
+        asked_s, self.now_s = self.now_s, self.now_s + self.answers_in_s
         width_mm = self.width_at(self.now_s)
         held = self.stopped_at_mm > self._to_mm and width_mm <= self.stopped_at_mm
         state = ObjectState.CONTACT_CLOSING if held else ObjectState.AT_POSITION
-        return GripperReading(width_mm, 0, 0, state, active=True, fault_code=0, current_a=None, at_s=self.now_s)
+        return GripperReading(width_mm, 0, 0, state, active=True, fault_code=0, current_a=None, at_s=asked_s)
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, _force_n: float) -> MoveResult:
         self._stopped.clear()
@@ -141,5 +143,56 @@ def test_fingers_that_end_their_way_without_a_contact_say_whether_something_held
         _, grip, touches = cell(0.0, stopped_at_mm)
         with pytest.raises(error):
             await grip.sweep(touches)
+
+    asyncio.run(scenario())
+
+
+def test_frames_on_the_way_wait_for_a_measurement_that_is_late(cell):
+    async def scenario():
+        fingers, grip, _ = cell(15.3)
+        await fingers.open(16.0)
+        widths_mm = []
+
+        async def measured(step: Any) -> bool:
+            while fingers.width_at(fingers.now_s) > 13.0:
+                await asyncio.sleep(0)
+            widths_mm.append(step.move.width_mm)
+            return True
+
+        async with asyncio.timeout(10):
+            assert (await grip.close_on(13.0, measured)).width_mm == 13.0
+        way_mm = BLUEBERRY.gripper.speed_mm_s * FRAME_S
+        assert -np.diff(widths_mm) == pytest.approx([way_mm] * 3, abs=0.01), "every frame, each with its own width"
+
+    asyncio.run(scenario())
+
+
+def test_an_area_that_ends_the_steps_stops_the_fingers_on_their_way(cell):
+    async def scenario():
+        fingers, grip, _ = cell(15.3)
+        await fingers.open(16.0)
+        stopped = await grip.close_on(10.0, lambda step: asyncio.sleep(0, step.move.width_mm > 14.5))
+        assert fingers.stops == 1
+        assert 10.0 < stopped.width_mm < 14.5
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(("answers_in_s", "known"), [(0.02, True), (0.06, False)])
+def test_a_frame_whose_width_is_not_known_to_a_count_is_no_step(cell, answers_in_s, known):
+    async def scenario():
+        fingers, grip, _ = cell(15.3)
+        fingers.answers_in_s = answers_in_s
+        await fingers.open(16.0)
+        steps = []
+
+        async def measured(step: Any) -> bool:
+            steps.append(step)
+            return True
+
+        await grip.close_on(10.0, measured)
+        assert bool(steps) == known
+        for step in steps:
+            assert step.move.width_mm == pytest.approx(fingers.width_at(step.last_frame.captured_s), abs=0.4)
 
     asyncio.run(scenario())

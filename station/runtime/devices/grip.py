@@ -89,6 +89,15 @@ class Met(NamedTuple):
     """At the last frame without one; None where there was none."""
 
 
+class _Read(NamedTuple):
+    """A reading of the gripper while it moves."""
+
+    reading: GripperReading
+    """Its time is the middle of the exchange."""
+    within_s: float
+    """Half the exchange: its width may be so much earlier or later."""
+
+
 Touches = Callable[[GripStep], Awaitable[bool]]
 """Says whether the gel is touched in a step's frames."""
 GoesOn = Callable[[GripStep], Awaitable[bool]]
@@ -206,7 +215,7 @@ class Grip:
         recipe = self._recipe
         lowest_mm = recipe.expected_width.smallest_mm - recipe.steps.step_mm
         unseen_s = MOST_UNSEEN_MM / recipe.gripper.speed_mm_s
-        readings = [await self._cell.gripper.read()]
+        readings = [await self._read()]
         clear_mm: float | None = None
         newer_than_s = time.monotonic()
         moving: asyncio.Future[MoveResult] | None = None
@@ -271,51 +280,69 @@ class Grip:
     async def close_on(self, width_mm: float, goes_on: GoesOn) -> MoveResult:
         """Close to a width without a stop, and hand on every frame that was captured on the way.
 
+        A measurement that is late costs no frame: those that come meanwhile wait for it. A frame whose width is not
+        known to a count of the gripper, as its readings took too long, is left out.
+
         Args:
             width_mm: the width to ask for; less than 0 is 0.
-            goes_on: gets each frame with the width at its capture, and says whether the fingers may close further.
+            goes_on: gets each frame with the width at its capture, in their order, and says whether the fingers may
+                close further.
 
         Returns:
             Where the fingers came to rest.
         """
-        readings = [await self._cell.gripper.read()]
-        newer_than_s = readings[0].at_s
+        readings = [await self._read()]
+        start_mm, newer_than_s = readings[0].reading.width_mm, readings[0].reading.at_s
+        passed: asyncio.Queue[GripStep | None] = asyncio.Queue()
         moving = asyncio.ensure_future(self.close_to(width_mm))
+        measuring = asyncio.ensure_future(_all_go_on(passed, goes_on))
         try:
             while not moving.done():
                 passing = asyncio.ensure_future(self._passing(newer_than_s, readings))
                 try:
-                    await asyncio.wait({passing, moving}, return_when=asyncio.FIRST_COMPLETED)
+                    await asyncio.wait({passing, moving, measuring}, return_when=asyncio.FIRST_COMPLETED)
                     if not passing.done():
                         break
                     step = await passing
                 finally:
                     passing.cancel()
                 newer_than_s = step.last_frame.captured_s
-                if step.move.width_mm < readings[0].width_mm and not await goes_on(step):
-                    await self._halt(moving)
-                    at = await self._cell.gripper.read()
-                    return MoveResult(at.width_mm, at.echoed_count, at)
-            return await moving
+                # The frame was captured between two of the last three readings.
+                doubt_mm = max(each.within_s for each in readings[-3:]) * self._recipe.gripper.speed_mm_s
+                if step.move.width_mm < start_mm and doubt_mm <= FINEST_STEP_MM:
+                    passed.put_nowait(step)
+            if moving.done():
+                moving.result()
+                passed.put_nowait(None)
+            if await measuring:
+                return await moving
+            await self._halt(moving)
+            at = await self._cell.gripper.read()
+            return MoveResult(at.width_mm, at.echoed_count, at)
         finally:
             moving.cancel()
-            await asyncio.gather(moving, return_exceptions=True)
+            measuring.cancel()
+            await asyncio.gather(moving, measuring, return_exceptions=True)
 
-    async def _seen(
-        self, newer_than_s: float, readings: list[GripperReading], touches: Touches
-    ) -> tuple[GripStep, bool]:
+    async def _seen(self, newer_than_s: float, readings: list[_Read], touches: Touches) -> tuple[GripStep, bool]:
         """The next frame with the width at its capture; and whether it shows a contact."""
         step = await self._passing(newer_than_s, readings)
         return step, await touches(step)
 
-    async def _passing(self, newer_than_s: float, readings: list[GripperReading]) -> GripStep:
+    async def _passing(self, newer_than_s: float, readings: list[_Read]) -> GripStep:
         """The next frame with the width at its capture, interpolated between readings."""
         frame = await self._sound_frame(newer_than_s)
-        readings.append(await self._cell.gripper.read())
-        times_s, widths_mm = [each.at_s for each in readings], [each.width_mm for each in readings]
-        width_mm = float(np.interp(frame.captured_s, times_s, widths_mm))
-        at_capture = replace(readings[-1], width_mm=width_mm, at_s=frame.captured_s)
+        readings.append(await self._read())
+        times_s = [each.reading.at_s for each in readings]
+        width_mm = float(np.interp(frame.captured_s, times_s, [each.reading.width_mm for each in readings]))
+        at_capture = replace(readings[-1].reading, width_mm=width_mm, at_s=frame.captured_s)
         return GripStep(-1, MoveResult(width_mm, at_capture.echoed_count, at_capture), (frame,))
+
+    async def _read(self) -> _Read:
+        """Read the gripper while it may move."""
+        reading = await self._cell.gripper.read()
+        within_s = (time.monotonic() - reading.at_s) / 2
+        return _Read(replace(reading, at_s=reading.at_s + within_s), within_s)
 
     async def _halt(self, moving: asyncio.Future[MoveResult]) -> None:
         """Stop the fingers where they are."""
@@ -386,6 +413,14 @@ class Grip:
             messages.BAD_FRAMES(number=_MOST_FAULTY_FRAMES, faults=describe(faults)),
             faults,
         )
+
+
+async def _all_go_on(passed: "asyncio.Queue[GripStep | None]", goes_on: GoesOn) -> bool:
+    """Whether the fingers may close further in every frame up to None."""
+    while (step := await passed.get()) is not None:
+        if not await goes_on(step):
+            return False
+    return True
 
 
 def _combined(after: Message | None, reason: Message, alone: Definition, with_same_reason: Definition) -> Message:
