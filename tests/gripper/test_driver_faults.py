@@ -242,7 +242,9 @@ async def reached(rig: Any) -> Any:
 
 def test_what_comes_and_goes_gives_errors_and_then_readings(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
-        rig.faults.set("intermittent", 1.0)
+        # There for longer than the driver waits for an answer and for a quiet line together: with a period of just
+        # these two, every request of the driver would fall into a silence.
+        rig.faults.set("intermittent", 4.0)
         seen = set()
         while seen != {True, False}:
             try:

@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from station.inspection.states import State
 from station.records.database import reading, records_folder
 from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
@@ -29,6 +30,8 @@ def inspected(bench, settings_file, tmp_path):
                 await cell.choose("blueberry")
                 cell.lay("blueberry", 1)
                 await cell.line.ready()
+                # So slow that a busy machine still measures frames on the way.
+                cell.at(State.MOVING, lambda: cell.twin.boards["gripper"].set("slow", 4.0))
                 outcome = await cell.line.inspect()
                 record = await cell.station.service.registry.records.inspection(outcome.sequence)
                 return outcome, record

@@ -168,11 +168,12 @@ class TwinCamera:
             while True:
                 async with asyncio.timeout(_SILENCE_S):
                     header = await _read_header(reader)
+                    received_s = time.monotonic()
                     image, sequence, age_s = await _read_frame(reader, header)
                 if sequence <= last:
                     raise CameraProtocolError(messages.WRONG_ORDER(found=str(sequence), before=str(last)))
                 last = sequence
-                self._feed.publish(image, time.monotonic() - age_s, sequence=sequence)
+                self._feed.publish(image, received_s - age_s, sequence=sequence)
         finally:
             await _close(writer)
 
