@@ -20,6 +20,8 @@ from station.vision.contact import Image, Mask
 _LONG_SIDE_PX = 640
 _FINE_PX, _COARSE_PX = 1.5, 12.0
 """The difference of these two blurs shows a tear or debris and not the drift of the light."""
+_DETAIL_PX = (5.0, 15.0)
+"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
 _BLEMISH_LEVELS, _NEW_BLEMISH_LEVELS = 20.0, 12.0
 _JOINED_PX = 7
 _SMALLEST_PX, _SMALLEST_NEW_PX = 40, 150
@@ -28,7 +30,8 @@ _MOST_BLEMISHED = 0.006
 """Real units reach 0.0032 of the field."""
 _TEAR_LENGTH, _TEAR_SLENDERNESS = 0.5, 10.0
 """A tear's diagonal over the image's width, and over its own mean width; real blemishes reach 0.2 and 6."""
-_DEAD_LED = 1 / 3
+DEAD_LED = 1 / 3
+"""Share of a colour's light below which its LED is dead."""
 _LED_COLOURS = (messages.BLUE, messages.GREEN, messages.RED)
 _MARK = (0, 0, 255)
 
@@ -89,13 +92,15 @@ def light(image: Image) -> Levels:
 
 
 def sharpness(image: Image) -> float:
-    """Return the root mean square of the light's structure between two scales, above the pixels' noise; grey levels.
+    """Return the root mean square of the detail that a lens shows and fog hides; grey levels.
 
     Args:
         image: shape (height, width, 3), dtype uint8.
     """
-    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in (5.0, 15.0))
-    return float(np.sqrt(np.mean((finer - coarser) ** 2)))
+    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
+    detail = finer - coarser
+    detail -= detail.mean(axis=0)  # the light drifts in bands along the columns, which is no detail
+    return float(np.sqrt(np.mean(detail**2)))
 
 
 def side_by_side(before: Image, now: Image) -> Image:
@@ -120,13 +125,13 @@ def _named(image: Image, name: str) -> Image:
 def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
     now = light(image)
     before = (float(np.median(now)),) * 3 if golden is None else light(golden)
-    limit = _DEAD_LED if golden is None else least_light
+    limit = DEAD_LED if golden is None else least_light
     shares = [(level / max(was, 1.0), colour) for level, was, colour in zip(now, before, _LED_COLOURS, strict=True)]
     lost = [(share, colour) for share, colour in shares if share < limit]
     if not lost:
         return []
     colours = [colour(percent=100 * share) for share, colour in lost]
-    dead = min(share for share, _ in lost) < _DEAD_LED
+    dead = min(share for share, _ in lost) < DEAD_LED
     of_before = messages.LED_DEAD if dead else messages.LED_DIM
     text = (messages.LED_DEAD_OF_OTHERS if golden is None else of_before)(colours=colours)
     return [Finding(GelFault.LED, text, image if golden is None else side_by_side(golden, image))]

@@ -26,8 +26,8 @@ class ReferenceSettings(Settings):
     least_sharpness: float = setting(
         0.7,
         title="Least sharpness",
-        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where 0.4 "
-        "of its worst fog reaches it.",
+        description="Detail as a share of the golden reference's; less is a fogged lens. Found on the twin, where 0.6 "
+        "to 0.9 of its worst fog reach it, from unit to unit.",
         gt=0.0,
         le=1.0,
     )

@@ -7,6 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from station.calibration.gel import DEAD_LED, light, sharpness
+from station.calibration.model import Levels
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
@@ -18,8 +20,6 @@ from station.settings.service import ReferenceSettings
 from station.vision.contact import Flag, Method
 from station.vision.methods import make_method
 
-_DETAIL_PX = (5.0, 15.0)
-"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
 _SATURATED_LEVEL = 250
 GOLDEN = "golden_reference.png"
 
@@ -53,6 +53,7 @@ class PreparedReference:
 
     shape: tuple[int, ...]
     sharpness: float
+    light: Levels
     method: Method
     renewal: Message
     """Instruction to make another one."""
@@ -90,7 +91,9 @@ class GoldenReference:
             self._prepared = (
                 data,
                 segmentation,
-                PreparedReference(image.shape, sharpness(image), make_method([image], segmentation), renewal),
+                PreparedReference(
+                    image.shape, sharpness(image), light(image), make_method([image], segmentation), renewal
+                ),
             )
         return self._prepared[2]
 
@@ -134,12 +137,14 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
     contact = golden.method.measure(image)
     drift = contact.drift_levels or 0.0
     share = detail / golden.sharpness
-    if share < settings.least_sharpness:
+    # First, since without one colour there is less detail too.
+    dead = any(now < DEAD_LED * before for now, before in zip(light(image), golden.light, strict=True))
+    if not dead and share < settings.least_sharpness:
         raise BadReferenceError(
             AlarmId.CAMERA_DIRTY,
             messages.REFERENCE_BLURRED(found=100 * share, limit=100 * settings.least_sharpness),
         )
-    if drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
+    if dead or drift > settings.most_drift_levels or Flag.REFERENCE_MISMATCH in contact.flags:
         raise BadReferenceError(
             AlarmId.CAMERA_LED_DEAD,
             messages.REFERENCE_LIGHT(levels=drift, renewal=golden.renewal),
@@ -150,13 +155,3 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
             messages.REFERENCE_TOUCHED(renewal=golden.renewal),
         )
     return ReferenceProperties(detail, saturated, drift)
-
-
-def sharpness(image: Image) -> float:
-    """Return the root mean square of the detail between two scales, grey levels.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-    """
-    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
-    return float(np.sqrt(np.mean((finer - coarser) ** 2)))

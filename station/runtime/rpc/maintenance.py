@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from station.calibration.gel import sharpness
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -35,7 +36,7 @@ from station.messages.commands import JOGGING
 from station.messages.message import Message
 from station.records.audit import AuditEntry
 from station.runtime.devices.manager import GRIPPER
-from station.runtime.imaging.reference import GOLDEN, sharpness
+from station.runtime.imaging.reference import GOLDEN
 from station.runtime.observability.observability import Observability
 from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing
