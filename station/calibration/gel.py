@@ -12,16 +12,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.calibration.model import Levels
 from station.messages import calibration as messages
 from station.messages.message import Message
 from station.vision.contact import Image, Mask
+from station.vision.image_quality import DEAD_LED, light, sharpness
 
 _LONG_SIDE_PX = 640
 _FINE_PX, _COARSE_PX = 1.5, 12.0
 """The difference of these two blurs shows a tear or debris and not the drift of the light."""
-_DETAIL_PX = (5.0, 15.0)
-"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
 _BLEMISH_LEVELS, _NEW_BLEMISH_LEVELS = 20.0, 12.0
 _JOINED_PX = 7
 _SMALLEST_PX, _SMALLEST_NEW_PX = 40, 150
@@ -30,8 +28,6 @@ _MOST_BLEMISHED = 0.006
 """Real units reach 0.0032 of the field."""
 _TEAR_LENGTH, _TEAR_SLENDERNESS = 0.5, 10.0
 """A tear's diagonal over the image's width, and over its own mean width; real blemishes reach 0.2 and 6."""
-DEAD_LED = 1 / 3
-"""Share of a colour's light below which its LED is dead."""
 _LED_COLOURS = (messages.BLUE, messages.GREEN, messages.RED)
 _MARK = (0, 0, 255)
 
@@ -79,28 +75,6 @@ def examine(image: Image, golden: Image | None, least_light: float) -> list[Find
         fogged = messages.FOGGED(percent=100 * fog)
         return [Finding(GelFault.FOG, fogged, side_by_side(golden, image))]
     return _blemishes(image, golden)
-
-
-def light(image: Image) -> Levels:
-    """Return the mean of each colour.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8, BGR.
-    """
-    blue, green, red = image.mean(axis=(0, 1))
-    return float(blue), float(green), float(red)
-
-
-def sharpness(image: Image) -> float:
-    """Return the root mean square of the detail that a lens shows and fog hides; grey levels.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-    """
-    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
-    detail = finer - coarser
-    detail -= detail.mean(axis=0)  # the light drifts in bands along the columns, which is no detail
-    return float(np.sqrt(np.mean(detail**2)))
 
 
 def side_by_side(before: Image, now: Image) -> Image:

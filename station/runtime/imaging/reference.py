@@ -7,8 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from station.calibration.gel import DEAD_LED, light, sharpness
-from station.calibration.model import Levels
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
@@ -53,7 +51,7 @@ class PreparedReference:
 
     shape: tuple[int, ...]
     sharpness: float
-    light: Levels
+    light: tuple[float, float, float]
     method: Method
     renewal: Message
     """Instruction to make another one."""

@@ -1,4 +1,4 @@
-"""What this start of the station reports of itself, and where."""
+"""Metrics, progress and audit trail of one start of the station."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

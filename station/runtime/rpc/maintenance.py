@@ -7,7 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from station.calibration.gel import sharpness
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -43,6 +42,7 @@ from station.runtime.rpc.log import LogRing
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
+from station.vision.image_quality import sharpness
 from station.vision.methods import make_method
 from station.vocabulary import Refusal
 

@@ -1,4 +1,4 @@
-"""What a controller's servers read of it and do to it."""
+"""Interface of a UR controller for its servers."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol

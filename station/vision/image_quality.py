@@ -1,0 +1,33 @@
+"""Light and sharpness of a picture of the untouched gel, for comparison with an earlier one."""
+
+import cv2
+import numpy as np
+
+from station.vision.contact import Image
+
+_DETAIL_PX = (5.0, 15.0)
+"""The difference of these two blurs is the detail that a lens shows and fog hides, coarser than the pixels' noise."""
+DEAD_LED = 1 / 3
+"""Share of a colour's light below which its LED is dead."""
+
+
+def light(image: Image) -> tuple[float, float, float]:
+    """Return the mean of each colour, grey levels.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8, BGR.
+    """
+    blue, green, red = image.mean(axis=(0, 1))
+    return float(blue), float(green), float(red)
+
+
+def sharpness(image: Image) -> float:
+    """Return the root mean square of the detail that a lens shows and fog hides; grey levels.
+
+    Args:
+        image: shape (height, width, 3), dtype uint8.
+    """
+    finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
+    detail = finer - coarser
+    detail -= detail.mean(axis=0)  # the light drifts in bands along the columns, which is no detail
+    return float(np.sqrt(np.mean(detail**2)))
