@@ -26,6 +26,7 @@ from station.messages.message import Definition, Message
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
 from station.vision.contact import Image
+from station.vision.image_quality import light, sharpness
 from station.vision.scale import Scale
 
 log = logging.getLogger(__name__)
@@ -223,8 +224,8 @@ class CalibrationProcedure:
             onset_mm=round(onset_mm, 3),
             zero_mm=round(onset_mm - self._settings.ball_mm - self._settings.holder_mm, 3),
             noise=noise,
-            light_levels=gel.light(reference),
-            sharpness_levels=round(gel.sharpness(reference), 3),
+            light_levels=light(reference),
+            sharpness_levels=round(sharpness(reference), 3),
             field=figures.field_map(reference, frames),
             checks=checks,
         )

@@ -16,6 +16,7 @@ from station.runtime.state_files import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Flag, Method
+from station.vision.image_quality import DEAD_LED, light, sharpness
 from station.vision.methods import make_method
 
 _SATURATED_LEVEL = 250
