@@ -64,15 +64,6 @@ class AlarmId(StrEnum):
     OUTBOX_BEHIND = "outbox_behind"
 
 
-class Provocation(NamedTuple):
-    """What makes an alarm come in a test."""
-
-    device: str
-    """`arm`, `gripper` or `camera` of the twin, or what lies in its `nest`; `line`, the simulated PLC, or its `can`
-    node; a `process`, the `disk`, the `files` or the `clock`."""
-    fault: str
-
-
 class AlarmRow(NamedTuple):
     """One alarm as its document and the panel show it."""
 
@@ -80,7 +71,6 @@ class AlarmRow(NamedTuple):
     """The PLC's error code, and from 1 the bit in its alarm registers. Never given to another alarm."""
     priority: Priority
     texts: AlarmTexts
-    provoked_by: tuple[Provocation, ...]
     latched: bool = False
     """Active until a person has reset it, also when its cause is gone."""
 
@@ -100,90 +90,40 @@ class AlarmRow(NamedTuple):
         return self.texts.action()
 
 
-P = Provocation
-
 ALARMS: dict[AlarmId, AlarmRow] = {
-    AlarmId.EMERGENCY_STOP: AlarmRow(
-        1,
-        Priority.CRITICAL,
-        texts.EMERGENCY_STOP,
-        (P("arm", "emergency_stop"), P("gripper", "emergency_stopped")),
-        latched=True,
-    ),
-    AlarmId.PROTECTIVE_STOP: AlarmRow(
-        2, Priority.CRITICAL, texts.PROTECTIVE_STOP, (P("arm", "protective_stop"),), latched=True
-    ),
-    AlarmId.SAFETY_FAULT: AlarmRow(3, Priority.CRITICAL, texts.SAFETY_FAULT, (P("arm", "safety_fault"),), latched=True),
-    AlarmId.FRUIT_HELD: AlarmRow(
-        4, Priority.HIGH, texts.FRUIT_HELD, (P("arm", "link_cut"), P("gripper", "off")), latched=True
-    ),
-    AlarmId.ARM_LINK_LOST: AlarmRow(
-        5,
-        Priority.MEDIUM,
-        texts.ARM_LINK_LOST,
-        (P("arm", "off"), P("arm", "link_cut"), P("arm", "stuck"), P("arm", "silent")),
-    ),
-    AlarmId.ARM_NOT_REMOTE: AlarmRow(
-        6,
-        Priority.MEDIUM,
-        texts.ARM_NOT_REMOTE,
-        (P("arm", "local_mode"), P("arm", "pendant_stop"), P("arm", "registers_in_use")),
-    ),
-    AlarmId.GRIPPER_LINK_LOST: AlarmRow(
-        7, Priority.MEDIUM, texts.GRIPPER_LINK_LOST, (P("gripper", "off"), P("gripper", "garbage"))
-    ),
-    AlarmId.GRIPPER_FAULT: AlarmRow(
-        8,
-        Priority.MEDIUM,
-        texts.GRIPPER_FAULT,
-        (P("gripper", "internal_fault"), P("gripper", "over_temperature"), P("gripper", "under_voltage")),
-    ),
-    AlarmId.GRIPPER_JAM: AlarmRow(9, Priority.MEDIUM, texts.GRIPPER_JAM, (P("gripper", "stuck"), P("gripper", "slow"))),
-    AlarmId.CAMERA_LOST: AlarmRow(
-        10, Priority.MEDIUM, texts.CAMERA_LOST, (P("camera", "off"), P("camera", "garbage"), P("camera", "wrong"))
-    ),
-    AlarmId.CAMERA_STALE: AlarmRow(
-        11, Priority.MEDIUM, texts.CAMERA_STALE, (P("camera", "stuck"), P("camera", "delayed"), P("camera", "slow"))
-    ),
-    AlarmId.CAMERA_LED_DEAD: AlarmRow(12, Priority.MEDIUM, texts.CAMERA_LED_DEAD, (P("camera", "led_dead"),)),
-    AlarmId.CAMERA_DIRTY: AlarmRow(13, Priority.MEDIUM, texts.CAMERA_DIRTY, (P("camera", "lens_fogged"),)),
-    AlarmId.CAMERA_SATURATED: AlarmRow(
-        14,
-        Priority.MEDIUM,
-        texts.CAMERA_SATURATED,
-        (P("camera", "frame_saturated"), P("camera", "frame_black"), P("camera", "frame_torn")),
-    ),
-    AlarmId.REFERENCE_BAD: AlarmRow(
-        15, Priority.MEDIUM, texts.REFERENCE_BAD, (P("camera", "gel_torn"), P("camera", "dirt"))
-    ),
-    AlarmId.REFERENCE_DRIFTING: AlarmRow(16, Priority.LOW, texts.REFERENCE_DRIFTING, (P("camera", "lens_fogged"),)),
-    AlarmId.PLC_HEARTBEAT_LOST: AlarmRow(
-        17, Priority.MEDIUM, texts.PLC_HEARTBEAT_LOST, (P("line", "heartbeat_frozen"),)
-    ),
-    AlarmId.PLC_INTERFACE_LOST: AlarmRow(18, Priority.MEDIUM, texts.PLC_INTERFACE_LOST, (P("process", "plc"),)),
-    AlarmId.CAN_NODE_LOST: AlarmRow(19, Priority.HIGH, texts.CAN_NODE_LOST, (P("can", "off"),)),
-    AlarmId.GATE_NOT_FIRED: AlarmRow(20, Priority.HIGH, texts.GATE_NOT_FIRED, (P("can", "stuck"),)),
-    AlarmId.RECORDS_NOT_WRITABLE: AlarmRow(
-        21, Priority.HIGH, texts.RECORDS_NOT_WRITABLE, (P("disk", "full"), P("disk", "read_only"))
-    ),
-    AlarmId.DISK_LOW: AlarmRow(22, Priority.LOW, texts.DISK_LOW, (P("disk", "low"),)),
-    AlarmId.CONFIGURATION_BROKEN: AlarmRow(
-        23, Priority.LOW, texts.CONFIGURATION_BROKEN, (P("files", "configuration"),)
-    ),
-    AlarmId.RECIPE_BROKEN: AlarmRow(24, Priority.LOW, texts.RECIPE_BROKEN, (P("files", "recipe"),)),
-    AlarmId.NO_RECIPE: AlarmRow(25, Priority.MEDIUM, texts.NO_RECIPE, (P("files", "no_recipe"),)),
-    AlarmId.CLOCK_STEPPED: AlarmRow(26, Priority.LOW, texts.CLOCK_STEPPED, (P("clock", "step"),)),
-    AlarmId.PROCESS_RESTARTS: AlarmRow(27, Priority.HIGH, texts.PROCESS_RESTARTS, (P("process", "crash_loop"),)),
-    AlarmId.MANY_NO_RESULT: AlarmRow(
-        28, Priority.MEDIUM, texts.MANY_NO_RESULT, (P("nest", "empty"), P("camera", "lens_fogged"))
-    ),
-    AlarmId.REJECT_RATE: AlarmRow(29, Priority.LOW, texts.REJECT_RATE, (P("nest", "bruised"),)),
-    AlarmId.DEADLINE_MISSED: AlarmRow(
-        30, Priority.LOW, texts.DEADLINE_MISSED, (P("arm", "slow"), P("gripper", "delayed"))
-    ),
-    AlarmId.CALIBRATION_OLD: AlarmRow(31, Priority.LOW, texts.CALIBRATION_OLD, (P("camera", "gel_worn"),)),
-    AlarmId.HMI_LOST: AlarmRow(32, Priority.LOW, texts.HMI_LOST, (P("process", "hmi"),)),
-    AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND, (P("process", "postgresql_away"),)),
+    AlarmId.EMERGENCY_STOP: AlarmRow(1, Priority.CRITICAL, texts.EMERGENCY_STOP, latched=True),
+    AlarmId.PROTECTIVE_STOP: AlarmRow(2, Priority.CRITICAL, texts.PROTECTIVE_STOP, latched=True),
+    AlarmId.SAFETY_FAULT: AlarmRow(3, Priority.CRITICAL, texts.SAFETY_FAULT, latched=True),
+    AlarmId.FRUIT_HELD: AlarmRow(4, Priority.HIGH, texts.FRUIT_HELD, latched=True),
+    AlarmId.ARM_LINK_LOST: AlarmRow(5, Priority.MEDIUM, texts.ARM_LINK_LOST),
+    AlarmId.ARM_NOT_REMOTE: AlarmRow(6, Priority.MEDIUM, texts.ARM_NOT_REMOTE),
+    AlarmId.GRIPPER_LINK_LOST: AlarmRow(7, Priority.MEDIUM, texts.GRIPPER_LINK_LOST),
+    AlarmId.GRIPPER_FAULT: AlarmRow(8, Priority.MEDIUM, texts.GRIPPER_FAULT),
+    AlarmId.GRIPPER_JAM: AlarmRow(9, Priority.MEDIUM, texts.GRIPPER_JAM),
+    AlarmId.CAMERA_LOST: AlarmRow(10, Priority.MEDIUM, texts.CAMERA_LOST),
+    AlarmId.CAMERA_STALE: AlarmRow(11, Priority.MEDIUM, texts.CAMERA_STALE),
+    AlarmId.CAMERA_LED_DEAD: AlarmRow(12, Priority.MEDIUM, texts.CAMERA_LED_DEAD),
+    AlarmId.CAMERA_DIRTY: AlarmRow(13, Priority.MEDIUM, texts.CAMERA_DIRTY),
+    AlarmId.CAMERA_SATURATED: AlarmRow(14, Priority.MEDIUM, texts.CAMERA_SATURATED),
+    AlarmId.REFERENCE_BAD: AlarmRow(15, Priority.MEDIUM, texts.REFERENCE_BAD),
+    AlarmId.REFERENCE_DRIFTING: AlarmRow(16, Priority.LOW, texts.REFERENCE_DRIFTING),
+    AlarmId.PLC_HEARTBEAT_LOST: AlarmRow(17, Priority.MEDIUM, texts.PLC_HEARTBEAT_LOST),
+    AlarmId.PLC_INTERFACE_LOST: AlarmRow(18, Priority.MEDIUM, texts.PLC_INTERFACE_LOST),
+    AlarmId.CAN_NODE_LOST: AlarmRow(19, Priority.HIGH, texts.CAN_NODE_LOST),
+    AlarmId.GATE_NOT_FIRED: AlarmRow(20, Priority.HIGH, texts.GATE_NOT_FIRED),
+    AlarmId.RECORDS_NOT_WRITABLE: AlarmRow(21, Priority.HIGH, texts.RECORDS_NOT_WRITABLE),
+    AlarmId.DISK_LOW: AlarmRow(22, Priority.LOW, texts.DISK_LOW),
+    AlarmId.CONFIGURATION_BROKEN: AlarmRow(23, Priority.LOW, texts.CONFIGURATION_BROKEN),
+    AlarmId.RECIPE_BROKEN: AlarmRow(24, Priority.LOW, texts.RECIPE_BROKEN),
+    AlarmId.NO_RECIPE: AlarmRow(25, Priority.MEDIUM, texts.NO_RECIPE),
+    AlarmId.CLOCK_STEPPED: AlarmRow(26, Priority.LOW, texts.CLOCK_STEPPED),
+    AlarmId.PROCESS_RESTARTS: AlarmRow(27, Priority.HIGH, texts.PROCESS_RESTARTS),
+    AlarmId.MANY_NO_RESULT: AlarmRow(28, Priority.MEDIUM, texts.MANY_NO_RESULT),
+    AlarmId.REJECT_RATE: AlarmRow(29, Priority.LOW, texts.REJECT_RATE),
+    AlarmId.DEADLINE_MISSED: AlarmRow(30, Priority.LOW, texts.DEADLINE_MISSED),
+    AlarmId.CALIBRATION_OLD: AlarmRow(31, Priority.LOW, texts.CALIBRATION_OLD),
+    AlarmId.HMI_LOST: AlarmRow(32, Priority.LOW, texts.HMI_LOST),
+    AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND),
 }
 """Every alarm, in the order of its number."""
 

@@ -153,14 +153,12 @@ def _alarm(alarm: AlarmId) -> Iterable[str]:
     row = ALARMS[alarm]
     yield f"## {alarm.value.replace('_', ' ')}\n"
     yield f"Number {row.number}, {row.priority}{', latched' if row.latched else ''}.\n"
-    provoked = ", ".join(f"{device} `{fault}`" for device, fault in row.provoked_by)
     yield _table(
         ("", ""),
         (
             ("cause", str(row.cause)),
             ("consequence", str(row.consequence)),
             ("action", str(row.action)),
-            ("provoked by", provoked),
         ),
     )
 
