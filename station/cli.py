@@ -22,7 +22,7 @@ class Entry(NamedTuple):
 COMMANDS = {
     "alarms": Entry("station.commands.alarms:alarms", "See, acknowledge and shelve the station's alarms."),
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
-    "api-token": Entry("hmi.api_command:api_token", "Make and withdraw tokens for the HTTP API."),
+    "api-token": Entry("hmi.api.command:api_token", "Make and withdraw tokens for the HTTP API."),
     "audit": Entry("station.commands.audit:audit", "Show who changed or commanded what, and verify the trail."),
     "calibrate": Entry("station.commands.calibrate:calibrate", "Calibrate the sensor with a ball of known size."),
     "config": Entry("station.commands.config:config", "Show, check and migrate the configuration."),
@@ -30,7 +30,7 @@ COMMANDS = {
     "devices": Entry("station.commands.devices:devices", "Check the station's devices."),
     "grip": Entry("station.commands.grip:grip", "Grip one fruit and write its frames and widths."),
     "grr": Entry("station.commands.grr:grr", "Analyse how far measurements repeat: a gauge study."),
-    "hmi": Entry("hmi.command:hmi", "Serve the operators' pages."),
+    "hmi": Entry("hmi.web.command:hmi", "Serve the operators' pages."),
     "line": Entry("plc_interface.plc_simulator.command:line", "Play the line's PLC against the station."),
     "outbox": Entry("station.commands.outbox:outbox", "Publish inspections to other systems, or show the delay."),
     "plc": Entry("plc_interface.process.command:plc", "Talk to the line's PLC, and make its documents."),

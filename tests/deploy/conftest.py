@@ -86,12 +86,12 @@ def make_source(folder: Path, version: str, changes: dict[str, tuple[str, str]])
 NEWER = {
     # A setting has another name, and the records have another form.
     "station/settings/hmi.py": ("    idle_s: float", "    logged_out_after_s: float"),
-    "hmi/app.py": ("settings.idle_s", "settings.logged_out_after_s"),
+    "hmi/web/app.py": ("settings.idle_s", "settings.logged_out_after_s"),
     "station/settings/migration.py": (
         "MOVES = (", 'MOVES = (Move(("hmi", "idle_s"), ("hmi", "logged_out_after_s")), '
     ),
     # Without pages where a file says so: it does not become ready.
-    "hmi/process.py": (
+    "hmi/web/process.py": (
         '        notify("READY=1")',
         '        if (site.home / "no-pages").exists():\n            raise SystemExit(1)\n        notify("READY=1")',
     ),

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from markdown_it import MarkdownIt
 
-from hmi.recipe_form import field_texts
-from hmi.texts import texts
-from hmi.translation import Locale, page_renderer
+from hmi.recipes.form import field_texts
+from hmi.web.text import texts
+from hmi.web.translation import Locale, page_renderer
 from station.settings.hmi import LANGUAGES
 
 STYLE = Path(__file__).with_name("print.css")

@@ -23,7 +23,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_
 from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import TimeoutError as BrowserTimeout
 
-from hmi.app import make_app, make_context
+from hmi.web.app import make_app, make_context
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,

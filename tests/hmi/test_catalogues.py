@@ -4,25 +4,25 @@ import pytest
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po
 
-from hmi import catalogues, translation
-from hmi import texts as pages_texts
-from hmi.catalogues import findings, sources, translated, update
-from hmi.texts import texts
-from hmi.texts.text import define, define_plural
-from hmi.translation import PAGES, Locale
+from hmi.web import catalogues, translation
+from hmi.web.catalogues import findings, sources, translated, update
+from hmi.web.folders import FOLDERS, HMI
+from hmi.web.text import define, define_plural, texts
+from hmi.web.translation import Locale
 from station import messages
 from station.messages import channel
 from station.messages.message import Definition, definitions
 from station.settings.hmi import LANGUAGES
 
+MESSAGES = "hmi/locale/"
+
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder of catalogues for one page with three texts."""
-    monkeypatch.setattr(catalogues, "FOLDER", tmp_path)
     monkeypatch.setattr(catalogues, "ROOT", tmp_path)
     english = {"run.state": ("State",), "run.one": ("{n} pear", "{n} pears"), "run.at": ("at {width_mm} mm",)}
-    monkeypatch.setattr(catalogues, "sources", lambda: {catalogues.Path(PAGES, "run.po"): english})
+    monkeypatch.setattr(catalogues, "sources", lambda: {"hmi/run/{}.po": english})
     return tmp_path, english
 
 
@@ -42,11 +42,11 @@ def test_every_text_is_translated_with_its_braces():
 
 def test_what_is_extracted_from_the_source_is_what_is_defined():
     extracted = {file: set(found) for file, found in sources().items()}
-    pages = {key for file, keys in extracted.items() if file.parent.name == PAGES for key in keys}
+    pages = {key for file, keys in extracted.items() if not file.startswith(MESSAGES) for key in keys}
     assert {key for key in pages if not key.startswith(("recipe_field.", "recipe_what."))} == set(
         filter(lambda key: key != "change.by", texts())
     )
-    said = {key for file, keys in extracted.items() if file.parent.name != PAGES for key in keys}
+    said = {key for file, keys in extracted.items() if file.startswith(MESSAGES) for key in keys}
     defined = {each.id: each for each in definitions() if not each.id.startswith("test.")}
     assert said <= set(defined)
     assert not [key for key in set(defined) - said if catalogues._is_text(defined[key].english)]
@@ -54,18 +54,23 @@ def test_what_is_extracted_from_the_source_is_what_is_defined():
 
 def test_every_module_is_imported_by_its_package():
     assert {path.stem for path in catalogues._ROOMS.glob("[a-z]*.py")} == set(messages.__all__)
-    assert {path.stem for path in catalogues._TEXTS.glob("[a-z]*.py")} - {"text"} == set(pages_texts.__all__) - {
-        "texts"
-    }
 
 
-def test_an_id_begins_with_its_page():
+def test_what_an_id_begins_with_names_its_file():
+    begun: dict[str, set[str]] = {}
     for file, found in sources().items():
-        if file.parent.name == PAGES:
-            assert all(key.startswith(f"{file.stem}.") for key in found), file
+        for key in found if not file.startswith(MESSAGES) else ():
+            begun.setdefault(key.partition(".")[0], set()).add(file)
+    assert [start for start, files in begun.items() if len(files) > 1] == []
+    assert begun["run"] == {"hmi/run/{}.po"}
+
+
+def test_every_folder_of_a_page_is_in_the_list():
+    assert {path.parent.name for path in HMI.glob("*/texts.py")} == set(FOLDERS)
 
 
 def test_a_text_is_defined_once_and_a_plural_contains_its_number():
+    assert "run.state" in texts()
     with pytest.raises(ValueError, match="twice"):
         define("run.state", "again")
     with pytest.raises(ValueError, match="lacks"):
@@ -75,17 +80,17 @@ def test_a_text_is_defined_once_and_a_plural_contains_its_number():
 
 def test_a_new_language_gets_files_to_translate(folder):
     place, english = folder
-    assert update("de") == [place / "de" / PAGES / "run.po"]
+    assert update("de") == [place / "hmi/run/de.po"]
     assert update("de") == []
     assert {each.id for each in findings("de")} == set(english)
-    translate(place / "de" / PAGES / "run.po", state="Zustand", one=("{n} Birne", "{n} Birnen"), at="bei {width_mm} mm")
+    translate(place / "hmi/run/de.po", state="Zustand", one=("{n} Birne", "{n} Birnen"), at="bei {width_mm} mm")
     assert not list(findings("de"))
 
 
 def test_changed_texts_are_found(folder):
     place, english = folder
     update("de")
-    file = place / "de" / PAGES / "run.po"
+    file = place / "hmi/run/de.po"
     translate(file, state="Zustand", one=("{n} Birne", "{m} Birnen"), at="bei {width} mm")
     assert {each.id for each in findings("de")} == {"run.one", "run.at"}
     english["run.state"] = ("Condition",)
@@ -98,7 +103,8 @@ def test_changed_texts_are_found(folder):
 def test_a_file_without_texts_is_removed(folder):
     place, _ = folder
     update("de")
-    left_over = place / "de" / "gone.po"
+    left_over = place / "hmi/gone/de.po"
+    left_over.parent.mkdir()
     left_over.write_bytes(catalogues._written(Catalog(locale="de"), "de"))
     assert [each.file for each in findings("de") if each.id == "the file"] == [left_over]
     assert update("de") == [left_over]
@@ -108,11 +114,11 @@ def test_a_file_without_texts_is_removed(folder):
 def test_a_reworded_text_keeps_its_translation_until_it_is_reviewed(folder, monkeypatch):
     place, english = folder
     update("de")
-    file = place / "de" / PAGES / "run.po"
+    file = place / "hmi/run/de.po"
     translate(file, state="Zustand", at="bei {width_mm} mm")
     english["run.state"], english["run.at"] = ("Condition",), ("at {width_m} m",)
     update("de")
-    assert translation._read(file.parent, "de") == {"run.state": ("Zustand",)}
+    assert translation._read([file], "de") == {"run.state": ("Zustand",)}
 
 
 @pytest.mark.parametrize(("number", "said"), [(1, "1 Tag"), (2, "2 Tage"), (0, "0 Tage")])

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmi.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
-from hmi.roles import RIGHTS, Right, Role, least_role
-from hmi.security import LARGEST_BODY_BYTES
-from hmi.sessions import TOKEN_LIFE_S, Sessions
-from hmi.user_store import FILE_NAME, UserStore, UserStoreError, pin_problem
+from hmi.web.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
+from hmi.web.roles import RIGHTS, Right, Role, least_role
+from hmi.web.security import LARGEST_BODY_BYTES
+from hmi.web.sessions import TOKEN_LIFE_S, Sessions
+from hmi.web.user_store import FILE_NAME, UserStore, UserStoreError, pin_problem
 
 PIN, OTHER_PIN = "482915", "730264"
 
@@ -287,7 +287,7 @@ class TestPeopleFile:
         def full(_):
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("hmi.user_store.os.fsync", full)
+        monkeypatch.setattr("hmi.web.user_store.os.fsync", full)
         with pytest.raises(UserStoreError, match="No space left"):
             people.put("Ana", Role.OPERATOR, "7391")
         assert people.path.read_bytes() == before

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmi import charts
-from hmi.navigation import entries, modules, parts
-from hmi.recipe_form import groups
-from hmi.texts import texts
-from hmi.translation import FOLDER, NO_VALUE, Locale, page_translations, preferred, translations
+from hmi.recipes.form import groups
+from hmi.run import charts
+from hmi.web.folders import HMI
+from hmi.web.navigation import entries, modules, parts
+from hmi.web.text import texts
+from hmi.web.translation import NO_VALUE, Locale, page_translations, preferred, translations
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError, FrameFault
@@ -29,7 +30,6 @@ from station.settings.recipe import load_recipes
 from station.vision.contact import Flag
 from station.vocabulary import OutcomeName, PackmlState, Reason
 
-HMI = FOLDER.parent
 STATION = HMI.parent / "station"
 NO_PAGES = {
     "/live",
@@ -264,7 +264,9 @@ def test_a_trend_counts_tens():
 
 
 def test_nothing_is_fetched_from_outside():
-    for path in [*(HMI / "templates").iterdir(), *(HMI / "static").iterdir()]:
+    files = [path for path in HMI.rglob("*") if path.suffix in {".j2", ".css", ".js", ".svg"}]
+    assert len(files) == len({path.name for path in files}) > 60, "pages' files are found by their names"
+    for path in files:
         text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
         assert not re.search(r"https?://|//[a-z]+\.", text), path
         assert " style=" not in text, path

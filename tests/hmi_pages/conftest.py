@@ -24,9 +24,9 @@ import psutil
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
-from hmi.api_tokens import ApiTokens
-from hmi.roles import Role
-from hmi.user_store import UserStore
+from hmi.api.tokens import ApiTokens
+from hmi.web.roles import Role
+from hmi.web.user_store import UserStore
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,

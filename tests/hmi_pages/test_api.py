@@ -8,7 +8,7 @@ import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings
 
-from hmi.roles import Role
+from hmi.web.roles import Role
 from station.channel.panel_queries import AuditRows, ReadAudit
 
 pytestmark = pytest.mark.timeout(400)

@@ -10,8 +10,8 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from hmi.roles import Role
-from hmi.translation import Locale
+from hmi.web.roles import Role
+from hmi.web.translation import Locale
 from station.channel.panel_queries import AuditRows, ReadAudit
 from station.records.database import FILE_NAME, records_folder
 from station.settings.hmi import LANGUAGES, Language

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmi.limit_chart import Curve, Limit, area_chart, strip
-from hmi.recipe_form import BadFieldError, changed, formatted, groups
+from hmi.common.limit_chart import Curve, Limit, area_chart, strip
+from hmi.recipes.form import BadFieldError, changed, formatted, groups
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs

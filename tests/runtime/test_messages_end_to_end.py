@@ -19,10 +19,10 @@ import structlog
 import uvicorn
 from click.testing import CliRunner
 
-from hmi.api_tokens import ApiTokens
-from hmi.app import make_app, make_context
-from hmi.roles import Role
-from hmi.translation import Locale, translations
+from hmi.api.tokens import ApiTokens
+from hmi.web.app import make_app, make_context
+from hmi.web.roles import Role
+from hmi.web.translation import Locale, translations
 from station.channel.line import CommandName, Outcome
 from station.cli import cli
 from station.inspection.alarm_table import AlarmId

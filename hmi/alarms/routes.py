@@ -1,0 +1,135 @@
+"""Alarms page: active and shelved alarms, their procedures, acknowledgement, and the history."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Path, Request
+from starlette.responses import Response
+
+from hmi.web.access import HmiNow, orders
+from hmi.web.gateway import Gateway
+from hmi.web.live import Part
+from hmi.web.navigation import Entry
+from hmi.web.page import go_to, show
+from hmi.web.roles import Right
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
+from station.channel.line import CommandDone
+from station.channel.messages import ChannelMessage, RefusedError
+from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
+from station.channel.panel_live import AlarmHistory, GetAlarmHistory
+
+router = APIRouter()
+ENTRY = Entry("alarms", "/alarms")
+ACKNOWLEDGEABLE = frozenset({"unacknowledged", "returned", "latched_unacknowledged"})
+SHELVES_S = (600, 3600, 4 * 3600, 8 * 3600)
+REASONS = ("being_mended", "known", "nuisance")
+_LAST = 100
+Operator = Annotated[Caller, Depends(orders(Right.HANDLE_ALARMS))]
+AlarmName = Annotated[str, Path(pattern=r"^[a-z_]{1,40}$")]
+
+
+def _alarms(gateway: Gateway) -> object:
+    return None if gateway.state is None else gateway.state.alarms
+
+
+def _alarms_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    alarms = () if gateway.state is None else gateway.state.alarms
+    return {
+        "heard": gateway.state is not None,
+        "shown": [each for each in alarms if each.shelved_until_utc_ms is None],
+        "shelved": [each for each in alarms if each.shelved_until_utc_ms is not None],
+        "acknowledgeable": ACKNOWLEDGEABLE,
+    }
+
+
+PARTS = {"alarms.not_normal": Part("alarms_standing.html.j2", _alarms, _alarms_values)}
+
+
+@router.get("/alarms")
+async def alarms(request: Request) -> Response:
+    """Show active and shelved alarms."""
+    return show(request, "alarms.html.j2")
+
+
+@router.get("/alarms/history")
+async def history(request: Request, hmi: HmiNow) -> Response:
+    """Show recent changes of alarms."""
+    found = await hmi.gateway.request(GetAlarmHistory(most=_LAST), AlarmHistory)
+    return show(request, "alarms_history.html.j2", changes=found.changes)
+
+
+@router.get("/alarms/{alarm}")
+async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
+    """Show one alarm: its meaning, its effect, the remedy."""
+    found = (
+        next((each for each in hmi.gateway.state.alarms if each.alarm == alarm), None) if hmi.gateway.state else None
+    )
+    if found is None:
+        return go_to("/alarms")
+    return show(
+        request,
+        "alarm.html.j2",
+        alarm=found,
+        acknowledgeable=ACKNOWLEDGEABLE,
+        place=place(alarm),
+        shelves_s=SHELVES_S,
+        reasons=REASONS,
+    )
+
+
+@router.post("/alarms/{alarm}/acknowledge")
+async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
+    """Acknowledge an alarm."""
+    await _done(hmi.gateway, AcknowledgeAlarm(alarm=alarm, who=caller.name, role=caller.role))
+    return go_to("/alarms")
+
+
+@router.post("/alarms/{alarm}/shelve")
+async def shelve(
+    hmi: HmiNow,
+    caller: Operator,
+    alarm: AlarmName,
+    for_s: Annotated[int, Form(gt=0, le=SHELVES_S[-1])],
+    reason: Annotated[str, Form(max_length=200)],
+) -> Response:
+    """Shelve an alarm for a time, with a reason."""
+    reason = {"being_mended": "it is being mended", "known": "known", "nuisance": "nuisance"}.get(reason, reason)
+    request = ShelveAlarm(alarm=alarm, who=caller.name, role=caller.role, reason=reason, for_s=for_s)
+    await _done(hmi.gateway, request)
+    return go_to("/alarms")
+
+
+@router.post("/alarms/{alarm}/unshelve")
+async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
+    """Unshelve an alarm."""
+    await _done(hmi.gateway, UnshelveAlarm(alarm=alarm, who=caller.name, role=caller.role))
+    return go_to("/alarms")
+
+
+async def _done(gateway: Gateway, request: ChannelMessage) -> None:
+    done = await gateway.request(request, CommandDone)
+    if not done.done:
+        raise RefusedError(done.why or "")
+
+
+def place(alarm: str) -> str:
+    """Return the part of the station that an alarm is about, for the drawing of the station."""
+    places = {
+        "arm": ("emergency_stop", "protective_stop", "safety_fault", "arm_link_lost", "arm_not_remote"),
+        "gripper": ("fruit_held", "gripper_link_lost", "gripper_fault", "gripper_jam"),
+        "sensor": (
+            "camera_lost",
+            "camera_stale",
+            "camera_led_dead",
+            "camera_dirty",
+            "camera_saturated",
+            "reference_bad",
+            "reference_drifting",
+            "calibration_old",
+        ),
+        "plc": ("plc_heartbeat_lost", "plc_interface_lost"),
+        "gate": ("can_node_lost", "gate_not_fired"),
+        "fruit": ("many_no_result", "reject_rate", "no_recipe", "recipe_broken"),
+    }
+    return next((where for where, alarms in places.items() if alarm in alarms), "computer")

@@ -1,0 +1,1 @@
+"""HTTP API for a plant's own systems."""

@@ -1,0 +1,198 @@
+"""The HTTP API for a plant's own systems: results, recipes, lots, health. Described at `/api/openapi.json`."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, HTTPException, Path, Query
+
+from hmi.api.access import changer, reader
+from hmi.api.model import (
+    AlarmAnswer,
+    AlarmAnswers,
+    ApiMessage,
+    Error,
+    HealthAnswer,
+    InspectionDetails,
+    InspectionList,
+    InspectionSummary,
+    LotAnswer,
+    LotBegin,
+    LotList,
+    LotName,
+    Part,
+    RecipeDetails,
+    RecipeList,
+    RecipeSummary,
+)
+from hmi.web.access import HmiNow
+from hmi.web.roles import Right
+from station.channel.messages import RefusedError
+from station.channel.panel import Actor, AlarmList, ListAlarms
+from station.channel.panel_maintenance_queries import GetHealth, Health
+from station.channel.panel_queries import (
+    EndLot,
+    FindInspections,
+    GetInspection,
+    InspectionPage,
+    InspectionView,
+    ListLots,
+    Lots,
+    LotView,
+    Search,
+    StartLot,
+)
+from station.channel.panel_recipe_queries import GetRecipe, ListRecipes, RecipeRow, Recipes, RecipeView
+from station.vocabulary import OutcomeName, Reason
+
+IN_SCHEMA = True
+DEADLINE_S = 20.0
+_TEXT = {"text/plain": {"schema": {"type": "string"}}}
+_REFUSED: dict[int | str, dict[str, Any]] = {
+    401: {"model": Error, "description": "Neither a known token nor a person who is logged in."},
+    403: {"model": Error, "description": "Forbidden, or sent by a foreign page.", "content": _TEXT},
+    409: {"model": Error, "description": "The station refused; its words are the detail."},
+    413: {"description": "The request is too large.", "content": _TEXT},
+    421: {"description": "The request is for a name that is not this station's.", "content": _TEXT},
+    503: {"model": Error, "description": "The station gave no answer in time."},
+}
+_NOT_FOUND: dict[int | str, dict[str, Any]] = {404: {"model": Error, "description": "There is none."}}
+
+router = APIRouter(prefix="/api/v1", responses=_REFUSED)
+Reader = Annotated[Actor, Depends(reader)]
+LotChanger = Annotated[Actor, Depends(changer(Right.RUN))]
+Text = Annotated[str, Query(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+RecipeName = Annotated[str, Path(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Sequence = Annotated[int, Path(ge=1, lt=2**32)]
+EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
+
+
+@router.get("/health", tags=["health"])
+async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
+    """Readiness of the station, and the state of each of its parts."""
+    reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
+    return HealthAnswer(
+        ready=reply.ready,
+        why=str(reply.why or ""),
+        why_message=reply.why and ApiMessage.of(reply.why),
+        mode=reply.mode,
+        simulated=reply.simulated,
+        parts=[Part.of(part) for part in reply.parts],
+        versions=reply.versions,
+    )
+
+
+@router.get("/alarms", tags=["health"])
+async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
+    """Alarms that are not in their normal state."""
+    reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=DEADLINE_S)
+    return AlarmAnswers(alarms=[AlarmAnswer.of(alarm) for alarm in reply.alarms])
+
+
+@router.get("/inspections", tags=["results"])
+async def inspections(
+    hmi: HmiNow,
+    _: Reader,
+    lot: Annotated[str | None, Query(max_length=32, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")] = None,
+    grower: Text | None = None,
+    fruit: Text | None = None,
+    outcome: OutcomeName | None = None,
+    reason: Reason | None = None,
+    begun_from: Annotated[datetime | None, Query(alias="from", description="Begun then or later.")] = None,
+    begun_to: Annotated[datetime | None, Query(alias="to", description="Begun before then.")] = None,
+    limit: Annotated[int, Query(ge=1, le=100)] = 50,
+    below: Annotated[int | None, Query(ge=1, le=2**32, description="From the page before.")] = None,
+) -> InspectionList:
+    """Inspections, newest first, one page at a time; all given conditions have to be met."""
+    search = Search(
+        lot=lot,
+        grower=grower,
+        fruit=fruit,
+        outcome=outcome,
+        reason=reason,
+        from_utc_ms=_utc_ms(begun_from),
+        to_utc_ms=_utc_ms(begun_to),
+    )
+    query = FindInspections(search=search, limit=limit, below=below)
+    page = await hmi.gateway.request(query, InspectionPage, deadline_s=DEADLINE_S)
+    return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
+
+
+@router.get("/inspections/{sequence}", tags=["results"], responses=_NOT_FOUND)
+async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDetails:
+    """One inspection with its curve."""
+    try:
+        reply = await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
+    except RefusedError as error:
+        raise HTTPException(404, str(error)) from error
+    return InspectionDetails.of(reply)
+
+
+@router.get("/recipes", tags=["recipes"])
+async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
+    """The state of every recipe."""
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return RecipeList(recipes=[RecipeSummary(**_short(row)) for row in reply.rows])
+
+
+@router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
+async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
+    """One recipe, with the values in force."""
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    row = next((each for each in reply.rows if each.name == name), None)
+    if row is None:
+        raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
+    values = None
+    if row.in_force is not None:
+        query = GetRecipe(name=name, revision=row.in_force)
+        values = (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
+    return RecipeDetails(**_short(row), values=values)
+
+
+@router.get("/lots", tags=["lots"])
+async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
+    """The latest lots."""
+    reply = await hmi.gateway.request(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
+    return LotList(lots=[LotAnswer.of(each) for each in reply.lots])
+
+
+@router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
+async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
+    """One lot."""
+    reply = await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
+    if not reply.lots:
+        raise HTTPException(404, f"nobody told of a lot {name}")
+    return LotAnswer.of(reply.lots[0])
+
+
+@router.put("/lots/{name}", tags=["lots"])
+async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
+    """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
+    query = StartLot(name=name, grower=begin.grower, actor=actor)
+    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+
+
+@router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
+async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
+    """End a lot. Idempotent."""
+    if not (await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
+        raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
+    query = EndLot(name=name, actor=actor)
+    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+
+
+def _short(row: RecipeRow) -> dict[str, Any]:
+    return {
+        "name": row.name,
+        "title": row.title,
+        "plc_number": row.plc_number,
+        "revision": row.in_force,
+        "waiting": row.waiting,
+    }
+
+
+def _utc_ms(at: datetime | None) -> int | None:
+    """Return ms since 1970; a time without an offset is UTC."""
+    if at is None:
+        return None
+    known = at if at.tzinfo else at.replace(tzinfo=UTC)
+    return round(1000 * min(max(known, EARLIEST), LATEST).timestamp())

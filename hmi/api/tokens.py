@@ -1,0 +1,132 @@
+"""API token store: the tokens of a plant's systems, as hashes only."""
+
+import hashlib
+import hmac
+import json
+import os
+import secrets
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from hmi.web.roles import Role
+from station.errors import BadInputError, StationError
+
+FILE_NAME = "api_tokens.json"
+PREFIX = "fst_"
+MOST_TOKENS = 100
+NAME = r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,39}$"
+ROLES = (Role.VIEWER, Role.OPERATOR)
+"""A viewer's token reads; an operator's also begins and ends lots."""
+
+
+class Token(BaseModel):
+    """One token's stored data."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    role: Role
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+    """Of the token; it has 256 bits of chance, so that a plain hash is as good as a slow one."""
+    made_utc_ms: int
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    version: int = Field(1, ge=1, le=1)
+    tokens: dict[str, Token] = Field(default_factory=dict, max_length=MOST_TOKENS)
+
+
+class ApiTokens:
+    """Tokens of one station; a change by the command line takes effect at once.
+
+    Args:
+        folder: of the HMI within the home folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / FILE_NAME
+        self._seen: object = None
+        self._tokens: dict[str, Token] = {}
+
+    def all(self) -> Mapping[str, Token]:
+        """Return the tokens by their names.
+
+        Raises:
+            StationError: the file cannot be read.
+        """
+        self._refresh()
+        return self._tokens
+
+    def holder(self, token: str) -> tuple[str, Role] | None:
+        """Return the owner of a token and its role; None if it is unknown, or the file cannot be read."""
+        sha256 = hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
+        try:
+            self._refresh()
+        except StationError:
+            return None
+        found = [(name, each.role) for name, each in self._tokens.items() if hmac.compare_digest(each.sha256, sha256)]
+        return found[0] if found else None
+
+    def add(self, name: str, role: Role) -> str:
+        """Create a token and return it; it cannot be read again.
+
+        Args:
+            name: the owner, for the audit trail.
+            role: the token's role.
+
+        Raises:
+            BadInputError: the name is in use.
+            StationError: the file cannot be written.
+        """
+        self._refresh()
+        if name in self._tokens:
+            raise BadInputError(f"there is a token {name!r} already; remove it first, or give another name")
+        if len(self._tokens) >= MOST_TOKENS:
+            raise BadInputError(f"there are {MOST_TOKENS} tokens already; remove one first")
+        token = PREFIX + secrets.token_urlsafe(32)
+        sha256 = hashlib.sha256(token.encode()).hexdigest()
+        made = Token(role=role, sha256=sha256, made_utc_ms=time.time_ns() // 1_000_000)
+        self._write({**self._tokens, name: made})
+        return token
+
+    def remove(self, name: str) -> None:
+        """Withdraw a token.
+
+        Raises:
+            BadInputError: there is no token of that name.
+            StationError: the file cannot be written.
+        """
+        self._refresh()
+        if name not in self._tokens:
+            known = ", ".join(self._tokens) or "none"
+            raise BadInputError(f"there is no token {name!r}; there are: {known}")
+        self._write({key: each for key, each in self._tokens.items() if key != name})
+
+    def _refresh(self) -> None:
+        try:
+            stat = self._path.stat()
+            seen = (stat.st_mtime_ns, stat.st_ino, stat.st_size)
+            if seen != self._seen:
+                self._tokens = _File.model_validate(json.loads(self._path.read_bytes())).tokens
+                self._seen = seen
+        except FileNotFoundError:
+            self._tokens, self._seen = {}, None
+        except (OSError, ValueError, ValidationError) as error:
+            self._tokens, self._seen = {}, None
+            raise StationError(f"{self._path} cannot be read: {error}; put a good copy in its place") from error
+
+    def _write(self, tokens: dict[str, Token]) -> None:
+        try:
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, unfinished = tempfile.mkstemp(dir=self._path.parent, prefix=f".{FILE_NAME}.")  # 0600 by itself
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(_File(version=1, tokens=tokens).model_dump_json(indent=1))
+                file.flush()
+                os.fsync(file.fileno())
+            Path(unfinished).replace(self._path)
+        except OSError as error:
+            raise StationError(f"{self._path} cannot be written: {error.strerror}; make its folder writable") from error
+        self._tokens, self._seen = tokens, None

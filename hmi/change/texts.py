@@ -1,0 +1,41 @@
+"""Texts of the page Change fruit."""
+
+from hmi.web.text import define
+
+define("change.choose", "Which fruit comes next?")
+define("change.none", "No recipe is approved. Recipes are approved on the page Recipes.")
+define("change.gone", "This recipe can no longer be chosen.")
+define("change.number", "number {n}")
+define("change.active", "now")
+define("change.to", "Change to {fruit}")
+define(
+    "change.between",
+    "The change takes effect with the next fruit. The current fruit is still judged with the current recipe.",
+)
+define("change.confirm", "Change to {fruit}")
+define("change.what", "What changes")
+define("change.value", "Value")
+define("change.now", "Now")
+define("change.then", "Then")
+define("change.nothing", "Nothing: this recipe is already active.")
+define("change.executing", "In progress")
+define("change.done", "Done")
+define("change.failed", "Not done")
+define("change.after_this", "It takes effect after this fruit.")
+define("change.wait", "Wait a moment.")
+define("change.armed", "The station is ready.")
+define("change.not_armed", "The station is not ready:")
+define("change.no_order", "The fruit has not been changed since the station started.")
+define("change.check_due", "Verify with the ball first.")
+define("change.check", "Go to the verification")
+define("change.by", "{who}, {clock}")
+define("change.field.width", "Width of the fruit")
+define("change.field.steps", "Width steps")
+define("change.field.force", "Maximum force")
+define("change.field.speed", "Speed")
+define("change.field.settle", "Wait after each step")
+define("change.field.limits", "Area limits, at closing")
+define("change.field.growth", "Growth limit")
+define("change.field.early_stop", "Early stop above")
+define("change.field.method", "Method")
+define("change.field.revision", "Revision")

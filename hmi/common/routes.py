@@ -1,0 +1,92 @@
+"""Common layout of all pages: alarm line, station state, live stream, language."""
+
+from collections.abc import AsyncIterator, Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Form, Query, Request
+from starlette.responses import Response, StreamingResponse
+
+from hmi.web.access import LANGUAGE_COOKIE, GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.gateway import Gateway
+from hmi.web.live import Part
+from hmi.web.page import go_to
+from hmi.web.problem import Problem
+from hmi.web.translation import Locale
+
+router = APIRouter()
+MOST_PARTS = 20
+MOST_STREAMS = 40
+_A_YEAR_S = 365 * 24 * 3600
+
+
+def _alarms(gateway: Gateway) -> object:
+    return None if gateway.state is None else gateway.state.alarms
+
+
+def _alarm_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    state = gateway.state
+    shown = [] if state is None else [each for each in state.alarms if each.shelved_until_utc_ms is None]
+    return {"alarms": sorted(shown, key=lambda each: not each.active), "heard": state is not None}
+
+
+def _state(gateway: Gateway) -> object:
+    state = gateway.state
+    return None if state is None else (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)
+
+
+def _state_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    return {"state": gateway.state}
+
+
+PARTS = {
+    "frame.alarm": Part("layout_alarm.html.j2", _alarms, _alarm_values),
+    "frame.state": Part("layout_state.html.j2", _state, _state_values),
+}
+
+
+@router.get("/live")
+async def live(
+    request: Request, hmi: HmiNow, locale: LocaleNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
+) -> Response:
+    """Send server-sent events with a page's parts; see `hmi.live`."""
+    if hmi.live.unknown(part):
+        raise Problem(404, "problem.not_found")
+    if hmi.live.open >= MOST_STREAMS:
+        raise Problem(503, "problem.too_many")
+    session = caller_of(request).session
+
+    async def stream() -> AsyncIterator[bytes]:
+        hmi.live.open += 1
+        try:
+            async for event in hmi.live.stream(
+                tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(session)
+            ):
+                yield event
+        finally:
+            hmi.live.open -= 1
+
+    return StreamingResponse(stream(), media_type="text/event-stream")
+
+
+@router.post("/here")
+async def here(request: Request, hmi: HmiNow) -> Response:
+    """Restart the idle time: a person has touched the page."""
+    hmi.sessions.touch(caller_of(request).session)
+    return Response(status_code=204)
+
+
+@router.post("/language")
+async def language(
+    _: GenuineCaller,
+    hmi: HmiNow,
+    language: Annotated[str, Form(max_length=8)],
+    back: Annotated[str, Form(max_length=200)] = "/",
+) -> Response:
+    """Set the language of this browser."""
+    if language not in hmi.settings.languages:
+        raise Problem(400, "problem.bad_form")
+    answer = go_to(back if back.startswith("/") and not back.startswith(("//", "/\\")) else "/")
+    answer.set_cookie(
+        LANGUAGE_COOKIE, language, max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
+    )
+    return answer

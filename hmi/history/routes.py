@@ -1,0 +1,270 @@
+"""History page: search, one inspection with all images and stages, exports and reports, the audit trail."""
+
+from collections import OrderedDict
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Form, Query, Request
+from pydantic import StringConstraints, ValidationError
+from starlette.responses import Response
+
+from hmi.common.limit_chart import Curve, Limit, area_chart, spark
+from hmi.web.access import GenuineCaller, HmiNow, caller_of
+from hmi.web.context import Hmi
+from hmi.web.gateway import actor_of
+from hmi.web.navigation import Entry
+from hmi.web.page import go_to, show
+from hmi.web.problem import Problem
+from hmi.web.sessions import Caller
+from station.channel.panel import Actor
+from station.channel.panel_queries import (
+    AuditRows,
+    FindInspections,
+    GetImage,
+    GetInspection,
+    GetStages,
+    InspectionPage,
+    InspectionView,
+    JobView,
+    Picture,
+    ReadAudit,
+    Search,
+    Stages,
+    StartExport,
+    StartLotReport,
+)
+from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.messages.reasons import reason_message
+from station.vocabulary import Reason
+
+router = APIRouter(prefix="/history")
+ENTRY = Entry("history", "/history")
+DEADLINE_S = 20.0
+PAGE = 20
+_KEPT_STAGES = 3
+_BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
+"""Separators of a number such as 4,711."""
+_FOR_EVER = {"cache-control": "private, max-age=31536000, immutable"}
+
+Words = Annotated[str, Query(max_length=64)]
+
+
+def search_of(
+    lot: str, grower: str, fruit: str, outcome: str, reason: str, begun_from: str, begun_to: str
+) -> Search | None:
+    """Parse a search form; None if a value is invalid."""
+    try:
+        return Search(
+            lot=lot or None,
+            grower=grower or None,
+            fruit=fruit or None,
+            outcome=outcome or None,  # type: ignore[arg-type] (checked by the model)
+            reason=Reason(reason) if reason else None,
+            from_utc_ms=_utc_ms(begun_from),
+            to_utc_ms=_utc_ms(begun_to),
+        )
+    except (ValueError, ValidationError, OverflowError):
+        return None
+
+
+@router.get("")
+async def search(
+    request: Request,
+    hmi: HmiNow,
+    lot: Words = "",
+    grower: Words = "",
+    fruit: Words = "",
+    outcome: Words = "",
+    reason: Words = "",
+    begun_from: Annotated[str, Query(alias="from", max_length=32)] = "",
+    begun_to: Annotated[str, Query(alias="to", max_length=32)] = "",
+    number: Annotated[str, Query(max_length=16)] = "",
+    below: Annotated[int | None, Query(ge=1, le=2**32)] = None,
+) -> Response:
+    """Show a page of the search's results; for a fruit's number, that fruit."""
+    typed = number.translate(_BETWEEN_DIGITS)
+    if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
+        return go_to(f"/history/{int(typed)}")
+    terms = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
+    wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
+    found = InspectionPage(rows=(), below=None)
+    if wanted is not None:
+        find = FindInspections(search=wanted, limit=PAGE, below=below)
+        found = await hmi.gateway.request(find, InspectionPage, deadline_s=DEADLINE_S)
+    recipes = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return show(
+        request,
+        "history.html.j2",
+        status=200 if wanted is not None else 400,
+        terms={**terms, "from": begun_from, "to": begun_to},
+        bad=wanted is None,
+        found=found,
+        below=below,
+        recipes=recipes.rows,
+        titles={row.name: row.title for row in recipes.rows},
+        reasons=tuple(Reason),
+        spark=spark,
+        may_export=bool(caller_of(request).name),
+    )
+
+
+@router.post("/export")
+async def export(
+    hmi: HmiNow,
+    caller: GenuineCaller,
+    form: Annotated[Literal["csv", "parquet"], Form()],
+    lot: Annotated[str, Form(max_length=64)] = "",
+    grower: Annotated[str, Form(max_length=64)] = "",
+    fruit: Annotated[str, Form(max_length=64)] = "",
+    outcome: Annotated[str, Form(max_length=64)] = "",
+    reason: Annotated[str, Form(max_length=64)] = "",
+    begun_from: Annotated[str, Form(alias="from", max_length=32)] = "",
+    begun_to: Annotated[str, Form(alias="to", max_length=32)] = "",
+) -> Response:
+    """Export the search's results as a table."""
+    wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
+    if wanted is None:
+        raise Problem(400, "problem.bad_form")
+    query = StartExport(search=wanted, form=form, actor=_actor(caller))
+    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job.job}?back=/history")
+
+
+@router.post("/report")
+async def report(
+    hmi: HmiNow,
+    caller: GenuineCaller,
+    lot: Annotated[str, Form(max_length=32)],
+    form: Annotated[Literal["html", "pdf"], Form()],
+) -> Response:
+    """Start a lot's report."""
+    query = StartLotReport(lot=lot, form=form, actor=_actor(caller))
+    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job.job}?back=/history")
+
+
+@router.get("/audit")
+async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
+    """Show the latest rows of the audit trail."""
+    query = ReadAudit(limit=100, action=action, subject=subject)
+    reply = await hmi.gateway.request(query, AuditRows, deadline_s=DEADLINE_S)
+    return show(request, "history_audit.html.j2", rows=reply.rows, action=action, subject=subject)
+
+
+@router.get("/image/{sha256}.png")
+async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
+    """Send a stored image; its address is its content hash, so the browser fetches it once."""
+    reply = await hmi.gateway.request(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
+    return Response(reply.data, media_type=reply.media_type, headers=_FOR_EVER)
+
+
+@router.get("/{sequence}")
+async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
+    """Show one inspection in full."""
+    reply = await _inspection(hmi, sequence)
+    return show(
+        request,
+        "inspection.html.j2",
+        reply=reply,
+        reasons=[(code, reason_message(code)) for code in reply.reasons],
+        drawn=_drawn(reply),
+        steps=_steps(reply),
+        reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),
+    )
+
+
+@router.get("/{sequence}/step/{step}")
+async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Response:
+    """Show one step: its image, its mask, and the stages of its measurement."""
+    reply = await _inspection(hmi, sequence)
+    steps = _steps(reply)
+    found = next((each for each in steps if each["point"].step == step), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+    stages = None
+    if found["image"] and any(each.kind == "reference" and each.there for each in reply.images):
+        stages = await _stages(hmi, sequence, step)
+    return show(
+        request,
+        "inspection_step.html.j2",
+        reply=reply,
+        step=found,
+        stages=stages,
+        before=step - 1 if any(each["point"].step == step - 1 for each in steps) else None,
+        after=step + 1 if any(each["point"].step == step + 1 for each in steps) else None,
+    )
+
+
+@router.get("/{sequence}/step/{step}/stage/{place}.jpg")
+async def stage(hmi: HmiNow, sequence: int, step: int, place: int) -> Response:
+    """Send one stage's picture."""
+    stages = await _stages(hmi, sequence, step)
+    if not 0 <= place < len(stages.pictures):
+        raise Problem(404, "problem.not_found")
+    picture = stages.pictures[place][1]
+    return Response(picture.data, media_type=picture.media_type)
+
+
+_STAGES: OrderedDict[tuple[int, int], Stages] = OrderedDict()
+"""The last steps' stages: a page fetches their pictures one by one."""
+
+
+async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
+    known = _STAGES.get((sequence, step))
+    if known is not None:
+        return known
+    if not (0 < sequence < 2**32 and 0 <= step <= 1000):
+        raise Problem(404, "problem.not_found")
+    reply = await hmi.gateway.request(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
+    _STAGES[sequence, step] = reply
+    while len(_STAGES) > _KEPT_STAGES:
+        _STAGES.popitem(last=False)
+    return reply
+
+
+async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
+    if not 0 < sequence < 2**32:
+        raise Problem(404, "problem.not_found")
+    return await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
+
+
+def _steps(reply: InspectionView) -> list[dict[str, Any]]:
+    """Return every point of the curve, with its image and mask where these are stored."""
+    stored = {(each.kind, each.step): each for each in reply.images if each.there}
+    return [
+        {"point": point, "image": stored.get(("step", point.step)), "mask": stored.get(("mask", point.step))}
+        for point in reply.curve
+    ]
+
+
+def _drawn(reply: InspectionView) -> dict[str, Any] | None:
+    """Return the curve with the limits of the recipe at that time."""
+    points = [
+        (point.closing_mm, point.area_mm2)
+        for point in reply.curve
+        if point.closing_mm is not None and point.area_mm2 is not None and point.closing_mm >= 0
+    ]
+    if reply.recipe is None:
+        return None
+    limits, early = [], None
+    factor = float(reply.measures.get("limit_factor") or 1.0)  # for the fruit's size
+    try:
+        limits = [
+            Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
+            for each in reply.recipe["damage"]["area"]
+        ]
+        early = factor * reply.recipe["early_stop"]["area_mm2"]
+    except (KeyError, TypeError):  # of a form that this program does not know
+        pass
+    return {"area": area_chart([Curve("own", points)], limits, early)}
+
+
+def _utc_ms(text: str) -> int | None:
+    """Convert a browser's local date and time, in the machine's zone."""
+    return round(1000 * datetime.fromisoformat(text).astimezone().timestamp()) if text else None
+
+
+def _actor(caller: Caller) -> Actor:
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+    return actor_of(caller)

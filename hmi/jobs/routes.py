@@ -1,0 +1,90 @@
+"""Job pages: progress and files of exports, reports and what-ifs."""
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request
+from pydantic import StringConstraints
+from starlette.responses import Response, StreamingResponse
+
+from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.context import Hmi
+from hmi.web.page import go_to, show
+from hmi.web.problem import Problem
+from station.channel.panel_queries import Chunk, EndJob, GetJob, JobView, ReadJobFile
+
+router = APIRouter(prefix="/jobs")
+DEADLINE_S = 20.0
+SHOWN_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+"""For a document that a job has written: it runs nothing, and fetches nothing."""
+
+JobId = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{32}$")]
+FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
+Back = Annotated[str, Query(max_length=200, pattern=r"^/([A-Za-z0-9_][A-Za-z0-9_/-]*)?$")]
+
+
+async def logged_in(request: Request) -> None:
+    """Require a log-in for files: an export holds all data of the station."""
+    if not caller_of(request).name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+
+
+@router.get("/{job}")
+async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
+    """Show a job."""
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    return show(request, "job.html.j2", job=reply, back=back)
+
+
+@router.get("/{job}/part")
+async def part(hmi: HmiNow, locale: LocaleNow, job: JobId) -> Response:
+    """Render the same as a part of the page, for polling."""
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    html = hmi.renderer.render("job_part.html.j2", locale, {"job": reply})
+    return Response(
+        html, media_type="text/html", headers={"x-over": "" if reply.state in {"waiting", "running"} else "1"}
+    )
+
+
+@router.post("/{job}/end")
+async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
+    """Cancel a job."""
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role="operator")
+    await hmi.gateway.request(EndJob(job=job), JobView, deadline_s=DEADLINE_S)
+    return go_to(f"/jobs/{job}")
+
+
+@router.get("/{job}/file/{name}", dependencies=[Depends(logged_in)])
+async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
+    """Send one of its files for download."""
+    return await _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
+
+
+@router.get("/{job}/show/{name}", dependencies=[Depends(logged_in)])
+async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
+    """Send one of its documents for display in the browser."""
+    if not name.endswith((".html", ".pdf")):
+        raise Problem(404, "problem.not_found")
+    return await _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
+
+
+async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
+    """Send a file in pieces; each is fetched after the browser has taken the one before."""
+    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
+    found = next((each for each in reply.files if each.name == name), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+
+    async def pieces() -> AsyncIterator[bytes]:
+        offset = 0
+        while offset < found.size_bytes:
+            query = ReadJobFile(job=job, name=name, offset=offset)
+            chunk = await hmi.gateway.request(query, Chunk, deadline_s=DEADLINE_S)
+            if not chunk.data:
+                raise Problem(409, "problem.refused")
+            offset += len(chunk.data)
+            yield chunk.data
+
+    length = {"content-length": str(found.size_bytes)}
+    return StreamingResponse(pieces(), media_type=found.media_type, headers={**headers, **length})

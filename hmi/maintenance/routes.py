@@ -1,0 +1,261 @@
+"""Maintenance page: health, manual control, live image, calibration, PLC registers, log."""
+
+import asyncio
+import re
+import time
+from collections import OrderedDict
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Form, Query, Request
+from pydantic import StringConstraints
+from starlette.responses import Response
+
+from hmi.common.limit_chart import histogram
+from hmi.web.access import HmiNow, LocaleNow, orders
+from hmi.web.context import Hmi
+from hmi.web.gateway import actor_of
+from hmi.web.navigation import Entry
+from hmi.web.page import go_to, show
+from hmi.web.problem import Problem
+from hmi.web.roles import Right
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
+from station.channel.messages import ChannelError, RefusedError
+from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_maintenance_queries import (
+    CalibrationRunView,
+    CalibrationState,
+    ContinueCalibrationRun,
+    EndCalibrationRun,
+    GetCalibration,
+    GetCalibrationPicture,
+    GetHealth,
+    GetLiveImage,
+    GetRegisters,
+    Health,
+    Jogged,
+    JogGripper,
+    LedsSet,
+    LiveImage,
+    Log,
+    ReadLog,
+    Registers,
+    SetLeds,
+    StartCalibrationRun,
+)
+from station.channel.panel_queries import Picture
+
+router = APIRouter(prefix="/maintenance")
+ENTRY = Entry("maintenance", "/maintenance")
+DEADLINE_S = 20.0
+MOVE_DEADLINE_S = 30.0
+MODE_S = 5.0
+_KEPT_FRAMES = 8
+_PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
+
+Maintainer = Annotated[Caller, Depends(orders(Right.MAINTAIN))]
+Level = Literal["DEBUG", "INFO", "WARNING", "ERROR"]
+Brightness = Annotated[int, Form(ge=0, le=15)]
+
+
+@router.get("")
+async def health(request: Request, hmi: HmiNow) -> Response:
+    """Show the health of every part."""
+    return show(request, "maintenance.html.j2", tab="health", **await _health(hmi))
+
+
+@router.get("/health/part")
+async def health_part(hmi: HmiNow, locale: LocaleNow) -> Response:
+    """Render the same as a part, for polling."""
+    return await _part(hmi, locale, "maintenance_health.html.j2", await _health(hmi))
+
+
+@router.get("/hand")
+async def hand(
+    request: Request,
+    hmi: HmiNow,
+    locale: LocaleNow,
+    at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
+    lit: Annotated[Literal["yes"] | None, Query()] = None,
+) -> Response:
+    """Show the manual control of fingers and light."""
+    done = locale.text("maintenance.lit") if lit else ""
+    if at_mm is not None:
+        done = locale.text("maintenance.jogged", width=locale.number(at_mm, 1))
+    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
+
+
+@router.post("/mode")
+async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
+    """Set manual mode, in which no fruit is accepted, or production again."""
+    query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
+    command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=DEADLINE_S)
+    until_s = time.monotonic() + MODE_S
+    while command.state == "executing" and time.monotonic() < until_s:
+        await asyncio.sleep(0.1)
+        if (await _health(hmi))["health"].mode == int(mode):
+            break
+    if command.state == "failed":
+        raise RefusedError(command.why or "")
+    return go_to("/maintenance/hand")
+
+
+@router.post("/jog")
+async def jog(
+    hmi: HmiNow,
+    caller: Maintainer,
+    to: Annotated[Literal["open", "width", "stop"], Form()],
+    width_mm: Annotated[str, Form(max_length=12)] = "",
+) -> Response:
+    """Move the fingers, or stop them; the page shows their position, or why they do not move."""
+    try:
+        width = float(width_mm.replace(",", ".")) if to == "width" else None
+        query = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
+    except ValueError:
+        raise Problem(400, "problem.bad_form") from None
+    jogged = await hmi.gateway.request(query, Jogged, deadline_s=MOVE_DEADLINE_S)
+    return go_to(f"/maintenance/hand?at_mm={jogged.width_mm:.1f}")
+
+
+@router.post("/leds")
+async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
+    """Set the sensor's light."""
+    query = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
+    await hmi.gateway.request(query, LedsSet, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/hand?lit=yes")
+
+
+@router.get("/image")
+async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+    """Show the live image, as fast as the browser takes it."""
+    return show(request, "maintenance_image.html.j2", tab="image", contact=contact, **await _live(hmi, contact=contact))
+
+
+@router.get("/image/part")
+async def image_part(hmi: HmiNow, locale: LocaleNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
+    """Render the next image with its contact; requested after the one before was taken."""
+    return await _part(hmi, locale, "maintenance_live.html.j2", await _live(hmi, contact=contact))
+
+
+@router.get("/image/{place}.jpg")
+async def frame(place: Annotated[str, StringConstraints(pattern=r"^\d{1,20}$")]) -> Response:
+    """Send an image that `image_part` has named."""
+    if place not in _FRAMES:
+        raise Problem(404, "problem.not_found")
+    return Response(_FRAMES[place].data, media_type=_FRAMES[place].media_type)
+
+
+@router.get("/sensor")
+async def sensor(request: Request, hmi: HmiNow) -> Response:
+    """Show calibration and verification, guided."""
+    return show(request, "maintenance_sensor.html.j2", tab="sensor", **await _calibration(hmi))
+
+
+@router.get("/sensor/part")
+async def sensor_part(hmi: HmiNow, locale: LocaleNow) -> Response:
+    """Render the state of the calibration run."""
+    reply = await _calibration(hmi)
+    run = reply["now"].run
+    over = run is None or run.state not in {"running", "waiting"}
+    state = "" if run is None else run.state
+    return await _part(hmi, locale, "maintenance_run.html.j2", reply, {"x-over": "1" if over else "", "x-state": state})
+
+
+@router.get("/sensor/{kind}/{name}")
+async def sensor_picture(
+    hmi: HmiNow,
+    kind: Literal["calibration", "verification"],
+    name: Literal["area.png", "field.png", "reference.png"],
+) -> Response:
+    """Send a plot of the calibration in force."""
+    reply = await hmi.gateway.request(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
+    return Response(reply.data, media_type=reply.media_type)
+
+
+@router.post("/sensor/begin")
+async def begin(
+    hmi: HmiNow,
+    caller: Maintainer,
+    kind: Annotated[Literal["calibration", "verification"], Form()],
+    places: Annotated[str, Form(max_length=200)] = "",
+) -> Response:
+    """Begin a run; places are given one per line, as `4; 0`."""
+    parsed = [_PLACE.match(line) for line in places.splitlines() if line.strip()]
+    if len(parsed) > 6 or not all(parsed):
+        raise Problem(400, "problem.bad_form")
+    wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
+    query = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
+    await hmi.gateway.request(query, CalibrationRunView, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.post("/sensor/go-on")
+async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
+    """Confirm that the ball is in place."""
+    await hmi.gateway.request(ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.post("/sensor/end")
+async def end(hmi: HmiNow, caller: Maintainer) -> Response:
+    """Cancel the run."""
+    await hmi.gateway.request(EndCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=MOVE_DEADLINE_S)
+    return go_to("/maintenance/sensor")
+
+
+@router.get("/registers")
+async def registers(request: Request, hmi: HmiNow) -> Response:
+    """Show the PLC's registers by name."""
+    return show(request, "maintenance_registers.html.j2", tab="registers", reply=await _registers(hmi))
+
+
+@router.get("/registers/part")
+async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
+    """Render the same as a part, for polling."""
+    return await _part(hmi, locale, "maintenance_register_table.html.j2", {"reply": await _registers(hmi)})
+
+
+@router.get("/log")
+async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
+    """Show the last lines of the station's log."""
+    reply = await hmi.gateway.request(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
+    return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
+
+
+_FRAMES: OrderedDict[str, Picture] = OrderedDict()
+"""The last live images: a page gets the address of one, and then fetches it."""
+
+
+async def _health(hmi: Hmi) -> dict[str, Any]:
+    return {"health": await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)}
+
+
+async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
+    try:
+        reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
+    except ChannelError as error:
+        return {"live_image": None, "why": error.message, "histograms": (), "place": ""}
+    place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
+    _FRAMES[place] = reply.picture
+    while len(_FRAMES) > _KEPT_FRAMES:
+        _FRAMES.popitem(last=False)
+    drawn = tuple(zip(("red", "green", "blue"), map(histogram, reply.histogram), strict=True))
+    return {"live_image": reply, "why": "", "histograms": drawn, "place": place}
+
+
+async def _calibration(hmi: Hmi) -> dict[str, Any]:
+    return {"now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)}
+
+
+async def _registers(hmi: Hmi) -> Registers:
+    return await hmi.gateway.request(GetRegisters(), Registers, deadline_s=DEADLINE_S)
+
+
+async def _part(
+    hmi: Hmi, locale: Locale, template: str, values: dict[str, Any], headers: dict[str, str] | None = None
+) -> Response:
+    return Response(hmi.renderer.render(template, locale, values), media_type="text/html", headers=headers)
+
+
+def _mm(text: str) -> float:
+    return float(text.replace(",", "."))

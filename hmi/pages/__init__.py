@@ -1,1 +1,0 @@
-"""The pages, each a router with its templates; `hmi.navigation` lists them."""

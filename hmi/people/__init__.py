@@ -1,0 +1,1 @@
+"""People page: log-in, log-out, users."""

@@ -1,0 +1,174 @@
+"""People page: log-in by PIN, users and their roles, and the cleaning lock."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Form, Query, Request
+from starlette.responses import Response
+
+from hmi.web.access import GenuineCaller, HmiNow, orders
+from hmi.web.context import Hmi
+from hmi.web.gateway import actor_of
+from hmi.web.navigation import Entry
+from hmi.web.page import give_session, go_to, show
+from hmi.web.problem import Problem
+from hmi.web.roles import Right, Role
+from hmi.web.sessions import Caller
+from hmi.web.user_store import UserStoreError, least_digits
+from station.channel.panel_live import PersonNoted
+
+router = APIRouter()
+ENTRY = Entry("people", "/people")
+LOOPBACK = ("127.", "::1")
+Name = Annotated[str, Form(max_length=40)]
+Pin = Annotated[str, Form(max_length=20)]
+Back = Annotated[str, Form(max_length=200)]
+Admin = Annotated[Caller, Depends(orders(Right.MANAGE_PEOPLE))]
+_CHECKING = asyncio.Lock()
+"""One PIN at a time: each takes 19 MiB and a core for a moment."""
+
+
+@router.get("/people")
+async def people(request: Request, hmi: HmiNow, back: Annotated[str, Query(max_length=200)] = "/") -> Response:
+    """Show the page."""
+    return _page(request, hmi, back)
+
+
+@router.post("/people/begin")
+async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin: Pin, again: Pin) -> Response:
+    """Set the administrator's PIN at the first start, at the machine itself."""
+    if not _address(request).startswith(LOOPBACK):
+        raise Problem(403, "people.only_here")
+    if pin != again:
+        return _page(request, hmi, "/", "people.pin_differs")
+    try:
+        async with _CHECKING:
+            await asyncio.to_thread(hmi.people.begin, name, pin)
+    except UserStoreError as error:
+        return _page(request, hmi, "/", error.key, error.detail)
+    await _note(hmi, Caller(name, Role.ADMIN, ""), "added", name)
+    return _logged_in(request, hmi, name, Role.ADMIN, "/people")
+
+
+@router.post("/people/log-in")
+async def log_in(
+    request: Request, hmi: HmiNow, caller: GenuineCaller, name: Name, pin: Pin, back: Back = "/"
+) -> Response:
+    """Log in; after several wrong PINs each further try is delayed."""
+    keys = (f"name {name if name in hmi.people.names() else ''}", f"address {_address(request)}")
+    if (wait_s := hmi.pins.wait_s(*keys)) > 0:
+        return _page(request, hmi, back, "people.wait", str(int(wait_s) + 1), status=429, chosen=name)
+    hmi.pins.tried(*keys)
+    async with _CHECKING:
+        role = await asyncio.to_thread(hmi.people.check, name, pin)
+    if role is None:
+        await _note(hmi, Caller(name, Role.VIEWER, ""), "log_in_refused", _address(request))
+        return _page(request, hmi, back, "people.wrong_pin", status=403, chosen=name)
+    hmi.pins.right(*keys)
+    hmi.sessions.log_out(caller.session)
+    await _note(hmi, Caller(name, role, ""), "logged_in", _address(request))
+    return _logged_in(request, hmi, name, role, back)
+
+
+@router.post("/people/log-out")
+async def log_out(hmi: HmiNow, caller: GenuineCaller) -> Response:
+    """Log out; the page continues as a viewer's."""
+    hmi.sessions.log_out(caller.session)
+    if caller.name:
+        await _note(hmi, caller, "logged_out")
+    return go_to("/")
+
+
+@router.post("/people/own-pin")
+async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin, pin: Pin) -> Response:
+    """Change one's own PIN."""
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)
+    key = f"name {caller.name}"
+    if (wait_s := hmi.pins.wait_s(key)) > 0:
+        return _page(request, hmi, "/", "people.wait", str(int(wait_s) + 1), status=429)
+    hmi.pins.tried(key)
+    async with _CHECKING:
+        if await asyncio.to_thread(hmi.people.check, caller.name, old) is None:
+            return _page(request, hmi, "/", "people.wrong_pin", status=403)
+        hmi.pins.right(key)
+        try:
+            await asyncio.to_thread(hmi.people.put, caller.name, caller.role, pin)
+        except UserStoreError as error:
+            return _page(request, hmi, "/", error.key, error.detail)
+    await _note(hmi, caller, "changed", caller.name)
+    return go_to("/people")
+
+
+@router.post("/people/put")
+async def put(
+    request: Request, hmi: HmiNow, caller: Admin, name: Name, role: Annotated[Role, Form()], pin: Pin = ""
+) -> Response:
+    """Add a user, or change a user's role or PIN; that user is logged out."""
+    known = name in hmi.people.names()
+    try:
+        async with _CHECKING:
+            await asyncio.to_thread(hmi.people.put, name, role, pin)
+    except UserStoreError as error:
+        return _page(request, hmi, "/", error.key, error.detail)
+    if name != caller.name:
+        hmi.sessions.forget(name)
+    await _note(hmi, caller, "changed" if known else "added", f"{name}: {role}")
+    return go_to("/people")
+
+
+@router.post("/people/remove")
+async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Response:
+    """Remove a user."""
+    try:
+        await asyncio.to_thread(hmi.people.remove, name)
+    except UserStoreError as error:
+        return _page(request, hmi, "/", error.key, error.detail)
+    hmi.sessions.forget(name)
+    await _note(hmi, caller, "removed", name)
+    return go_to("/people")
+
+
+@router.post("/people/clean")
+async def clean(hmi: HmiNow, caller: GenuineCaller) -> Response:
+    """Record the cleaning lock, which the page sets and releases by itself."""
+    await _note(hmi, caller, "cleaning", f"{hmi.settings.cleaning_s:g} s")
+    return Response(status_code=204)
+
+
+def _page(
+    request: Request, hmi: Hmi, back: str, wrong: str = "", detail: str = "", *, status: int = 0, chosen: str = ""
+) -> Response:
+    return show(
+        request,
+        "people.html.j2",
+        status=status or (400 if wrong else 200),
+        back=back if _is_ours(back) else "/",
+        wrong=wrong,
+        detail=detail,
+        chosen=chosen,
+        people=hmi.people.names(),
+        broken=hmi.people.broken,
+        here=_address(request).startswith(LOOPBACK),
+        roles=[role for role in Role if role is not Role.VIEWER],
+        least_digits={role: least_digits(role) for role in Role},
+    )
+
+
+def _logged_in(request: Request, hmi: Hmi, name: str, role: Role, back: str) -> Response:
+    answer = go_to(back if _is_ours(back) else "/")
+    give_session(request, answer, hmi.sessions.log_in(name, role))
+    return answer
+
+
+def _is_ours(address: str) -> bool:
+    """Return whether the address to go back to is a page of ours, and not inserted by a foreign page."""
+    return address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
+
+
+def _address(request: Request) -> str:
+    return request.client.host if request.client else ""
+
+
+async def _note(hmi: Hmi, caller: Caller, what: str, subject: str = "") -> None:
+    await hmi.gateway.note(PersonNoted(person=actor_of(caller), what=what, subject=subject))  # type: ignore[arg-type]

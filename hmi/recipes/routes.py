@@ -1,0 +1,323 @@
+"""Recipes page: state, editing as drafts with every limit drawn on past curves, approval by another person."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, File, Form, Query, Request, UploadFile
+from pydantic import StringConstraints
+from starlette.responses import Response
+
+from hmi.common.limit_chart import Curve, Limit, area_chart, strip
+from hmi.recipes.form import BadFieldError, Group, changed, formatted, groups, with_changes
+from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
+from hmi.web.context import Hmi
+from hmi.web.gateway import actor_of
+from hmi.web.navigation import Entry
+from hmi.web.page import go_to, show
+from hmi.web.problem import Problem
+from hmi.web.roles import Right
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
+from station.channel.messages import RefusedError
+from station.channel.panel_queries import JobView
+from station.channel.panel_recipe_queries import (
+    LARGEST_TEXT,
+    ApproveRecipe,
+    Change,
+    Changes,
+    CompareRecipe,
+    ExportRecipe,
+    GetPastCurves,
+    GetRecipe,
+    GetRecipeHistory,
+    ImportRecipe,
+    ListRecipes,
+    PastCurve,
+    PastCurves,
+    RecipeHistory,
+    RecipeRow,
+    Recipes,
+    RecipeText,
+    RecipeView,
+    RejectRecipe,
+    RevertRecipe,
+    SaveDraft,
+    StartWhatIf,
+    SubmitRecipe,
+)
+from station.messages.message import Message
+
+router = APIRouter(prefix="/recipes")
+ENTRY = Entry("recipes", "/recipes")
+DEADLINE_S = 20.0
+_PREFIX = "v:"
+"""Of a form's fields that are values of the recipe."""
+
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Reason = Annotated[str, Form(min_length=1, max_length=1000)]
+Editor = Annotated[Caller, Depends(orders(Right.EDIT_RECIPES))]
+Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
+
+
+@router.get("")
+async def recipes(request: Request, hmi: HmiNow) -> Response:
+    """Show the state of all recipes."""
+    return show(
+        request, "recipes.html.j2", reply=await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    )
+
+
+@router.get("/{name}")
+async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
+    """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
+    standing = await _row(hmi, name)
+    changes: tuple[Change, ...] = ()
+    if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
+        query = CompareRecipe(name=name, new=standing.waiting)
+        changes = (await hmi.gateway.request(query, Changes, deadline_s=DEADLINE_S)).changes
+    values = await _values(hmi, name, standing)
+    drawn = None if values is None else await _drawn(hmi, name, values)
+    return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
+
+
+@router.get("/{name}/edit")
+async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
+    """Show the form."""
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    return await _form(request, hmi, locale, reply, {}, "")
+
+
+@router.get("/{name}/chart")
+async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
+    """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    typed: dict[str, Any] = {}
+    for path, text in _typed(request.query_params).items():
+        try:
+            typed |= changed(reply.values, {path: text})
+        except BadFieldError:
+            continue
+    drawn = await _drawn(hmi, name, with_changes(reply.values, typed))
+    html = hmi.renderer.render("recipe_chart.html.j2", locale, {"drawn": drawn})
+    return Response(html, media_type="text/html")
+
+
+@router.post("/{name}/draft")
+async def save(
+    request: Request, hmi: HmiNow, locale: LocaleNow, name: Name, caller: Editor, reason: Reason
+) -> Response:
+    """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
+    form = await request.form()
+    texts = {key: value for key, value in form.items() if isinstance(value, str)}
+    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    typed = _typed(texts)
+    try:
+        changes = changed(reply.values, typed)
+    except BadFieldError as error:
+        why = locale.text("recipes.bad_field", field=_title(locale, error.field.key, error.field.title),
+                           expected=locale.sentence(error.field.expected))  # fmt: skip
+        return await _form(request, hmi, locale, reply, typed, why, reason)
+    if not changes:
+        return await _form(request, hmi, locale, reply, typed, locale.text("recipes.nothing_changed"), reason)
+    try:
+        query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
+        await hmi.gateway.request(query, RecipeRow, deadline_s=DEADLINE_S)
+    except RefusedError as error:
+        return await _form(request, hmi, locale, reply, typed, error.message, reason)
+    return go_to(f"/recipes/{name}")
+
+
+@router.post("/{name}/submit")
+async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Response:
+    """Record the edited file as a draft."""
+    return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=actor_of(caller)))
+
+
+@router.post("/{name}/approve")
+async def approve(
+    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+) -> Response:
+    """Approve a draft."""
+    return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+
+
+@router.post("/{name}/reject")
+async def reject(
+    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+) -> Response:
+    """Reject a draft."""
+    return await _order(hmi, RejectRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+
+
+@router.post("/{name}/revert")
+async def revert(
+    hmi: HmiNow,
+    name: Name,
+    caller: Editor,
+    reason: Reason,
+    revision: Annotated[int | None, Form(ge=1, le=2**31)] = None,
+) -> Response:
+    """Restore a revision's text in the file."""
+    return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+
+
+@router.get("/{name}/history")
+async def history(
+    request: Request, hmi: HmiNow, name: Name, below: Annotated[int | None, Query(ge=1, le=2**31)] = None
+) -> Response:
+    """Show the revisions: author, approver, dates, differences."""
+    query = GetRecipeHistory(name=name, below=below)
+    reply = await hmi.gateway.request(query, RecipeHistory, deadline_s=DEADLINE_S)
+    return show(request, "recipe_history.html.j2", row=await _row(hmi, name), reply=reply, tab="history")
+
+
+@router.get("/{name}/text")
+async def text(
+    request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
+) -> Response:
+    """Show the file's text, with its comments."""
+    reply = await hmi.gateway.request(GetRecipe(name=name, revision=revision), RecipeView, deadline_s=DEADLINE_S)
+    return show(request, "recipe_text.html.j2", row=reply.row, text=reply.text, revision=revision, tab="text")
+
+
+@router.get("/{name}/export")
+async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
+    """Send the file, to be edited elsewhere and imported again."""
+    reply = await hmi.gateway.request(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
+    headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
+    return Response(reply.text, media_type="application/yaml", headers=headers)
+
+
+@router.post("/import")
+async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotated[UploadFile, File()]) -> Response:
+    """Replace the file by a whole recipe, and record it as a draft."""
+    data = await file.read(LARGEST_TEXT + 1)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Problem(400, "problem.bad_form") from None
+    if not text or len(text) > LARGEST_TEXT:
+        raise Problem(400, "problem.bad_form")
+    actor = actor_of(caller)
+    row = await hmi.gateway.request(
+        ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
+    )
+    if row.file_state == "draft":
+        await hmi.gateway.request(
+            SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
+        )
+    return go_to(f"/recipes/{row.name}")
+
+
+@router.post("/{name}/whatif")
+async def whatif(
+    hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
+) -> Response:
+    """Judge the latest fruit again by the file as it is."""
+    job = await hmi.gateway.request(
+        StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobView, deadline_s=DEADLINE_S
+    )
+    return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
+
+
+async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
+    await hmi.gateway.request(order, RecipeRow, deadline_s=DEADLINE_S)
+    return go_to(f"/recipes/{order.name}")
+
+
+async def _form(
+    request: Request,
+    hmi: Hmi,
+    locale: Locale,
+    reply: RecipeView,
+    typed: Mapping[str, str],
+    wrong: str | Message,
+    reason: str = "",
+) -> Response:
+    made, sign = groups(reply.values), locale.decimal_sign
+    texts = {field.path: typed.get(field.path, formatted(field, sign)) for group in made for field in group.fields}
+    caller, known = caller_of(request), await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    return show(
+        request,
+        "recipe_edit.html.j2",
+        status=400 if wrong else 200,
+        row=reply.row,
+        groups=_sorted(made),
+        texts=texts,
+        prefix=_PREFIX,
+        wrong=wrong,
+        reason=reason,
+        drawn=await _drawn(hmi, reply.row.name, reply.values),
+        title=lambda each: _title(locale, each.key, each.title),
+        reply=known,
+        editable=known.editable and caller.may(Right.EDIT_RECIPES),
+        tab="edit",
+    )
+
+
+def _sorted(made: list[Group]) -> list[tuple[Group, bool]]:
+    """Sort the groups: frequently changed ones first and open; the others follow, folded."""
+    often = ("damage", "early_stop", "expected_width", "steps")
+    order = [each for start in often for each in made if each.path.startswith(start)]
+    return [*((each, True) for each in order), *((each, False) for each in made if each not in order)]
+
+
+def _title(locale: Locale, key: str, english: str) -> str:
+    return locale.own(key, english)
+
+
+def _typed(texts: Mapping[str, str]) -> dict[str, str]:
+    return {key.removeprefix(_PREFIX): value for key, value in texts.items() if key.startswith(_PREFIX)}
+
+
+async def _row(hmi: Hmi, name: str) -> RecipeRow:
+    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+    found = next((row for row in reply.rows if row.name == name), None)
+    if found is None:
+        raise Problem(404, "problem.not_found")
+    return found
+
+
+async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
+    """Return the values of the pending draft, else those in force; None if neither can be read."""
+    revision = row.waiting or row.in_force
+    if revision is None:
+        return None
+    query = GetRecipe(name=name, revision=revision)
+    return (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
+
+
+async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the limits on past curves; an empty result before the first inspection."""
+    try:
+        past = (await hmi.gateway.request(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
+    except RefusedError:  # there is no good file, or there are no records yet
+        past = ()
+    damage, early = values["damage"], values["early_stop"]
+    limits = [Limit(each["closing_mm"], each["area_mm2"], each["least_area_mm2"]) for each in damage["area"]]
+    curves = [
+        Curve(_kind(each), list(zip(each.closings_mm, each.areas_mm2, strict=True)))
+        for each in sorted(past, key=lambda each: each.outcome == "FAIL")
+    ]
+    width, robust = values["expected_width"], values["segmentation"]["robust"]
+    return {
+        "number": len(past),
+        "failed": sum(each.outcome == "FAIL" for each in past),
+        "area": area_chart(curves, limits, early["area_mm2"]),
+        "growth": strip(
+            [(_kind(each), each.growth_mm2_per_mm) for each in past if each.growth_mm2_per_mm is not None],
+            [("limit", damage["growth_mm2_per_mm"]), ("early", early["growth_mm2_per_mm"])],
+        ),
+        "width": strip(
+            [(_kind(each), each.onset_mm) for each in past if each.onset_mm is not None],
+            [("limit", width["smallest_mm"]), ("limit", width["largest_mm"])],
+        ),
+        "confidence": strip(
+            [(_kind(each), each.confidence) for each in past if each.confidence is not None],
+            [("limit", robust["least_confidence"])],
+        ),
+    }
+
+
+def _kind(curve: PastCurve) -> str:
+    return {"PASS": "pass", "FAIL": "fail"}.get(curve.outcome, "none")

@@ -1,0 +1,179 @@
+"""Run page: the station's activity, the operator's next action, and the latest fruit."""
+
+import base64
+from collections import Counter
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Form, Path, Request
+from starlette.responses import Response
+
+from hmi.run import charts
+from hmi.web.access import HmiNow, LocaleNow, orders
+from hmi.web.gateway import Gateway, actor_of
+from hmi.web.live import Part
+from hmi.web.navigation import Entry
+from hmi.web.page import go_to, show
+from hmi.web.problem import Problem
+from hmi.web.roles import Right
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
+from station.channel.messages import RefusedError
+from station.channel.panel_live import (
+    Fruit,
+    GetFruit,
+    GetPicture,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    Picture,
+)
+
+router = APIRouter()
+ENTRY = Entry("run", "/")
+MOST_RECENT = 20
+ORDER_DEADLINE_S = 5.0
+_MOST_REASONS = 3
+_ORDERS = frozenset(
+    {
+        OperatorCommandName.START,
+        OperatorCommandName.STOP,
+        OperatorCommandName.CALL_OFF,
+        OperatorCommandName.RECOVER,
+        OperatorCommandName.START_LOT,
+        OperatorCommandName.END_LOT,
+    }
+)
+_IMMUTABLE = "private, max-age=31536000, immutable"
+Sequence = Annotated[int, Path(ge=1, lt=2**32)]
+
+
+def _activity(gateway: Gateway) -> object:
+    state = gateway.state
+    return None if state is None else state.model_copy(update={"utc_ms": 0, "devices": ()})
+
+
+def _activity_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    state = gateway.state
+    order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
+    return {"state": state, "order": order}
+
+
+def _buttons(gateway: Gateway) -> object:
+    state = gateway.state
+    return None if state is None else (state.may, state.recoveries, state.needs_person)
+
+
+def _buttons_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    return {"state": gateway.state, "OperatorCommandName": OperatorCommandName}
+
+
+def _fruit(gateway: Gateway) -> object:
+    return gateway.last
+
+
+def _fruit_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
+    return fruit_values(gateway.last, locale)
+
+
+def _figures(gateway: Gateway) -> object:
+    state = gateway.state
+    if state is None:
+        return None
+    return gateway.last, state.recipe, state.lot, state.named_lot, state.lot_counts, state.plc_names_lots
+
+
+def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
+    fruit = gateway.recent.fruit
+    reasons = Counter(reason for each in fruit for reason in each.reasons[:1])
+    times_s = [each.duration_ms / 1000 for each in fruit[:MOST_RECENT]]
+    return {
+        "state": gateway.state,
+        "last": gateway.last,
+        "looked_at": len(fruit),
+        "rejected": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
+        "reasons": reasons.most_common(_MOST_REASONS),
+        "trend": charts.trend(fruit, locale),
+        "bar": charts.bar,
+        "longest_s": max(times_s, default=None),
+    }
+
+
+def _recent(gateway: Gateway) -> object:
+    return gateway.recent
+
+
+def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    return {"fruit": gateway.recent.fruit[:MOST_RECENT], "sketch": charts.sketch}
+
+
+PARTS = {
+    "run.activity": Part("run_activity.html.j2", _activity, _activity_values),
+    "run.buttons": Part("run_buttons.html.j2", _buttons, _buttons_values),
+    "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
+    "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
+    "run.recent": Part("run_recent.html.j2", _recent, _recent_values),
+}
+
+
+def fruit_values(fruit: Fruit | None, locale: Locale) -> Mapping[str, Any]:
+    """Return the values that `run_fruit.html.j2` needs for a fruit."""
+    return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, locale)}
+
+
+@router.get("/")
+async def run(request: Request) -> Response:
+    """Show the page."""
+    return show(request, "run.html.j2")
+
+
+@router.get("/fruit/{sequence}")
+async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequence) -> Response:
+    """Show one of the latest fruit; an older one is in the history."""
+    try:
+        found = await hmi.gateway.request(GetFruit(sequence=sequence), Fruit)
+    except RefusedError:
+        return go_to(f"/history/{sequence}")
+    return show(request, "fruit.html.j2", **fruit_values(found, locale))
+
+
+@router.get("/fruit/{sequence}/picture.svg")
+async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
+    """Send a fruit's picture with the contact's outline; it never changes, so a browser fetches it once."""
+    found = await hmi.gateway.request(GetPicture(sequence=sequence), Picture)
+    base64.b64decode(found.jpeg, validate=True)
+    corners = " ".join(f"{x},{y}" for x, y in found.outline)
+    size = f'width="{found.width_px}" height="{found.height_px}"'
+    # A light line upon a dark one is seen on any picture.
+    outline = "".join(
+        f'<polygon points="{corners}" fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-linejoin="round"/>'
+        for colour, width_px in (("#000", 7), ("#fff", 3))
+        if corners
+    )
+    drawn = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {found.width_px} {found.height_px}" {size}>'
+        f'<image {size} href="data:image/jpeg;base64,{found.jpeg}"/>{outline}</svg>'
+    )
+    return Response(drawn, media_type="image/svg+xml", headers={"cache-control": _IMMUTABLE})
+
+
+@router.post("/order")
+async def order(
+    hmi: HmiNow,
+    caller: Annotated[Caller, Depends(orders(Right.RUN))],
+    order: Annotated[OperatorCommandName, Form()],
+    argument: Annotated[str, Form(max_length=64)] = "",
+    grower: Annotated[str, Form(max_length=64)] = "",
+) -> Response:
+    """Start, stop, cancel, recover, or begin and end a lot; the page shows the result."""
+    if order not in _ORDERS:
+        raise Problem(400, "problem.bad_form")
+    request = OperatorCommand(person=actor_of(caller), order=order, argument=argument, grower=grower)
+    await hmi.gateway.request(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
+    return go_to("/")
+
+
+@router.get("/lot")
+async def lot(request: Request) -> Response:
+    """Show the form that begins and ends a lot, if the PLC names none."""
+    return show(request, "lot.html.j2")

@@ -1,0 +1,85 @@
+"""Access control of the pages: caller, rights, and the one-time token of each order."""
+
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+
+from hmi.web.context import Hmi
+from hmi.web.problem import Problem
+from hmi.web.roles import Right, least_role
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale, preferred
+
+SESSION_COOKIE, LANGUAGE_COOKIE = "station_session", "station_language"
+TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
+
+
+def hmi_of(request: Request) -> Hmi:
+    """Return the process's parts."""
+    return request.app.state.hmi
+
+
+def caller_of(request: Request) -> Caller:
+    """Return the caller; a viewer if nobody is logged in. A browser without a cookie gets one with the page."""
+    session = request.cookies.get(SESSION_COOKIE, "")
+    if not session:
+        session = getattr(request.state, "new_session", "") or hmi_of(request).sessions.new()
+        request.state.new_session = session
+    return hmi_of(request).sessions.caller(session)
+
+
+def locale_of(request: Request) -> Locale:
+    """Return the language to answer in."""
+    cookie, accepted = request.cookies.get(LANGUAGE_COOKIE, ""), request.headers.get("accept-language", "")
+    return Locale(preferred(hmi_of(request).settings.languages, cookie, accepted))
+
+
+async def genuine(request: Request) -> Caller:
+    """Return the caller of an order that one of our own pages has sent, for the first time.
+
+    Args:
+        request: with the page's token in the form's field `csrf` or the header `X-CSRF-Token`.
+
+    Raises:
+        Problem: 403, forged or too old; 409, sent before.
+    """
+    caller = caller_of(request)
+    token: Any = request.headers.get(TOKEN_HEADER)
+    if token is None:
+        token = (await request.form()).get(TOKEN_FIELD, "")
+    wrong = hmi_of(request).sessions.spend(caller.session, token if isinstance(token, str) else "")
+    if wrong:
+        raise Problem(409 if wrong == "problem.replayed" else 403, wrong)
+    hmi_of(request).sessions.touch(caller.session)
+    return caller
+
+
+def may(right: Right) -> Callable[[Request], Awaitable[Caller]]:
+    """Make a dependency for a page or a file that needs a right."""
+
+    async def check(request: Request) -> Caller:
+        return _with_right(caller_of(request), right)
+
+    return check
+
+
+def orders(right: Right) -> Callable[[Request], Awaitable[Caller]]:
+    """Make a dependency for every request that changes something: the token is checked first, then the role."""
+
+    async def check(request: Request) -> Caller:
+        return _with_right(await genuine(request), right)
+
+    return check
+
+
+def _with_right(caller: Caller, right: Right) -> Caller:
+    if not caller.may(right):
+        raise Problem(403, "problem.not_allowed", role=least_role(right))
+    return caller
+
+
+HmiNow = Annotated[Hmi, Depends(hmi_of)]
+CallerNow = Annotated[Caller, Depends(caller_of)]
+GenuineCaller = Annotated[Caller, Depends(genuine)]
+LocaleNow = Annotated[Locale, Depends(locale_of)]

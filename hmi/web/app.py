@@ -1,0 +1,145 @@
+"""Web application: every page behind the security middleware, over one gateway to the station."""
+
+import asyncio
+import contextlib
+import logging
+import uuid
+from collections.abc import AsyncIterator
+
+from fastapi import FastAPI, Request
+from fastapi.exception_handlers import request_validation_exception_handler
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from hmi.api.model import ApiMessage, Error
+from hmi.web.access import locale_of
+from hmi.web.assets import Assets
+from hmi.web.context import Hmi
+from hmi.web.gateway import Gateway, actor_of
+from hmi.web.live import Live
+from hmi.web.login_limiter import LoginRateLimiter
+from hmi.web.navigation import modules, parts
+from hmi.web.page import show
+from hmi.web.problem import Problem
+from hmi.web.render import Renderer
+from hmi.web.security import SecurityMiddleware
+from hmi.web.sessions import Sessions
+from hmi.web.user_store import UserStore
+from station.channel.messages import ChannelError, DeadlineError
+from station.channel.panel_live import PersonNoted
+from station.messages.message import Message
+from station.settings.configuration import Configuration
+from station.settings.hmi import panel_endpoint
+
+FOLDER = "hmi"
+_SWEEP_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+def make_context(site: Configuration) -> Hmi:
+    """Make the parts that all pages use; the gateway is not entered yet.
+
+    Raises:
+        StationError: the user store cannot be read, or the endpoint is none.
+    """
+    settings, boot = site.hmi, uuid.uuid4().hex[:12]
+    assets, gateway = Assets(), Gateway(panel_endpoint(site.hmi, site.home), site.hmi.refresh_s)
+    renderer = Renderer(assets)
+    return Hmi(
+        settings=settings,
+        gateway=gateway,
+        sessions=Sessions(settings.idle_s),
+        people=UserStore(site.home / FOLDER),
+        pins=LoginRateLimiter(),
+        assets=assets,
+        renderer=renderer,
+        live=Live(parts(), renderer, gateway, boot),
+        boot=boot,
+    )
+
+
+def make_app(hmi: Hmi) -> SecurityMiddleware:
+    """Make the application."""
+
+    @contextlib.asynccontextmanager
+    async def running(_: FastAPI) -> AsyncIterator[None]:
+        async with hmi.gateway:
+            sweeping = asyncio.create_task(_sweep(hmi), name="logging out who is idle")
+            try:
+                yield
+            finally:
+                sweeping.cancel()
+                await asyncio.gather(sweeping, return_exceptions=True)
+
+    app = FastAPI(
+        title="Fruit station",
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        lifespan=running,
+        routes=[Route("/static/{digest}/{name}", hmi.assets.serve)],
+        exception_handlers={
+            Problem: _problem,
+            HTTPException: _http,
+            RequestValidationError: _bad_form,
+            ChannelError: _away,
+            Exception: _broken,
+        },
+    )
+    app.state.hmi = hmi
+    for module in modules():
+        app.include_router(module.router, include_in_schema=getattr(module, "IN_SCHEMA", False))
+    return SecurityMiddleware(app, (*hmi.settings.names, hmi.settings.host), secure=hmi.settings.tls.enabled)
+
+
+async def _sweep(hmi: Hmi) -> None:
+    while True:
+        await asyncio.sleep(_SWEEP_S)
+        for caller in hmi.sessions.sweep():
+            await hmi.gateway.note(PersonNoted(person=actor_of(caller), what="idle"))
+
+
+async def _problem(request: Request, error: Exception) -> Response:
+    assert isinstance(error, Problem)  # noqa: S101 (what it is registered for)
+    values = dict(error.values)
+    locale = locale_of(request)
+    if "role" in values:
+        values["role"] = locale.text(f"role.{values['role']}")
+    return _problem_answer(request, error.status, locale.text(error.key, **values))
+
+
+async def _http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101 (what it is registered for)
+    key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
+    answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else str(error.detail))
+    answer.headers.update(error.headers or {})
+    return answer
+
+
+async def _bad_form(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)  # noqa: S101 (what it is registered for)
+    if request.url.path.startswith("/api/"):
+        return await request_validation_exception_handler(request, error)
+    return _problem_answer(request, 400, locale_of(request).text("problem.bad_form"))
+
+
+async def _away(request: Request, error: Exception) -> Response:
+    """Answer that the station refused or did not answer, and state the result of an order where it is known."""
+    assert isinstance(error, ChannelError)  # noqa: S101 (what it is registered for)
+    if isinstance(error, DeadlineError):
+        return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), error.message)
+    return _problem_answer(request, 409, locale_of(request).text("problem.refused"), error.message)
+
+
+async def _broken(request: Request, _: Exception) -> Response:
+    return _problem_answer(request, 500, locale_of(request).text("problem.broken"))
+
+
+def _problem_answer(request: Request, status: int, text: str, detail: Message | None = None) -> Response:
+    if request.url.path.startswith("/api/"):
+        told = Error(detail=f"{text} {detail or ''}".strip(), message=detail and ApiMessage.of(detail))
+        return JSONResponse(told.model_dump(mode="json", exclude_none=True), status)
+    return show(request, "problem.html.j2", status=status, text=text, detail=detail)

@@ -1,0 +1,22 @@
+"""`station hmi`: the operators' pages."""
+
+import asyncio
+from pathlib import Path
+
+import click
+
+from hmi.web.process import serve
+from station.logs import configure_logging
+from station.settings.configuration import load_configuration
+
+
+@click.command("hmi")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+def hmi(config: Path | None) -> None:
+    """Serve the operators' pages until SIGTERM or Ctrl-C; `station run` starts this by itself.
+
+    It shows the station through its channel; while the station does not answer, the pages report that and recover by
+    themselves.
+    """
+    configure_logging("hmi")
+    asyncio.run(serve(load_configuration(config)))

@@ -1,0 +1,27 @@
+"""Parts that all pages use."""
+
+from dataclasses import dataclass
+
+from hmi.web.assets import Assets
+from hmi.web.gateway import Gateway
+from hmi.web.live import Live
+from hmi.web.login_limiter import LoginRateLimiter
+from hmi.web.render import Renderer
+from hmi.web.sessions import Sessions
+from hmi.web.user_store import UserStore
+from station.settings.hmi import HmiSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Hmi:
+    """The process's parts; `request.app.state.hmi`."""
+
+    settings: HmiSettings
+    gateway: Gateway
+    sessions: Sessions
+    people: UserStore
+    pins: LoginRateLimiter
+    assets: Assets
+    renderer: Renderer
+    live: Live
+    boot: str

@@ -1,0 +1,124 @@
+"""Gateway to the station: the HMI's one channel client; requests with deadlines, and periodic polling."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from typing import Self, TypeVar
+
+from hmi.web.sessions import Caller
+from station.channel.client import ChannelClient
+from station.channel.line import Noted
+from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError
+from station.channel.panel import Actor
+from station.channel.panel_live import Fruit, GetFruit, GetPanelState, GetRecent, PanelState, PersonNoted, Recent
+from station.errors import StationError
+
+ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
+STALE_S = 2.0
+"""An older state is not shown as live."""
+DEADLINE_S = 2.0
+_POLL_DEADLINE_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+class Gateway:
+    """Polled state of the station, and requests to it. Belongs to the event loop in which it is entered.
+
+    Args:
+        endpoint: the panel's channel.
+        period_s: polling period; one poll serves all pages, however many are open.
+    """
+
+    def __init__(self, endpoint: str, period_s: float) -> None:
+        self._endpoint, self._period_s = endpoint, period_s
+        self._client: ChannelClient | None = None
+        self._polling: asyncio.Task[None] | None = None
+        self._polled = asyncio.Event()
+        self._known: tuple[str, int | None] | None = None
+        """The station's start and last fruit of `last` and `recent`."""
+        self.state: PanelState | None = None
+        """The last answer; None before the first."""
+        self.heard_s: float | None = None
+        """Time of the last answer, monotonic."""
+        self.last: Fruit | None = None
+        """The last fruit."""
+        self.recent = Recent(fruit=())
+        """The last fruit in short."""
+
+    async def __aenter__(self) -> Self:
+        self._client = ChannelClient(self._endpoint, "the station")
+        self._polling = asyncio.create_task(self._poll(), name="polling the station")
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._polling is not None:
+            self._polling.cancel()
+            await asyncio.gather(self._polling, return_exceptions=True)
+        if self._client is not None:
+            await self._client.close()
+
+    @property
+    def age_s(self) -> float | None:
+        """Age of `state`; None before the first answer."""
+        return None if self.heard_s is None else time.monotonic() - self.heard_s
+
+    @property
+    def fresh(self) -> bool:
+        """True while `state` is recent enough to be shown as live."""
+        return self.age_s is not None and self.age_s <= STALE_S
+
+    async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
+        """Send a request to the station and return its answer.
+
+        Args:
+            request: a message of the panel's channel.
+            reply: the type of its answer.
+            deadline_s: how long to wait in all.
+
+        Raises:
+            DeadlineError: no answer came in time; of an order it is unknown whether it was carried out.
+            RefusedError: the station refused; the message is the station's.
+        """
+        if self._client is None:
+            raise DeadlineError("the channel to the station is not open")
+        return await self._client.request(request, reply, deadline_s=deadline_s)
+
+    async def note(self, what: PersonNoted) -> None:
+        """Write an event into the audit trail, and into the log if the station does not answer."""
+        log.info("%s (%s): %s %s", what.person.who, what.person.role, what.what, what.subject)
+        try:
+            await self.request(what, Noted)
+        except StationError as error:
+            log.warning("the audit trail does not have it: %s", error)
+
+    async def polled(self) -> None:
+        """Wait for the end of the next poll, with or without an answer."""
+        await self._polled.wait()
+
+    async def _poll(self) -> None:
+        while True:
+            began_s = time.monotonic()
+            with contextlib.suppress(ChannelError):
+                state = await self.request(GetPanelState(), PanelState, deadline_s=_POLL_DEADLINE_S)
+                if (newest := (state.boot, state.last_sequence)) != self._known:
+                    self.recent = await self.request(GetRecent(most=200), Recent)
+                    self.last, self._known = await self._fruit(state.last_sequence), newest
+                self.state, self.heard_s = state, time.monotonic()
+            polled, self._polled = self._polled, asyncio.Event()
+            polled.set()
+            await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
+
+    async def _fruit(self, sequence: int | None) -> Fruit | None:
+        """Return a fruit in full; None if the station has no details of it any more."""
+        if sequence is None:
+            return None
+        with contextlib.suppress(RefusedError):
+            return await self.request(GetFruit(sequence=sequence), Fruit)
+        return None
+
+
+def actor_of(caller: Caller) -> Actor:
+    """Return the caller as an actor of the audit trail."""
+    return Actor(who=caller.name or "panel", role=caller.role)

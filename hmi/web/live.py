@@ -1,0 +1,108 @@
+"""Live parts of pages: rendered once for all browsers, sent only to the pages that show them."""
+
+import asyncio
+import hashlib
+import json
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+from markupsafe import Markup
+
+from hmi.web.gateway import Gateway
+from hmi.web.render import Renderer
+from hmi.web.roles import RIGHTS, Right, Role
+from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
+from station.settings.hmi import Language
+
+BEAT_S = 0.5
+"""Period of a page's events if nothing changes."""
+
+
+class Part(NamedTuple):
+    """A part of a page."""
+
+    template: str
+    depends_on: Callable[[Gateway], object]
+    """Filled in anew when this is no longer equal to what it was; cheap."""
+    values: Callable[[Gateway, Locale], Mapping[str, Any]]
+    """The template's values, beside `may(right)`; `gateway.state` may be None, or old: the page shows its age."""
+
+
+class Filled(NamedTuple):
+    """A part's present content."""
+
+    digest: str
+    html: Markup
+
+
+class Live:
+    """Live parts of all pages.
+
+    Args:
+        parts: by their names, `page.what`.
+        renderer: renders the templates.
+        gateway: state of the station.
+        boot: differs after each start of this process; then a page reloads itself.
+    """
+
+    def __init__(self, parts: Mapping[str, Part], renderer: Renderer, gateway: Gateway, boot: str) -> None:
+        self._parts, self._renderer, self._gateway, self._boot = parts, renderer, gateway, boot
+        self._filled: dict[tuple[str, Language, Role], tuple[object, Filled]] = {}
+        self.open = 0
+        """Streams under way."""
+        self.ending = False
+        """The process ends: streams end."""
+
+    def unknown(self, names: Iterable[str]) -> bool:
+        """Return whether any of the names is not a part."""
+        return any(name not in self._parts for name in names)
+
+    def part(self, name: str, locale: Locale, role: Role) -> Filled:
+        """Return a part's present content.
+
+        Args:
+            name: a known one.
+            locale: the language.
+            role: of the reader; an order within the part has no token, which the page's script fills in.
+        """
+        part = self._parts[name]
+        depends_on = part.depends_on(self._gateway)
+        known = self._filled.get((name, locale.language, role))
+        if known is not None and known[0] == depends_on:
+            return known[1]
+        values = {**part.values(self._gateway, locale), "may": RIGHTS[role].__contains__, "Right": Right}
+        html = self._renderer.render(part.template, locale, values)
+        filled = Filled(hashlib.sha256(html.encode()).hexdigest()[:12], html)
+        self._filled[name, locale.language, role] = depends_on, filled
+        return filled
+
+    async def stream(
+        self, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
+    ) -> AsyncIterator[bytes]:
+        """Send server-sent events to one page until it closes. A slow browser gets fewer.
+
+        Args:
+            names: the page's parts.
+            locale: its language.
+            caller: returns who is logged in there now; the page reloads itself when that changes.
+        """
+        sent: dict[str, str] = {}
+        loop, beat_at_s = asyncio.get_running_loop(), 0.0
+        while not self.ending:
+            who = caller()
+            filled = {name: self.part(name, locale, who.role) for name in names}
+            news = {name: each for name, each in filled.items() if sent.get(name) != each.digest}
+            if news or loop.time() >= beat_at_s:
+                beat_at_s = loop.time() + BEAT_S
+                age_s = self._gateway.age_s
+                event = {
+                    "age_ms": None if age_s is None else round(1000 * age_s),
+                    "utc_ms": 0 if self._gateway.state is None else self._gateway.state.utc_ms,
+                    "boot": self._boot,
+                    "caller": f"{who.name}|{who.role}",
+                    "parts": {name: [each.digest, each.html] for name, each in news.items()},
+                }
+                yield f"data: {json.dumps(event, ensure_ascii=False)}\n\n".encode()
+                sent |= {name: each.digest for name, each in news.items()}
+            await self._gateway.polled()

@@ -1,0 +1,67 @@
+"""Page rendering: a page's template within the common layout."""
+
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse, RedirectResponse
+from markupsafe import Markup
+from starlette.responses import Response
+
+from hmi.web.access import SESSION_COOKIE, caller_of, hmi_of, locale_of
+from hmi.web.context import Hmi
+from hmi.web.navigation import entries
+from hmi.web.roles import Right, Role
+from hmi.web.translation import Locale
+
+FRAME_PARTS = ("frame.alarm", "frame.state")
+"""On every page."""
+
+
+def show(request: Request, template: str, *, status: int = 200, **values: Any) -> Response:
+    """Answer with a page.
+
+    Args:
+        request: the browser's.
+        template: extends `base.html.j2`.
+        status: HTTP status.
+        values: the page's own, in addition to those of every page: `caller`, `Right`, `state` (the station's, or None),
+            `token()` for a form, and `live(name)`, which inserts a live part.
+    """
+    hmi, caller, locale = hmi_of(request), caller_of(request), locale_of(request)
+    age_s = hmi.gateway.age_s
+    frame = {
+        "caller": caller,
+        "Right": Right,
+        "state": hmi.gateway.state,
+        "fresh": hmi.gateway.fresh,
+        "age_ms": -1 if age_s is None else round(1000 * age_s),
+        "boot": hmi.boot,
+        "settings": hmi.settings,
+        "entries": entries(),
+        "path": request.url.path,
+        "first_start": hmi.people.first_start,
+        "token": lambda: hmi.sessions.token(caller.session),
+        "live": lambda name: _live(hmi, locale, caller.role, name),
+    }
+    answer = HTMLResponse(hmi.renderer.render(template, locale, {**frame, **values}), status)
+    give_session(request, answer, getattr(request.state, "new_session", ""))
+    if caller.name and request.method == "GET":
+        hmi.sessions.touch(caller.session)
+    return answer
+
+
+def give_session(request: Request, answer: Response, session: str) -> None:
+    """Set the browser's cookie if it is new."""
+    if session:
+        secure = hmi_of(request).settings.tls.enabled
+        answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="strict", path="/")
+
+
+def go_to(address: str) -> RedirectResponse:
+    """Answer an order by redirecting to a page, which can be reloaded without repeating the order."""
+    return RedirectResponse(address, 303)
+
+
+def _live(hmi: Hmi, locale: Locale, role: Role, name: str) -> Markup:
+    filled = hmi.live.part(name, locale, role)
+    return Markup('<div data-live="{}" data-digest="{}">{}</div>').format(name, filled.digest, filled.html)

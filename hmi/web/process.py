@@ -1,0 +1,86 @@
+"""HMI process: serves the pages until SIGINT or SIGTERM."""
+
+import asyncio
+import logging
+import signal
+import ssl
+
+import uvicorn
+
+from hmi.web.app import make_app, make_context
+from station.errors import BadInputError
+from station.settings.configuration import Configuration
+from station.settings.hmi import HmiSettings, address_of
+from station.supervision.notify import feed_watchdog, notify
+from station.supervision.serving import CLOSE_S, AddressError, Server, listen
+
+START_S = 30.0
+LOOPBACK = ("127.", "::1", "localhost")
+
+log = logging.getLogger(__name__)
+
+
+async def serve(site: Configuration) -> None:
+    """Serve the pages until SIGINT or SIGTERM.
+
+    Args:
+        site: the site's configuration.
+
+    Raises:
+        StationError: the address, a certificate or the user store cannot be used.
+    """
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    hmi = make_context(site)
+    listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages")
+    server = Server(_config(site.hmi, make_app(hmi)))
+    serving = asyncio.create_task(server.serve(sockets=[listener]), name="pages")
+    feeding: asyncio.Task[None] | None = None
+    try:
+        async with asyncio.timeout(START_S):
+            while not server.started:
+                if serving.done():
+                    serving.result()
+                    raise AddressError("the pages' server ended at once; see the log")
+                await asyncio.sleep(0.01)
+        if not site.hmi.tls.enabled and not site.hmi.host.startswith(LOOPBACK):
+            log.warning("the pages are served on %s without TLS: PINs can be read on the network", site.hmi.host)
+        log.info("the pages are served on %s", address_of(site.hmi))
+        feeding = asyncio.create_task(feed_watchdog(lambda: True), name="watchdog")
+        notify("READY=1")
+        waiting = asyncio.create_task(ended.wait(), name="order to end")
+        await asyncio.wait({serving, waiting}, return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+    finally:
+        if feeding is not None:
+            feeding.cancel()
+        hmi.live.ending = server.should_exit = True
+        await serving
+
+
+def _config(settings: HmiSettings, app: object) -> uvicorn.Config:
+    tls = settings.tls
+    config = uvicorn.Config(
+        app,  # type: ignore[arg-type] (an ASGI application)
+        log_config=None,
+        access_log=False,
+        ws="none",
+        server_header=False,
+        proxy_headers=False,
+        limit_concurrency=200,
+        h11_max_incomplete_event_size=16 * 1024,
+        timeout_keep_alive=30,
+        timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
+        ssl_certfile=tls.certificate if tls.enabled else None,
+        ssl_keyfile=tls.key if tls.enabled else None,
+    )
+    try:
+        config.load()
+    except (OSError, ssl.SSLError) as error:
+        raise BadInputError(
+            f"hmi.tls: {tls.certificate} and {tls.key} cannot be used: {error}; name a certificate and its key in PEM"
+        ) from error
+    if config.ssl is not None:
+        config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
+    return config
