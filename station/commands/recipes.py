@@ -18,7 +18,7 @@ from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import shortened
 from station.settings.recipe import Recipe, check_recipes, recipe_files
-from station.settings.recipe_form import content_sha256
+from station.settings.recipe_versions import content_sha256
 from station.settings.scalars import MeaningError, plain_scalar
 
 Command = Callable[..., Any]

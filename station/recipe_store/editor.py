@@ -21,9 +21,9 @@ from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
 from station.records.direct_transaction import direct_transaction
 from station.settings.recipe import shipped_folder
-from station.settings.recipe_form import content_sha256, parse_recipe
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_text import upgraded_text, with_values
+from station.settings.recipe_versions import content_sha256, parse_recipe
 
 _BASE = re.compile(r"^# base: sha256 ([0-9a-f]{64})\n", re.MULTILINE)
 _SHORTEST_BASE = 8

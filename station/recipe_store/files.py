@@ -16,7 +16,7 @@ from station.recipe_store.revision import RecipeStoreError
 from station.records.high_water_mark import sync_folder
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import check_recipes, recipe_files
-from station.settings.recipe_form import parse_recipe
+from station.settings.recipe_versions import parse_recipe
 
 BACKUPS = "recipe_backups"
 _LOCK = "recipes.lock"

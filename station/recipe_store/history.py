@@ -11,8 +11,8 @@ from station.recipe_store.revision import STATUS, ConflictError, Origin, RecipeS
 from station.records.audit import AuditEntry, append_audit
 from station.records.schema import recipe_revisions
 from station.records.write_requests import utc_ms
-from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import content_sha256
 
 
 class Person(NamedTuple):

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 from station.errors import StationError
 from station.messages import recipes as messages
-from station.settings.recipe_form import parse_recipe
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import parse_recipe
 
 
 class RecipeStoreError(StationError):

@@ -20,8 +20,8 @@ from station.records.direct_transaction import direct_transaction
 from station.records.errors import RecordsError
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import approved_by_distribution, shipped_folder
-from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import content_sha256
 
 BEGAN = "recipe.history_began"
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.settings.problems import Problem, SettingsError, shortened
-from station.settings.recipe_form import content_sha256, recipe_of
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import content_sha256, recipe_of
 from station.settings.yaml_loader import read_document
 
 __all__ = ["Checked", "Recipe", "check_recipes", "find_recipe", "load_recipe", "load_recipes", "recipe_files"]

@@ -10,8 +10,8 @@ from ruamel.yaml.error import YAMLError
 
 from station.errors import BadInputError
 from station.settings.problems import Problem, SettingsError, shortened
-from station.settings.recipe_form import FORM, parse_recipe, upgrade
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import SCHEMA_VERSION, parse_recipe, upgrade
 
 _PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d{1,3})\]|(\d{1,3})")
 _WIDE = 4096
@@ -54,7 +54,7 @@ def upgraded_text(text: str, source: str) -> tuple[str, int] | None:
     if found is None:
         return None
     changed = _dumped(yaml, values)
-    parse_recipe(changed, f"{source} in form {FORM}")
+    parse_recipe(changed, f"{source} in form {SCHEMA_VERSION}")
     return changed, found
 
 

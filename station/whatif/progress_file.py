@@ -12,8 +12,8 @@ from typing import Any, Self
 from station.errors import BadInputError, StationError
 from station.messages import whatif as messages
 from station.records.stored_message import from_stored, to_stored
-from station.settings.recipe_form import content_sha256
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import content_sha256
 from station.whatif.replay import Replayed
 
 FILE_NAME = "replayed.jsonl"

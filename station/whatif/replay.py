@@ -16,8 +16,8 @@ from station.inspection.press import Press
 from station.inspection.second_press import needs_second_press, together
 from station.messages import whatif as messages
 from station.messages.message import Message, joined
-from station.settings.recipe_form import upgrade
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import upgrade
 from station.vocabulary import OutcomeName
 from station.whatif.remeasure import CannotRemeasureError, remeasured
 from station.whatif.stored import StoredPress

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from station.settings import recipe_form
+from station.settings import recipe_versions
 from station.settings.problems import SettingsError
 from station.settings.recipe import load_recipe
-from station.settings.recipe_form import FORM, content_sha256, parse_recipe, rename
 from station.settings.recipe_text import with_values
+from station.settings.recipe_versions import SCHEMA_VERSION, content_sha256, parse_recipe, rename
 
 GOLDEN = Path(__file__).parent / "golden"
 FORMS = sorted(GOLDEN.iterdir())
@@ -23,7 +23,7 @@ def to_first_form(values):
 @pytest.fixture
 def earlier_form(monkeypatch, site):
     """A program that knows a form before the first, and a strawberry's file in it."""
-    monkeypatch.setattr(recipe_form, "MIGRATIONS", {0: to_first_form})
+    monkeypatch.setattr(recipe_versions, "MIGRATIONS", {0: to_first_form})
     file = site / "strawberry.yaml"
     text = file.read_text().replace("schema_version: 1\n", "schema_version: 0\n")
     file.write_text(text.replace("  growth_mm2_per_mm: 41  #", "  growth: 41  #"))
@@ -31,7 +31,7 @@ def earlier_form(monkeypatch, site):
 
 
 def test_there_is_a_golden_file_of_every_form():
-    assert [form.name for form in FORMS] == [f"form_{number}" for number in range(1, FORM + 1)]
+    assert [form.name for form in FORMS] == [f"form_{number}" for number in range(1, SCHEMA_VERSION + 1)]
 
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
@@ -72,7 +72,8 @@ def test_a_bad_file_of_an_earlier_form_is_told_with_its_line(earlier_form):
 
 
 def test_a_newer_form_is_left_alone(site):
-    text = (site / "strawberry.yaml").read_text().replace("schema_version: 1\n", f"schema_version: {FORM + 1}\n")
-    told = rf"x:\d+: schema_version: expected at most {FORM}, got {FORM + 1} of a newer"
+    newer = SCHEMA_VERSION + 1
+    text = (site / "strawberry.yaml").read_text().replace("schema_version: 1\n", f"schema_version: {newer}\n")
+    told = rf"x:\d+: schema_version: expected at most {SCHEMA_VERSION}, got {newer} of a newer"
     with pytest.raises(SettingsError, match=told):
         parse_recipe(text, "x")

@@ -23,7 +23,7 @@ from station.records.model import RecipeSnapshot
 from station.runtime.state_files import StateFiles
 from station.settings.problems import SettingsError
 from station.settings.recipe import Recipe
-from station.settings.recipe_form import content_sha256
+from station.settings.recipe_versions import content_sha256
 
 _ACTIVE = "active_recipe.json"
 _CONTROLS = "control_recipes"

@@ -18,7 +18,7 @@ from station.records.model import FullRecord, StoredImage
 from station.records.queries import read_inspection
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.problems import SettingsError
-from station.settings.recipe_form import parse_recipe
+from station.settings.recipe_versions import parse_recipe
 from station.vision.contact import Image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker

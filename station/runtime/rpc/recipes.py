@@ -53,7 +53,7 @@ from station.runtime.rpc.jobs import PanelJobs
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import Recipe, shipped_folder
-from station.settings.recipe_form import content_sha256
+from station.settings.recipe_versions import content_sha256
 
 _REVISIONS = 20
 """Revisions on one page of a history."""

@@ -11,7 +11,7 @@ from station.settings.recipe_model import Recipe
 from station.settings.validation import validated
 from station.settings.yaml_loader import Document, parse_document
 
-FORM = 1
+SCHEMA_VERSION = 1
 """The `schema_version` that this program reads and writes."""
 
 Migration = Callable[[MutableMapping[str, Any]], None]
@@ -44,9 +44,12 @@ def recipe_of(document: Document) -> Recipe:
     """
     values = document.value
     form = values.get("schema_version") if isinstance(values, dict) else None
-    if isinstance(form, int) and form > FORM:
+    if isinstance(form, int) and form > SCHEMA_VERSION:
         place, field = document.locate(("schema_version",))
-        message = f"expected at most {FORM}, got {form} of a newer fruit-station: install that, or write the older form"
+        message = (
+            f"expected at most {SCHEMA_VERSION}, got {form} of a newer fruit-station: install that, or write the older "
+            "form"
+        )
         problem = Problem(place, field, message)
         document = replace(document, problems=(problem,), doubtful=frozenset({()}))
     if isinstance(values, dict) and not document.problems:
