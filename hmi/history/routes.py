@@ -5,17 +5,19 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Form, Query, Request
+from markupsafe import Markup
 from pydantic import StringConstraints, ValidationError
 from starlette.responses import Response
 
-from hmi.common.limit_chart import Curve, Limit, area_chart, spark
-from hmi.web.access import GenuineCaller, HmiNow, caller_of
+from hmi.common.charts import area_over_closing
+from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
 from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
 from station.channel.panel import Actor
 from station.channel.panel_queries import (
     AuditRows,
@@ -34,6 +36,8 @@ from station.channel.panel_queries import (
     StartLotReport,
 )
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.charts.area_chart import Curve, Limit
+from station.charts.spark import spark
 from station.messages.reasons import reason_message
 from station.vocabulary import Reason
 
@@ -159,7 +163,7 @@ async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"
 
 
 @router.get("/{sequence}")
-async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
+async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: int) -> Response:
     """Show one inspection in full."""
     reply = await _inspection(hmi, sequence)
     return show(
@@ -167,7 +171,7 @@ async def inspection(request: Request, hmi: HmiNow, sequence: int) -> Response:
         "inspection.html.j2",
         reply=reply,
         reasons=[(code, reason_message(code)) for code in reply.reasons],
-        drawn=_drawn(reply),
+        chart=_chart(reply, locale),
         steps=_steps(reply),
         reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),
     )
@@ -237,8 +241,8 @@ def _steps(reply: InspectionView) -> list[dict[str, Any]]:
     ]
 
 
-def _drawn(reply: InspectionView) -> dict[str, Any] | None:
-    """Return the curve with the limits of the recipe at that time."""
+def _chart(reply: InspectionView, locale: Locale) -> Markup | None:
+    """Draw the curve with the limits of the recipe at that time."""
     points = [
         (point.closing_mm, point.area_mm2)
         for point in reply.curve
@@ -256,7 +260,8 @@ def _drawn(reply: InspectionView) -> dict[str, Any] | None:
         early = factor * reply.recipe["early_stop"]["area_mm2"]
     except (KeyError, TypeError):  # of a form that this program does not know
         pass
-    return {"area": area_chart([Curve("own", points)], limits, early)}
+    label = locale.text("chart.fruit_label", n=reply.sequence)
+    return area_over_closing([Curve("own", points, ("point",) * len(points))], limits, locale, label, early)
 
 
 def _utc_ms(text: str) -> int | None:

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Form, Query, Request
 from pydantic import StringConstraints
 from starlette.responses import Response
 
-from hmi.common.limit_chart import histogram
+from hmi.maintenance.histogram import histogram
 from hmi.web.access import HmiNow, LocaleNow, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of

@@ -7,8 +7,9 @@ from fastapi import APIRouter, Depends, File, Form, Query, Request, UploadFile
 from pydantic import StringConstraints
 from starlette.responses import Response
 
-from hmi.common.limit_chart import Curve, Limit, area_chart, strip
+from hmi.common.charts import area_over_closing
 from hmi.recipes.form import BadFieldError, Group, changed, formatted, groups, with_changes
+from hmi.recipes.strip import strip
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
@@ -45,6 +46,7 @@ from station.channel.panel_recipe_queries import (
     StartWhatIf,
     SubmitRecipe,
 )
+from station.charts.area_chart import Curve, Kind, Limit
 from station.messages.message import Message
 
 router = APIRouter(prefix="/recipes")
@@ -68,7 +70,7 @@ async def recipes(request: Request, hmi: HmiNow) -> Response:
 
 
 @router.get("/{name}")
-async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
+async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
     standing = await _row(hmi, name)
     changes: tuple[Change, ...] = ()
@@ -76,7 +78,7 @@ async def recipe(request: Request, hmi: HmiNow, name: Name) -> Response:
         query = CompareRecipe(name=name, new=standing.waiting)
         changes = (await hmi.gateway.request(query, Changes, deadline_s=DEADLINE_S)).changes
     values = await _values(hmi, name, standing)
-    drawn = None if values is None else await _drawn(hmi, name, values)
+    drawn = None if values is None else await _drawn(hmi, locale, name, values)
     return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
 
 
@@ -97,7 +99,7 @@ async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) ->
             typed |= changed(reply.values, {path: text})
         except BadFieldError:
             continue
-    drawn = await _drawn(hmi, name, with_changes(reply.values, typed))
+    drawn = await _drawn(hmi, locale, name, with_changes(reply.values, typed))
     html = hmi.renderer.render("recipe_chart.html.j2", locale, {"drawn": drawn})
     return Response(html, media_type="text/html")
 
@@ -247,7 +249,7 @@ async def _form(
         prefix=_PREFIX,
         wrong=wrong,
         reason=reason,
-        drawn=await _drawn(hmi, reply.row.name, reply.values),
+        drawn=await _drawn(hmi, locale, reply.row.name, reply.values),
         title=lambda each: _title(locale, each.key, each.title),
         reply=known,
         editable=known.editable and caller.may(Right.EDIT_RECIPES),
@@ -287,7 +289,7 @@ async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
     return (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
 
 
-async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+async def _drawn(hmi: Hmi, locale: Locale, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the limits on past curves; an empty result before the first inspection."""
     try:
         past = (await hmi.gateway.request(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
@@ -300,10 +302,12 @@ async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, An
         for each in sorted(past, key=lambda each: each.outcome == "FAIL")
     ]
     width, robust = values["expected_width"], values["segmentation"]["robust"]
+    failed = sum(each.outcome == "FAIL" for each in past)
+    label = locale.text("chart.recipe_label", n=len(past), failed=failed)
     return {
         "number": len(past),
-        "failed": sum(each.outcome == "FAIL" for each in past),
-        "area": area_chart(curves, limits, early["area_mm2"]),
+        "failed": failed,
+        "area": area_over_closing(curves, limits, locale, label, early["area_mm2"]),
         "growth": strip(
             [(_kind(each), each.growth_mm2_per_mm) for each in past if each.growth_mm2_per_mm is not None],
             [("limit", damage["growth_mm2_per_mm"]), ("early", early["growth_mm2_per_mm"])],
@@ -319,5 +323,6 @@ async def _drawn(hmi: Hmi, name: str, values: Mapping[str, Any]) -> dict[str, An
     }
 
 
-def _kind(curve: PastCurve) -> str:
-    return {"PASS": "pass", "FAIL": "fail"}.get(curve.outcome, "none")
+def _kind(curve: PastCurve) -> Kind:
+    kinds: dict[str, Kind] = {"PASS": "pass", "FAIL": "fail"}
+    return kinds.get(curve.outcome, "none")

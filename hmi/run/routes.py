@@ -28,6 +28,7 @@ from station.channel.panel_live import (
     OperatorCommandView,
     Picture,
 )
+from station.charts.spark import spark
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
@@ -104,7 +105,7 @@ def _recent(gateway: Gateway) -> object:
 
 
 def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    return {"fruit": gateway.recent.fruit[:MOST_RECENT], "sketch": charts.sketch}
+    return {"fruit": gateway.recent.fruit[:MOST_RECENT], "spark": spark}
 
 
 PARTS = {

@@ -8,6 +8,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from hmi.web.folders import FOLDERS, HMI
+from station.charts.area_chart import STYLE_FILE
 
 _KINDS = {".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml"}
 _FOR_EVER = "public, max-age=31536000, immutable"
@@ -24,7 +25,7 @@ class Asset(NamedTuple):
 
 
 class Assets:
-    """Scripts, styles and icons of all pages' folders; their names are unique."""
+    """Scripts, styles and icons of all pages' folders, and the charts' style; their names are unique."""
 
     def __init__(self) -> None:
         self._files = {
@@ -34,8 +35,7 @@ class Assets:
                 _KINDS[path.suffix],
                 hashlib.sha256(data).hexdigest()[:12],
             )
-            for folder in FOLDERS
-            for path in sorted((HMI / folder).iterdir())
+            for path in (STYLE_FILE, *(path for folder in FOLDERS for path in sorted((HMI / folder).iterdir())))
             if path.suffix in _KINDS
         }
 

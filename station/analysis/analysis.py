@@ -6,7 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
+from station.analysis.curve_chart import curve_chart
 from station.analysis.decoding import Decoded
 from station.analysis.measurement import Measured, Refused, measure_all
 from station.analysis.output import OutputFolder, flag_names
@@ -15,6 +17,7 @@ from station.analysis.presses import Run, runs, singles
 from station.analysis.report import Report, ReportRow, data_uri, render
 from station.analysis.sources import Source
 from station.calibration.model import Calibration
+from station.charts.area_chart import document
 from station.errors import BadInputError
 from station.inspection.curve import Reading, area_curve
 from station.inspection.monotone import wrong_frames
@@ -199,15 +202,15 @@ def _write_summaries(
     qualities = [(item.row.image, item.quality) for item in measured if item.quality is not None]
     if qualities:
         output.write_denoising(qualities)
-    svg, rows = _write_curve(output, request, measured)
+    chart, rows = _write_curve(output, request, measured)
     report = Report(
         title=f"Contact areas of {len(measured)} images",
         facts=_facts(request, scale, order),
         rows=rows,
         errors=[(item.source.name, item.reason) for item in refused],
-        curve_svg=svg,
+        curve=chart,
         stages=stages_pictures,
-        no_onset=request.widths_mm is not None and svg is None,
+        no_onset=request.widths_mm is not None and chart is None,
         quality=_mean_quality(qualities),
     )
     output.write_bytes("report.html", render(report).encode())
@@ -215,10 +218,8 @@ def _write_summaries(
 
 def _write_curve(
     output: OutputFolder, request: Request, measured: Sequence[_Summary]
-) -> tuple[str | None, list[ReportRow]]:
+) -> tuple[Markup | None, list[ReportRow]]:
     """Write the curve if there are widths, and add the closings to the report's rows."""
-    from station.analysis.plots import curve_svg  # noqa: PLC0415 (matplotlib takes a second to load; few runs draw)
-
     rows = [item.row for item in measured]
     by_reading = {id(item.reading): item for item in measured if item.reading is not None}
     curve = area_curve(item.reading for item in by_reading.values() if item.reading is not None)
@@ -229,17 +230,17 @@ def _write_curve(
     points = [point.reading for point in curve.points]
     wrong = wrong_frames([reading.width_mm for reading in points], [reading.area_mm2 for reading in points])
     output.write_curve(images, curve, wrong)
-    svg = curve_svg(
+    chart = curve_chart(
         curve,
         wrong,
         f"{request.recipe or 'press'}, method {request.segmentation.method}",
         changed_mm2=[row.changed_area_mm2 for row in of_points],
         lower_bounds=[place for place, row in enumerate(of_points) if row.lower_bound],
     )
-    output.write_bytes("curve.svg", svg.encode())
+    output.write_bytes("curve.svg", document(chart).encode())
     closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
     unfit = {images[frame.index] for frame in wrong}
-    return svg, [_on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in rows]
+    return chart, [_on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in rows]
 
 
 def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:

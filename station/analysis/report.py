@@ -8,6 +8,7 @@ import cv2
 import jinja2
 from markupsafe import Markup
 
+from station.charts.area_chart import style
 from station.vision.contact import Image
 
 _JPEG_QUALITY = 88
@@ -45,7 +46,7 @@ class Report:
     """Names and values of the measurement's settings."""
     rows: Sequence[ReportRow]
     errors: Sequence[tuple[str, str]]
-    curve_svg: str | None
+    curve: Markup | None
     no_onset: bool
     """True if there are widths, and no contact was found: there is no curve."""
     stages: Sequence[tuple[str, str]]
@@ -63,8 +64,7 @@ def render(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    curve = Markup(report.curve_svg[report.curve_svg.index("<svg") :]) if report.curve_svg else None  # noqa: S704 (made by this program, text escaped by matplotlib)
-    return environment.get_template("report.html.j2").render(report=report, curve=curve)
+    return environment.get_template("report.html.j2").render(report=report, chart_style=style())
 
 
 def data_uri(picture: Image) -> str:

@@ -9,9 +9,11 @@ from pathlib import Path
 import cv2
 import jinja2
 import numpy as np
+from markupsafe import Markup
 from sqlalchemy import Connection
 
 from station.calibration.gate import gated
+from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, style
 from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
@@ -25,7 +27,7 @@ from station.whatif.replay import Replayed
 from station.whatif.stored import read_gate_factor
 
 MOST_SHOWN = 60
-_WIDE, _HIGH, _EDGE = 260, 130, 22
+_CHART = Size(300, 170, 12)
 _PICTURE_PX = 150
 _WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
 
@@ -35,12 +37,8 @@ class FruitView:
     """View of one fruit."""
 
     result: Replayed
-    curve: str
-    """An SVG picture's points: x,y x,y …"""
-    again: str
-    """Likewise, of the areas that the draft measures in the stored images; empty if it measures as before."""
-    limits: tuple[tuple[float, float, str], ...]
-    """x, y and `own` or `draft` of every area limit."""
+    chart: Markup
+    """Area over closing, with the limits of then and of the draft."""
     picture: str
     """A data URI of its last image with the contact's outline; empty if none was stored."""
 
@@ -70,7 +68,7 @@ def render(page: Page) -> str:
         lstrip_blocks=True,
     )
     template = environment.get_template("whatif.html.j2")
-    return template.render(page=page, before=BEFORE, after=AFTER, wide=_WIDE, high=_HIGH, edge=_EDGE)
+    return template.render(page=page, before=BEFORE, after=AFTER, chart_style=style())
 
 
 def fruit_views(
@@ -94,22 +92,14 @@ def _fruit_view(connection: Connection, folder: Path, result: Replayed, own: Rec
         "AND area_mm2 IS NOT NULL ORDER BY step",
         (result.sequence,),
     ).all()
-    limits = [(each.closing_mm, each.area_mm2, "draft") for each in draft.damage.area]
-    limits += [(each.closing_mm, each.area_mm2, "own") for each in own.damage.area] if own else []
-    most_x = max([row[0] for row in rows] + [limit[0] for limit in limits])
-    most_y = max([row[1] for row in rows] + [limit[1] for limit in limits] + list(result.areas_mm2))
-
-    def place(closing_mm: float, area_mm2: float) -> tuple[float, float]:
-        x = _EDGE + max(0.0, closing_mm) / most_x * (_WIDE - 2 * _EDGE)
-        return round(x, 1), round(_HIGH - _EDGE - area_mm2 / most_y * (_HIGH - 2 * _EDGE), 1)
-
-    curve = " ".join("{},{}".format(*place(*row)) for row in rows)
-    again = " ".join(
-        "{},{}".format(*place(row[0], area_mm2)) for row, area_mm2 in zip(rows, result.areas_mm2, strict=False)
-    )
-    placed = tuple((*place(closing_mm, area_mm2), whose) for closing_mm, area_mm2, whose in limits)
+    limits = [Limit(each.closing_mm, each.area_mm2, former=True) for each in own.damage.area] if own else []
+    limits += [Limit(each.closing_mm, each.area_mm2) for each in draft.damage.area]
+    curves = [Curve("own", [(row[0], row[1]) for row in rows])]
+    if result.areas_mm2:
+        curves.append(Curve("again", [(row[0], area) for row, area in zip(rows, result.areas_mm2, strict=False)]))
+    chart = area_chart(curves, limits, Texts(f"Area over closing of inspection {result.sequence}"), size=_CHART)
     measuring = draft.segmentation if result.areas_mm2 else None
-    return FruitView(result, curve, again, placed, _picture(connection, folder, result.sequence, measuring))
+    return FruitView(result, chart, _picture(connection, folder, result.sequence, measuring))
 
 
 def _picture(connection: Connection, folder: Path, sequence: int, draft: Segmentation | None) -> str:

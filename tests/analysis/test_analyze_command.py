@@ -58,7 +58,7 @@ def test_widths_add_closing_curve_and_plot(press, analyze, tmp_path):
     assert [float(row["width_mm"]) for row in curve] == [38, 37, 36, 35, 34]
     areas = [float(row["area_mm2"]) for row in curve]
     assert areas == sorted(areas)
-    assert "closing [mm]" in (out / "curve.svg").read_text()
+    assert "closing, mm" in (out / "curve.svg").read_text()
 
 
 def test_stages_are_the_papers_three_rows_with_the_denoising_figures(press, analyze, tmp_path):

@@ -207,14 +207,6 @@ def test_the_browsers_wish_counts_after_the_persons():
     assert preferred(("de", "en"), "es", "fr") == "de"
 
 
-@given(st.floats(0.01, 1e4))
-def test_an_axis_reaches_its_largest_value_with_few_round_numbers(largest):
-    ticks = charts.ticks(largest)
-    assert ticks[0] == 0
-    assert largest <= ticks[-1] * (1 + 1e-6)
-    assert 2 <= len(ticks) <= 12
-
-
 def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 60.0)) -> Fruit:
     short = FruitSummary(
         sequence=7,
@@ -250,8 +242,9 @@ def test_a_curve_is_drawn_with_every_point_and_limit(areas):
     circles = [each for each in drawn.iter() if each.tag.endswith("circle")]
     assert len(circles) == len(areas)
     assert drawn.get("role") == "img"
+    assert [each.get("class") for each in circles] == ["mark-doubtful", "mark-point", "mark-point"][: len(areas)]
     assert "60,0" in drawn.attrib["aria-label"]
-    assert all(0 <= float(each.attrib["cy"]) <= charts.HEIGHT for each in circles)
+    assert all(0 <= float(each.attrib["cy"]) <= 290 for each in circles)
 
 
 def test_a_trend_counts_tens():
@@ -260,7 +253,6 @@ def test_a_trend_counts_tens():
     many = [fruit(outcome).short for outcome in outcomes]
     drawn = ET.fromstring(charts.trend(many, Locale("en")))
     assert drawn.attrib["aria-label"].endswith("0, 3")
-    ET.fromstring(charts.sketch(()))
 
 
 def test_nothing_is_fetched_from_outside():

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hmi.common.limit_chart import Curve, Limit, area_chart, strip
 from hmi.recipes.form import BadFieldError, changed, formatted, groups
+from hmi.recipes.strip import strip
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
@@ -149,22 +149,6 @@ def test_a_form_tells_numbers_lists_and_nothing_apart() -> None:
     for path, text in (("damage.area[0].area_mm2", "nan"), ("steps.number", "many"), ("steps.start", "middle")):
         with pytest.raises(BadFieldError):
             changed(values, {path: text})
-
-
-areas = st.floats(0, 260, allow_nan=False)
-
-
-@given(st.lists(st.tuples(st.floats(0, 50), areas), max_size=30), st.floats(0.5, 50), st.floats(1, 260), areas)
-def test_nothing_is_drawn_outside_a_chart(points: Any, closing_mm: float, limit_mm2: float, early_mm2: float) -> None:
-    chart = area_chart([Curve("own", points)], [Limit(closing_mm, limit_mm2, 0.0)], early_mm2)
-    places = [place for _, _, marked in chart.curves for place in marked]
-    places += [(mark.x, mark.y) for mark in chart.marks]
-    assert all(62 <= x <= 702 and 0 <= y <= 284 for x, y in places)
-    assert chart.early_y is not None
-    for (x, y), (value, area) in zip(chart.curves[0][2], points, strict=True):
-        mark = chart.marks[0]
-        assert (x - mark.x) * (value - closing_mm) >= 0
-        assert (mark.y - y) * (area - limit_mm2) >= 0
 
 
 @given(st.lists(st.tuples(st.sampled_from(["pass", "fail"]), st.floats(0, 1e4)), max_size=40), st.floats(0, 1e4))
