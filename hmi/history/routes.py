@@ -135,14 +135,9 @@ async def export(
 
 
 @router.post("/report")
-async def report(
-    hmi: HmiNow,
-    caller: GenuineCaller,
-    lot: Annotated[str, Form(max_length=32)],
-    form: Annotated[Literal["html", "pdf"], Form()],
-) -> Response:
+async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(max_length=32)]) -> Response:
     """Start a lot's report."""
-    query = StartLotReport(lot=lot, form=form, actor=_actor(caller))
+    query = StartLotReport(lot=lot, actor=_actor(caller))
     job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
     return go_to(f"/jobs/{job.job}?back=/history")
 

@@ -64,7 +64,7 @@ async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
 @router.get("/{job}/show/{name}", dependencies=[Depends(logged_in)])
 async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
     """Send one of its documents for display in the browser."""
-    if not name.endswith((".html", ".pdf")):
+    if not name.endswith(".html"):
         raise Problem(404, "problem.not_found")
     return await _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
 

@@ -259,7 +259,6 @@ class StartLotReport(ChannelMessage):
 
     purpose: ClassVar[str] = "for a lot's report"
     lot: str = Field(max_length=32)
-    form: Literal["html", "pdf"]
     actor: Actor
 
 

@@ -8,9 +8,10 @@ from station.commands.records_options import config_option, folder_of, query_opt
 from station.records.error_mapping import map_error
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
-from station.records.lot_report import WAYS, write_report
+from station.records.lot_report import SUFFIX, write_report
 from station.records.lot_summary import summarise
 from station.records.search import Query
+from station.settings.configuration import load_configuration
 
 
 @click.command()
@@ -29,12 +30,14 @@ def export(file: Path, query: Query, config: Path | None) -> None:
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @config_option
 def report(lot: str, file: Path, config: Path | None) -> None:
-    """Write a report of the lot LOT to FILE: .html or .pdf by its suffix, one file that needs no other."""
-    if file.suffix not in WAYS:
-        raise click.UsageError(f"{file}: expected a file that ends in {' or '.join(WAYS)}")
+    """Write a report of the lot LOT to FILE.html, one file that needs no other; a browser prints it on A4 or as PDF."""
+    if file.suffix != SUFFIX:
+        raise click.UsageError(
+            f"{file}: expected a file that ends in {SUFFIX}; for paper or a PDF, print that file from a browser"
+        )
     summary = summarise(folder_of(config), lot)
     try:
-        write_report(summary, file)
+        write_report(summary, load_configuration(config).outbox.station, file)
     except OSError as error:
         raise map_error(error, str(file)) from error
     click.echo(f"{file}: {summary.total} inspections of lot {lot}")

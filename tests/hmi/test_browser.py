@@ -84,7 +84,7 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     assert drawn.headers["cache-control"].startswith("private, max-age=")
     viewer.page.locator(".tile").first.click()
     viewer.until("h1", f"Frucht {sequence}")
-    assert viewer.page.locator(".fruit-curve .point, .fruit-curve .doubtful").count() > 1
+    assert viewer.page.locator(".fruit-curve circle").count() > 1
 
 
 @pytest.mark.timeout(240)

@@ -159,7 +159,7 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     page.get_by_role("button", name="Search").click()
     expect(page.get_by_role("heading", name=f"Fruit {soft.sequence}")).to_be_visible()
     assert page.locator(".reasons li").count() == len(soft.reasons)
-    assert page.locator(".curve-point").count() >= 2
+    assert page.locator(".mark-point").count() >= 2
     expect(page.get_by_text("fruit length 48.0 mm, class 3 (given by the PLC)")).to_be_visible()
     page.locator(".steps a").nth(1).click()
     expect(page.get_by_role("heading", name="Step 1")).to_be_visible()

@@ -84,12 +84,30 @@ def test_a_lots_report_needs_no_other_file_and_escapes_what_comes_from_outside(h
     assert ask("report", "other", tmp_path / "lot.doc").exit_code == 2
 
 
-def test_a_lots_report_as_pdf_can_be_read(history, ask, tmp_path):
-    assert ask("report", "other", tmp_path / "lot.pdf").exit_code == 0
-    content = (tmp_path / "lot.pdf").read_bytes()
-    assert content.startswith(b"%PDF-1.")
-    assert content.rstrip().endswith(b"%%EOF")
-    assert len(content) > 10_000
+def test_who_asks_for_a_pdf_is_told_the_way(history, ask, tmp_path):
+    done = ask("report", "other", tmp_path / "lot.pdf")
+    assert done.exit_code == 2
+    assert "expected a file that ends in .html; for paper or a PDF, print that file from a browser" in done.output
+
+
+@pytest.mark.timeout(300)
+def test_a_lots_report_is_printed_on_a4_with_lot_and_station_on_each_page(history, ask, tmp_path, chromium):
+    """A name that ends the style sheet's text would end its rules, and the pages would lose their size."""
+    ask("report", "a <b> & 'c'", tmp_path / "lot.html")
+    pdf = tmp_path / "lot.pdf"
+    options = (
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--no-pdf-header-footer",
+        f"--user-data-dir={tmp_path / 'p'}",
+    )
+    command = [chromium, *options, f"--print-to-pdf={pdf}", (tmp_path / "lot.html").as_uri()]
+    subprocess.run(command, capture_output=True, check=True, timeout=200)
+    printed = pdf.read_bytes()
+    sizes = re.findall(rb"/MediaBox\s*\[0 0 ([0-9.]+) ([0-9.]+)\]", printed)
+    assert [(round(float(wide)), round(float(high))) for wide, high in sizes] == [(595, 842)] * len(sizes)
+    assert 1 <= len(sizes) <= 2
 
 
 def test_a_browser_shows_the_report(history, ask, tmp_path, chromium):

@@ -13,8 +13,8 @@ LOT = "coalesce(nullif(lot, ''), 'not told')"
 
 LOTS = (
     sql("table", "Lots", "percentunit",
-        "Each lot with its grower and what became of it; the newest on top. The lot's report as a PDF is at the "
-        "station: `station records lot NAME`.", "records.md",
+        "Each lot with its grower and what became of it; the newest on top. The lot's report is at the "
+        "station: `station records report NAME lot.html`.", "records.md",
         f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(began) AS began, count(*)::text AS inspected,
         {FAILED} AS failed, {UNJUDGED} AS "not judged"
         FROM inspections_of_growers WHERE {HERE}

@@ -145,7 +145,7 @@ class PanelHistory:
         """Start a lot's report."""
         _check_text(request.lot)
         folder = self._jobs.folder()
-        arguments = ["records", "report", "--", request.lot, str(folder / f"lot.{request.form}")]
+        arguments = ["records", "report", "--", request.lot, str(folder / "lot.html")]
         return self._jobs.begin("lot_report", folder, arguments)
 
     async def job(self, request: GetJob) -> JobView:

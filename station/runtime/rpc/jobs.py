@@ -34,7 +34,6 @@ _MEDIA = {
     ".csv": "text/csv; charset=utf-8",
     ".parquet": "application/vnd.apache.parquet",
     ".html": "text/html; charset=utf-8",
-    ".pdf": "application/pdf",
     ".json": "application/json",
 }
 
