@@ -70,7 +70,7 @@ class OutboxSettings(Settings):
     station: str = setting(
         "station-1",
         title="Station's name",
-        description="Name of this station in other systems; every station needs a different one.",
+        description="Name of this station in other systems and on lots' reports; every station needs a different one.",
         pattern=r"^[A-Za-z0-9_.-]{1,64}$",
     )
     longest_pause_s: float = setting(

@@ -92,8 +92,11 @@ def test_who_asks_for_a_pdf_is_told_the_way(history, ask, tmp_path):
 
 @pytest.mark.timeout(300)
 def test_a_lots_report_is_printed_on_a4_with_lot_and_station_on_each_page(history, ask, tmp_path, chromium):
-    """A name that ends the style sheet's text would end its rules, and the pages would lose their size."""
     ask("report", "a <b> & 'c'", tmp_path / "lot.html")
+    sheet = (tmp_path / "lot.html").read_text(encoding="utf-8")
+    name = r"a\000020\00003cb\00003e\000020\000026\000020\000027c\000027"  # no sign that could end a text of CSS
+    assert f'@top-left {{ content: "Lot {name}"' in sheet
+    assert r'@top-right { content: "station\00002d1"' in sheet
     pdf = tmp_path / "lot.pdf"
     options = (
         "--headless",
