@@ -350,6 +350,10 @@ class Panel:
         with self.page.expect_navigation():
             self.page.locator("form[action='/people/log-in'] .button.main").click()
 
+    def overflow(self) -> int:
+        """By how many pixels the page is wider than the screen."""
+        return self.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+
     def text(self, selector: str = "body") -> str:
         return self.page.inner_text(selector)
 

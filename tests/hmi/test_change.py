@@ -49,3 +49,26 @@ def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypa
         assert status == 200
         assert ("Die Kalibrierung wurde nie überprüft" in text) == bool(due)
         assert ('href="/maintenance/sensor"' in text) == bool(due)
+
+
+@pytest.mark.timeout(240)
+def test_the_fruit_is_changed_while_a_fruit_is_running(ready, operator):
+    operator.open("/change")
+    touches = 0
+    operator.page.locator(".fruit-tile", has_text="Raspberry").click()
+    touches += 1
+    operator.page.get_by_role("heading", name="Change to Raspberry").wait_for()
+    assert "Width of the fruit" in operator.text("table")
+    sequence = ready.begin()
+    operator.page.get_by_role("button", name="Change to Raspberry").click()
+    touches += 1
+    operator.until("main", "In progress|Done")
+    outcome = ready.end(sequence)
+    assert outcome.recipe_number == 2, "the fruit under way is judged by the recipe that it began with"
+    operator.until("main", "The station is ready")
+    assert touches <= 3
+    assert "Raspberry" in operator.text(".progress")
+    state = ready.until(lambda state: state.recipe.number == 3)
+    assert (state.orders[0].state, state.orders[0].who) == ("done", "Ana")
+    ready.twin(do="fruit", kind="raspberry", seed=1, bruised=False)
+    assert ready.end(ready.begin()).recipe_number == 3

@@ -2,7 +2,6 @@
 
 import ast
 import re
-import xml.etree.ElementTree as ET
 from pathlib import Path
 from string import Formatter
 
@@ -11,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmi.recipes.form import groups
-from hmi.run import charts
 from hmi.web.folders import HMI
 from hmi.web.navigation import entries, modules, parts
 from hmi.web.text import texts
@@ -160,7 +158,7 @@ def test_every_part_is_somewhere():
 def test_every_page_is_looked_at_in_both_sizes():
     """By the tests that open each page of their list `PAGES`, and those of `IN_THEIR_OWN_TESTS`."""
     looked_at = []
-    for test in ("hmi/test_browser.py", "hmi_pages/test_pages.py"):
+    for test in ("hmi/test_every_page.py", "hmi_pages/test_every_page.py"):
         body = ast.parse((Path(__file__).parents[1] / test).read_text(encoding="utf-8")).body
         lists = [
             each.value for each in body if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "PAGES"
@@ -234,25 +232,6 @@ def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 
         phases_s={},
         picture_step=2,
     )
-
-
-@pytest.mark.parametrize("areas", [(), (5.0,), (1.0, 20.5, 60.0)])
-def test_a_curve_is_drawn_with_every_point_and_limit(areas):
-    drawn = ET.fromstring(charts.curve(fruit(areas=areas), Locale("de")))
-    circles = [each for each in drawn.iter() if each.tag.endswith("circle")]
-    assert len(circles) == len(areas)
-    assert drawn.get("role") == "img"
-    assert [each.get("class") for each in circles] == ["mark-doubtful", "mark-point", "mark-point"][: len(areas)]
-    assert "60,0" in drawn.attrib["aria-label"]
-    assert all(0 <= float(each.attrib["cy"]) <= 290 for each in circles)
-
-
-def test_a_trend_counts_tens():
-    outcomes: list[OutcomeName] = ["PASS", "PASS", "FAIL", "FAIL", "NO_RESULT"]
-    outcomes.extend(outcomes[0] for _ in range(19))
-    many = [fruit(outcome).short for outcome in outcomes]
-    drawn = ET.fromstring(charts.trend(many, Locale("en")))
-    assert drawn.attrib["aria-label"].endswith("0, 3")
 
 
 def test_nothing_is_fetched_from_outside():

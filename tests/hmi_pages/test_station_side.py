@@ -1,4 +1,4 @@
-"""What the station does for the pages, without a browser: jobs, the worker, forms, charts."""
+"""What the station does for the pages, without a browser: jobs, the worker, shipped recipes."""
 
 import asyncio
 import sys
@@ -10,11 +10,7 @@ from typing import Any
 
 import psutil
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from hmi.recipes.form import BadFieldError, changed, formatted, groups
-from hmi.recipes.strip import strip
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
@@ -132,28 +128,3 @@ def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: 
     assert shipped.own_folder == str(own)
     own.mkdir()
     assert asyncio.run(told(own)).editable
-
-
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_a_form_sent_back_as_it_was_shown_changes_nothing(decimal: str) -> None:
-    for recipe in load_recipes().values():
-        values = recipe.model_dump(mode="json")
-        form = {field.path: formatted(field, decimal) for group in groups(values) for field in group.fields}
-        assert changed(values, form) == {}
-
-
-def test_a_form_tells_numbers_lists_and_nothing_apart() -> None:
-    values = load_recipes()["strawberry"].model_dump(mode="json")
-    typed = {"steps.result_closings_mm": "3; 4,5", "steps.start_width_mm": "", "damage.area[0].area_mm2": " 99,5 "}
-    assert changed(values, typed) == {"steps.result_closings_mm": [3, 4.5], "damage.area[0].area_mm2": 99.5}
-    for path, text in (("damage.area[0].area_mm2", "nan"), ("steps.number", "many"), ("steps.start", "middle")):
-        with pytest.raises(BadFieldError):
-            changed(values, {path: text})
-
-
-@given(st.lists(st.tuples(st.sampled_from(["pass", "fail"]), st.floats(0, 1e4)), max_size=40), st.floats(0, 1e4))
-def test_a_strip_shows_every_fruit_on_its_side_of_the_limit(values: Any, limit: float) -> None:
-    drawn = strip(values, [("limit", limit)])
-    assert len(drawn.dots) == len(values)
-    for (_, value), (_, x, _) in zip(values, drawn.dots, strict=True):
-        assert (x - drawn.lines[0].x) * (value - limit) >= 0

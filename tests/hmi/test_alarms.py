@@ -1,0 +1,46 @@
+"""The alarms page in a real browser."""
+
+import re
+
+import pytest
+
+
+@pytest.mark.timeout(240)
+def test_the_life_of_an_alarm(ready, operator, eventually):
+    ready.twin(do="set", device="camera", fault="off")
+    try:
+        operator.open("/alarms")
+        operator.until(".alarm-line", "tactile camera gives no frames")
+        alarm = operator.page.locator(".alarm", has_text="tactile camera gives no frames")
+        assert "not acknowledged" in alarm.inner_text()
+        alarm.get_by_role("button", name="Acknowledge").click()
+        operator.until(".alarm", "acknowledged · since")
+        ready.until(lambda state: [a.state for a in state.alarms if a.alarm == "camera_lost"] == ["acknowledged"])
+        operator.page.locator(".alarm", has_text="camera").get_by_role("link", name="Details").click()
+        assert "Check the camera's cable" in operator.text("article")
+        assert "Triggers are refused" in operator.text("article")
+        for width, height in ((390, 844), (1280, 800)):
+            operator.page.set_viewport_size({"width": width, "height": height})
+            assert operator.overflow() <= 0
+        operator.page.locator("input[name=for_s][value='3600']").check(force=True)
+        operator.hold(".shelve-form [data-hold]")
+        operator.until("h2", "Shelved")
+        assert "by Ana" in operator.text("main")
+        assert "camera" not in operator.text(".alarm-line")
+        operator.page.get_by_role("button", name="Show again").click()
+        operator.until(".alarm-line", "camera")
+    finally:
+        ready.twin(do="clear", device="camera")
+    operator.until(".alarm", "returned to normal, not acknowledged")
+    operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge").click()
+    ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
+    operator.page.locator("main").get_by_role("link", name="History").click()
+
+    def history():  # which is written behind
+        operator.page.reload()
+        rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
+        changes = [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows]
+        first = ["raised", "acknowledged", "shelved", "shown again"]
+        return changes[::-1][:4] == first and sorted(changes[::-1][4:]) == ["acknowledged", "returned to normal"]
+
+    eventually(history)

@@ -1,0 +1,78 @@
+"""Every page in a real browser: both sizes, accessibility, room for a finger, the cleaning lock."""
+
+import json
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+PAGES = (
+    "/",
+    "/change",
+    "/change/3",
+    "/change/progress",
+    "/alarms",
+    "/alarms/history",
+    "/people",
+    "/lot",
+    "/fruit/LAST",
+)
+TARGET_PX = 15 / 25.4 * (1280**2 + 800**2) ** 0.5 / 10.1
+TOO_SMALL = """(reach) => {
+  const controls = [...document.querySelectorAll("a[href], button, select, summary, label, input")];
+  const seen = controls.filter((each) => each.checkVisibility() && !each.matches(".skip, h2 a, input[type=hidden]"));
+  return seen.filter((each) => {
+    each.scrollIntoView({block: "center"});
+    const box = each.getBoundingClientRect();
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const caught = (dx, dy) => {
+      const hit = document.elementFromPoint(x + dx, y + dy);
+      return hit !== null && (each.contains(hit) || hit.contains(each) && hit.matches("label"));
+    };
+    return ![[-reach, 0], [reach, 0], [0, -reach], [0, reach]].every(([dx, dy]) => caught(dx, dy));
+  }).map((each) => each.outerHTML.slice(0, 90));
+}"""
+SIZES = ((1280, 800), (390, 844))
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_every_page_fits_and_is_accessible(ready, people, panel, size):
+    sequence = ready.end(ready.begin()).sequence
+    pages = [path.replace("LAST", str(sequence)) for path in PAGES]
+    shown = panel(width=size[0], height=size[1], locale="de-DE")
+    for path in pages:
+        shown.open(path)
+        assert shown.overflow() <= 0, f"{path}, nobody logged in"
+    shown.log_in("admin", "482915")
+    for path in pages:
+        shown.open(path)
+        assert shown.overflow() <= 0, path
+        found = Axe().run(shown.page)
+        serious = [
+            (each["id"], [node["target"] for node in each["nodes"]])
+            for each in found.response["violations"]
+            if each["impact"] in {"serious", "critical"}
+        ]
+        assert serious == [], f"{path}: {json.dumps(serious)}"
+
+
+@pytest.mark.timeout(240)
+def test_what_operators_touch_has_room_for_a_gloved_finger(ready, operator):
+    """15 mm on a 10.1" panel of 1280 x 800; where less is seen, the finger is caught beside it."""
+    ready.end(ready.begin())
+    for path in ("/", "/change", "/change/3", "/change/progress", "/alarms", "/lot", "/people"):
+        operator.open(path)
+        operator.page.locator("body:not(.stale)").wait_for()
+        assert operator.page.evaluate(TOO_SMALL, TARGET_PX / 2 - 1) == [], path
+
+
+@pytest.mark.timeout(120)
+def test_the_cleaning_lock_takes_no_touch_and_ends_by_itself(people, panel):
+    viewer = panel()
+    viewer.open("/people")
+    viewer.order("Lock for cleaning")
+    viewer.until("dialog", "Locked for cleaning")
+    viewer.page.keyboard.press("Escape")
+    assert viewer.page.locator("dialog").is_visible()
+    assert viewer.page.evaluate("document.elementFromPoint(200, 300).closest('dialog') !== null")
+    viewer.page.locator("dialog").wait_for(state="hidden")

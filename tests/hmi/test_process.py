@@ -1,0 +1,77 @@
+"""Open pages while the station or the pages' own process hangs or is killed."""
+
+import re
+import time
+
+import pytest
+
+
+@pytest.mark.timeout(240)
+def test_the_station_hangs_and_is_killed_under_an_open_page(ready, panel):
+    viewer = panel()
+    viewer.open("/")
+    viewer.until(".station-state", "Ready")
+    page_made = viewer.page.evaluate("document.body.dataset.made = 'once'")
+    hung = ready.process("service")
+    hung.suspend()
+    viewer.page.locator("body.stale").wait_for()
+    hung.kill()
+    assert re.search(r"No data for \d+ s", viewer.text(".stale-line"))
+    assert viewer.page.evaluate("document.querySelector('[data-live]').inert")
+    viewer.page.locator("body:not(.stale)").wait_for()
+    assert viewer.text(".stale-line") == ""
+    assert viewer.page.evaluate("document.body.dataset.made") == page_made, "it recovers without being loaded anew"
+    ready.choose("blueberry")
+    viewer.until(".station-state", "Blueberry")
+
+
+@pytest.mark.timeout(240)
+def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, operator, eventually):
+    ready.twin(do="fruit", kind="blueberry", seed=1, bruised=True)
+    soft = ready.end(ready.begin())
+    assert soft.outcome != "PASS", "only of others every image is kept"
+    lost = ready.begin()
+    operator.open("/")
+    operator.hold("[data-hold]:has-text('Stop')")
+    before = ready.until(lambda state: state.stopping)
+    ready.process("service").kill()
+
+    def stands(state):
+        return state.boot != before.boot and state.state == "stopped"
+
+    after = ready.until(stands)
+    assert after.stopping
+    counted = before.lot_counts.model_copy(update={"unjudged": before.lot_counts.unjudged + 1})
+    assert after.lot_counts == counted, "the fruit under way is counted with what became of it"
+    operator.until(".run-activity", "Stopped")
+    time.sleep(1.0)
+    assert stands(ready.state()), "it does not begin by itself"
+    operator.page.locator(f".tile[href='/fruit/{soft.sequence}']").click()
+    operator.until("h1", f"Fruit {soft.sequence}")
+    eventually(lambda: operator.page.locator(".fruit-picture").evaluate("picture => picture.naturalWidth") == 480)
+    assert operator.page.locator(".fruit-curve circle").count() > 1
+    operator.open("/")
+    operator.page.locator(f".tile[href='/fruit/{lost}']").click()
+    operator.page.wait_for_url(f"**/history/{lost}")
+    operator.until("main", "No result")
+    operator.open("/")
+    operator.page.get_by_role("button", name="Start").click()
+    ready.until(lambda state: state.ready)
+    operator.until(".run-activity", "Ready")
+
+
+@pytest.mark.timeout(240)
+def test_the_pages_are_killed_under_a_running_line(ready, panel):
+    viewer = panel()
+    viewer.open("/")
+    viewer.until(".station-state", "Ready")
+    sequence = ready.begin()
+    boot = viewer.page.evaluate("document.body.dataset.boot")
+    killed = ready.process("hmi")
+    killed.kill()
+    outcome = ready.end(sequence)
+    assert outcome.outcome in {"PASS", "FAIL"}, outcome
+    viewer.page.locator(f"body:not([data-boot='{boot}'])").wait_for()
+    viewer.page.locator("body:not(.stale)").wait_for()
+    viewer.until(".run-fruit .facts", f"Number\\s*{sequence}\\b")
+    assert ready.process("hmi").pid != killed.pid

@@ -1,0 +1,58 @@
+"""The run page's charts: every point and limit of the curve, and the trend of rejects."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from hmi.run import charts
+from hmi.web.translation import Locale
+from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView
+from station.vocabulary import OutcomeName
+
+
+def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 60.0)) -> Fruit:
+    short = FruitSummary(
+        sequence=7,
+        outcome=outcome,
+        reasons=("area_over_limit",),
+        ended_utc_ms=1_700_000_000_000,
+        duration_ms=8000,
+        recipe="blueberry",
+        lot="<L>",
+        area_mm2=60.0,
+        closing_mm=2.0,
+        areas_mm2=areas,
+    )
+    return Fruit(
+        short=short,
+        explanation=(),
+        recipe_title="Blueberry",
+        revision="1",
+        onset_mm=15.0,
+        curve=tuple(CurvePointSummary(closing_mm=float(n), area_mm2=a, flagged=n == 0) for n, a in enumerate(areas)),
+        limits=(LimitView(closing_mm=3.0, area_mm2=45.0, least_area_mm2=10.0),),
+        early_stop_mm2=50.0,
+        growth_mm2_per_mm=20.0,
+        deadline_s=100.0,
+        phases_s={},
+        picture_step=2,
+    )
+
+
+@pytest.mark.parametrize("areas", [(), (5.0,), (1.0, 20.5, 60.0)])
+def test_a_curve_is_drawn_with_every_point_and_limit(areas):
+    drawn = ET.fromstring(charts.curve(fruit(areas=areas), Locale("de")))
+    circles = [each for each in drawn.iter() if each.tag.endswith("circle")]
+    assert len(circles) == len(areas)
+    assert drawn.get("role") == "img"
+    assert [each.get("class") for each in circles] == ["mark-doubtful", "mark-point", "mark-point"][: len(areas)]
+    assert "60,0" in drawn.attrib["aria-label"]
+    assert all(0 <= float(each.attrib["cy"]) <= 290 for each in circles)
+
+
+def test_a_trend_counts_tens():
+    outcomes: list[OutcomeName] = ["PASS", "PASS", "FAIL", "FAIL", "NO_RESULT"]
+    outcomes.extend(outcomes[0] for _ in range(19))
+    many = [fruit(outcome).short for outcome in outcomes]
+    drawn = ET.fromstring(charts.trend(many, Locale("en")))
+    assert drawn.attrib["aria-label"].endswith("0, 3")

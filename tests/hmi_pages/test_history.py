@@ -1,0 +1,107 @@
+"""The history page in a real browser: search, one inspection, tables and reports."""
+
+import json
+import sqlite3
+from typing import Any
+
+import pytest
+from playwright.sync_api import expect
+
+from hmi.web.roles import Role
+from station.records.database import FILE_NAME, records_folder
+
+pytestmark = pytest.mark.timeout(400)
+
+OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+
+
+def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, panel: Any) -> None:
+    soft = orchard.soft
+    page = panel().go("/history")
+    page.get_by_label("Fruit number").fill(str(soft.sequence))
+    page.get_by_role("button", name="Search").click()
+    expect(page.get_by_role("heading", name=f"Fruit {soft.sequence}")).to_be_visible()
+    assert page.locator(".reasons li").count() == len(soft.reasons)
+    assert page.locator(".mark-point").count() >= 2
+    expect(page.get_by_text("fruit length 48.0 mm, class 3 (given by the PLC)")).to_be_visible()
+    page.locator(".steps a").nth(1).click()
+    expect(page.get_by_role("heading", name="Step 1")).to_be_visible()
+    pictures = page.locator(".stages img")
+    assert pictures.count() >= 8
+    sizes = pictures.evaluate_all("all => Promise.all(all.map(each => each.decode().then(() => each.naturalWidth)))")
+    assert all(size == 480 for size in sizes)
+
+
+def test_why_a_fruit_was_diverted_is_said_in_german(orchard: Any, panel: Any) -> None:
+    page = panel("", locale="de").go(f"/history/{orchard.soft.sequence}")
+    why = page.locator("section[aria-labelledby=why]")
+    expect(why).to_contain_text("mm Schließweg")
+    assert why.locator("[lang=en]").count() == 0
+
+
+def test_a_record_of_before_messages_is_shown_in_english_and_marked(
+    orchard: Any, panel: Any, api: Any, token_of: Any
+) -> None:
+    told, number = "The area at 3 mm of closing was over the limit.", orchard.fruit[0].sequence
+    database = sqlite3.connect(records_folder(orchard.home) / FILE_NAME, timeout=60)
+    (before,) = database.execute("SELECT explanation FROM inspections WHERE sequence = ?", (number,)).fetchone()
+    change = "UPDATE inspections SET explanation = ? WHERE sequence = ?"
+    try:
+        with database:
+            database.execute(change, (json.dumps([told]), number))
+        page = panel("", locale="de").go(f"/history/{number}")
+        expect(page.locator("section[aria-labelledby=why] p [lang=en]")).to_have_text(told)
+        whole = api("GET", f"/api/v1/inspections/{number}", token=token_of("before", Role.VIEWER)).body
+        assert whole["explanation"] == [told]
+        assert whole["messages"] == [{"id": "text.verbatim", "parameters": {"text": told}, "text": told}]
+    finally:
+        with database:
+            database.execute(change, (before, number))
+        database.close()
+
+
+def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orchard: Any, panel: Any) -> None:
+    page = panel(locale="de").go("/history")
+    page.locator("[name=number]").fill("4.711")
+    page.locator(".search .main, .search button").first.click()
+    expect(page.locator("main")).to_contain_text("es gibt keine Prüfung 4711; aufgezeichnet sind")
+    page = panel().go("/history")
+    page.locator("[name=number]").fill("fruit 7")
+    page.get_by_role("button", name="Search").click()
+    expect(page.get_by_role("alert")).to_contain_text("Invalid search")
+
+
+def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
+    page = panel().go("/history")
+    page.get_by_label("Recipe").select_option("strawberry")
+    page.get_by_role("button", name="Search").click()
+    shown = [int(text) for text in page.locator(".row-number").all_inner_texts()]
+    assert shown == [outcome.sequence for outcome in orchard.fruit][::-1][:20]
+    assert panel().go("/history?fruit=raspberry").locator(".row-number").count() == 0
+
+
+def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) -> None:
+    soft = orchard.soft
+    page = panel().go(f"/history?reason={soft.reasons[0]}")
+    shown = {int(text) for text in page.locator(".row-number").all_inner_texts()}
+    assert shown == {outcome.sequence for outcome in orchard.fruit if soft.reasons[0] in outcome.reasons}
+
+
+def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: Any) -> None:
+    person = panel("Quin")
+    page = person.go("/history?fruit=strawberry")
+    page.get_by_text("Tables and reports").click()
+    page.get_by_role("button", name="CSV").click()
+    expect(page.get_by_role("link", name="Save inspections.csv")).to_be_visible()
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate(OVERFLOW) == 0
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Save inspections.csv").click()
+    lines = download.value.path().read_text().splitlines()
+    assert len(lines) == 1 + len(orchard.fruit)
+    page = person.go("/history")
+    page.get_by_text("Tables and reports").click()
+    page.get_by_label("Report of lot").fill("LOT 1")
+    page.get_by_role("button", name="Printable report").click()
+    page.get_by_role("link", name="Open lot.html").click()
+    expect(page.get_by_text("Lot LOT 1").first).to_be_visible()

@@ -1,0 +1,106 @@
+"""The maintenance page in a real browser: jogging, live image, registers, verification."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from station.channel.panel_queries import AuditRows, ReadAudit
+
+pytestmark = pytest.mark.timeout(400)
+
+
+def audited(site: Any, action: str) -> list[Any]:
+    asked = ReadAudit(action=action)
+    return list(site.over_the_panel(lambda client: client.request(asked, AuditRows, deadline_s=20)).rows)
+
+
+def holding(page: Page, address: str) -> list[Any]:
+    """Keeps what a page asks for from being answered; gives what was asked."""
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    page.route(address, hold)
+    return held
+
+
+def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
+    orchard: Any, panel: Any, eventually: Callable[..., Any]
+) -> None:
+    person = panel("Max")
+    page = person.go("/maintenance/hand")
+    expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
+    page.get_by_label("Width, mm").fill("40")
+    page.get_by_role("button", name="Move", exact=True).click()
+    expect(page.get_by_text("The station is in mode 1")).to_be_visible()
+    eventually(lambda: [row for row in audited(orchard, "maintenance.jog") if row.who == "Max"])
+    page = person.go("/maintenance/hand")
+    page.get_by_role("button", name="Set manual mode").click()
+    expect(page.get_by_role("button", name="Back to production")).to_be_visible()
+    page.get_by_label("Width, mm").fill("40,4")
+    page.get_by_role("button", name="Move", exact=True).click()
+    told = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
+    expect(told).to_be_visible()
+    width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
+    assert abs(width_mm - 40.4) < 0.3
+    assert not orchard.state().ready
+    page.get_by_role("button", name="Open", exact=True).click()
+    expect(told).not_to_contain_text(f"{width_mm:.1f}")
+    page.get_by_role("button", name="Back to production").click()
+    expect(page.get_by_role("button", name="Set manual mode")).to_be_visible()
+    assert orchard.state().mode == 1
+
+
+def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, panel: Any) -> None:
+    person = panel()
+    page = person.go("/maintenance/image")
+    picture = page.locator(".live img")
+    first = picture.get_attribute("src")
+    expect(picture).not_to_have_attribute("src", first or "")
+    assert page.locator(".bars").count() == 3
+    page = person.go("/maintenance/registers")
+    row = page.locator("tr", has_text="reference_u16")
+    expect(row).to_contain_text("4660")
+    expect(page.locator("tr", has_text="packml_mode")).to_contain_text("production")
+
+
+def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/image")
+    asked: list[str] = []
+    held = holding(page, "**/maintenance/image/*.jpg")
+    page.on("request", lambda request: asked.append(request.url) if "/image/part" in request.url else None)
+    while not held:
+        page.wait_for_timeout(50)
+    before = len(asked)
+    page.wait_for_timeout(1500)  # seven times the pause between two
+    assert (len(asked), len(held)) == (before, 1), "the next is not asked for before this one was taken"
+    page.unroute("**/maintenance/image/*.jpg")  # which lets it go on
+    with page.expect_request("**/maintenance/image/part*"):
+        pass
+
+
+def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/registers")
+    holding(page, "**/maintenance/registers/part")
+    part = page.locator("[data-poll]")
+    expect(part).to_have_class(re.compile("old-part"))
+    assert re.search(r"No data for \d+ s", part.get_attribute("data-old") or "")
+    assert part.evaluate("part => part.inert")
+    assert page.locator("body:not(.stale)").count() == 1, "the station itself is heard"
+    page.unroute("**/maintenance/registers/part")
+    expect(part).not_to_have_class(re.compile("old-part"))
+    assert not part.evaluate("part => part.inert")
+
+
+def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, panel: Any) -> None:
+    person = panel("Max")
+    expect(person.go("/maintenance/sensor").get_by_text("set manual mode, 3, first")).to_be_visible()
+    with orchard.manual_mode():
+        page = person.go("/maintenance/sensor")
+        expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
+        assert page.get_by_role("button", name="Verify").count() == 0
+        assert page.get_by_text("None yet.").count() == 2
