@@ -3,9 +3,7 @@
 import hashlib
 import hmac
 import json
-import os
 import secrets
-import tempfile
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hmi.web.roles import Role
+from station.atomic_file import write_atomically
 from station.errors import BadInputError, StationError
 
 FILE_NAME = "api_tokens.json"
@@ -121,12 +120,8 @@ class ApiTokens:
     def _write(self, tokens: dict[str, Token]) -> None:
         try:
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, unfinished = tempfile.mkstemp(dir=self._path.parent, prefix=f".{FILE_NAME}.")  # 0600 by itself
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(_File(version=1, tokens=tokens).model_dump_json(indent=1))
-                file.flush()
-                os.fsync(file.fileno())
-            Path(unfinished).replace(self._path)
+            data = _File(version=1, tokens=tokens).model_dump_json(indent=1)
+            write_atomically(self._path, data.encode(), 0o600)
         except OSError as error:
             raise StationError(f"{self._path} cannot be written: {error.strerror}; make its folder writable") from error
         self._tokens, self._seen = tokens, None

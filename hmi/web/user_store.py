@@ -2,8 +2,6 @@
 
 import json
 import logging
-import os
-import tempfile
 import threading
 from collections.abc import Mapping
 from itertools import pairwise
@@ -14,6 +12,7 @@ from argon2.exceptions import InvalidHashError, VerificationError
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hmi.web.roles import Role
+from station.atomic_file import write_atomically
 from station.errors import StationError
 
 FILE_NAME = "people.json"
@@ -148,12 +147,7 @@ class UserStore:
         data = _File(version=1, people=people).model_dump_json(indent=1).encode()
         try:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle, unfinished = tempfile.mkstemp(dir=self.path.parent, prefix=f".{FILE_NAME}.")  # 0600 by itself
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(unfinished).replace(self.path)
+            write_atomically(self.path, data, 0o600)
         except OSError as error:
             raise UserStoreError("people.not_written", f"{self.path}: {error.strerror}") from error
         self._people = people

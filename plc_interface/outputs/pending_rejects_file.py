@@ -5,6 +5,8 @@ import logging
 from collections.abc import Mapping
 from pathlib import Path
 
+from station.atomic_file import write_atomically
+
 log = logging.getLogger(__name__)
 
 _RANGE = 2**32
@@ -19,7 +21,7 @@ class PendingRejectFile:
         Args:
             folder: the journal's.
         """
-        self._path, self._new = folder / "shots.json", folder / "shots.new"
+        self._path = folder / "shots.json"
 
     def read(self) -> dict[int, int]:
         """Return the counts at which flaps are to open, by sequence; none if the file is absent or damaged."""
@@ -43,7 +45,6 @@ class PendingRejectFile:
             counts: as `read` returns them.
         """
         try:
-            self._new.write_text(json.dumps(counts))
-            self._new.replace(self._path)
+            write_atomically(self._path, json.dumps(counts).encode())
         except OSError as error:
             log.error("the shots cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400

@@ -3,13 +3,13 @@
 import contextlib
 import fcntl
 import logging
-import os
 import time
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from plc_interface.handshake.journal import Journal
+from station.atomic_file import write_atomically
 from station.errors import BadInputError, StationError
 from station.messages import line as messages
 from station.messages.message import Message
@@ -70,12 +70,7 @@ class JournalFile:
             durable: wait for the disk, so that it outlives a loss of power too.
         """
         try:
-            with self._new.open("wb") as file:
-                file.write(journal.model_dump_json().encode())
-                if durable:
-                    file.flush()
-                    os.fsync(file.fileno())
-            self._new.replace(self._path)
+            write_atomically(self._path, journal.model_dump_json().encode(), durable=durable)
         except OSError as error:
             trouble = messages.JOURNAL_NOT_WRITTEN(file=str(self._path), error=str(error.strerror))
             if trouble != self.trouble:

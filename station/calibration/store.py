@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from station.atomic_file import sync_folder
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
 from station.calibration.model import Calibration, Refusal, Serial, Stamp, Stored, Verification
 from station.messages import calibration as messages
@@ -128,9 +129,9 @@ class CalibrationStore:
             unfinished.chmod(0o755)
             for file, data in {**files, RECORDS[kind]: record.model_dump_json(indent=1).encode()}.items():
                 _write(unfinished / file, data)
-            _sync(unfinished)
+            sync_folder(unfinished)
             unfinished.rename(folder / name)
-            _sync(folder)
+            sync_folder(folder)
         except OSError as error:
             if unfinished is not None:
                 shutil.rmtree(unfinished, ignore_errors=True)
@@ -174,11 +175,3 @@ def _write(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from station.atomic_file import write_atomically
 from station.settings.conduits import Zone
 from station.settings.configuration import load_configuration
 from station.settings.firewall import rules
@@ -105,16 +106,9 @@ def _text(file: Path) -> str:
 
 
 def _replace(file: Path, text: str) -> None:
-    unfinished = file.with_name(f".{file.name}.new")
     try:
         was = file.stat()
-        with unfinished.open("w", encoding="utf-8") as target:
-            os.fchmod(target.fileno(), was.st_mode & 0o7777)
-            if os.geteuid() == 0:
-                os.fchown(target.fileno(), was.st_uid, was.st_gid)
-            target.write(text)
-            target.flush()
-            os.fsync(target.fileno())
-        unfinished.replace(file)
+        owner = (was.st_uid, was.st_gid) if os.geteuid() == 0 else None
+        write_atomically(file, text.encode(), was.st_mode & 0o7777, owner=owner)
     except OSError as error:
         raise SettingsError([Problem(str(file), "file", f"cannot be written: {error.strerror}")]) from error

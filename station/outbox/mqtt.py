@@ -12,10 +12,10 @@ from pathlib import Path
 
 import aiomqtt
 
+from station.atomic_file import write_atomically
 from station.outbox.errors import OutboxError
 from station.outbox.feed import Batch, json_text
 from station.outbox.secrets import password
-from station.outbox.status import write_atomically
 from station.settings.outbox import OutboxMqttSettings
 
 log = logging.getLogger(__name__)
@@ -113,4 +113,5 @@ class Session:
                     pass
 
     def _keep(self, batch: Batch, position: int) -> None:
-        write_atomically(self._path, json.dumps({batch.lineage[0].id: position}))
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(self._path, json.dumps({batch.lineage[0].id: position}).encode())

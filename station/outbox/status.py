@@ -1,11 +1,12 @@
 """Outbox status, in a small file that the station's metrics are made from."""
 
 import json
-import os
 import time
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+
+from station.atomic_file import write_atomically
 
 FOLDER_NAME = "outbox"
 _FILE_NAME = "status.json"
@@ -49,7 +50,8 @@ def write_status(folder: Path, destinations: dict[str, DestinationStatus]) -> No
         OSError: it cannot be written.
     """
     status = OutboxStatus(utc_ms=time.time_ns() // 1_000_000, destinations=destinations)
-    write_atomically(folder / _FILE_NAME, status.model_dump_json())
+    folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(folder / _FILE_NAME, status.model_dump_json().encode())
 
 
 def read_status(folder: Path) -> OutboxStatus | None:
@@ -58,21 +60,3 @@ def read_status(folder: Path) -> OutboxStatus | None:
         return OutboxStatus.model_validate(json.loads((folder / _FILE_NAME).read_bytes()))
     except (OSError, ValueError, ValidationError):
         return None
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Write a file atomically.
-
-    Args:
-        path: its folder is made if missing.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    with partial.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)

@@ -1,19 +1,17 @@
 """Recipe files of a folder: reading, locking, and atomic writing with a backup."""
 
-import contextlib
 import fcntl
 import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from station.atomic_file import write_atomically
 from station.messages import recipes as messages
 from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
-from station.records.high_water_mark import sync_folder
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import check_recipes, recipe_files
 from station.settings.recipe_versions import parse_recipe
@@ -101,28 +99,12 @@ def write_back(path: Path, text: str, home: Path) -> Path | None:
             stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
             backup = home / BACKUPS / f"{path.stem}-{stamp}{path.suffix}"
             backup.parent.mkdir(parents=True, exist_ok=True)
-            _write(backup, path.read_bytes(), 0o644)
+            write_atomically(backup, path.read_bytes())
         mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
-        _write(path, text.encode(), mode)
+        write_atomically(path, text.encode(), mode)
     except OSError as error:
         raise _unwritable(path, error) from error
     return backup
-
-
-def _write(path: Path, data: bytes, mode: int) -> None:
-    handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(unfinished).chmod(mode)
-        Path(unfinished).replace(path)
-        sync_folder(path.parent)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(unfinished).unlink()
-        raise
 
 
 def _unwritable(path: Path, error: OSError) -> RecipeStoreError:

@@ -10,7 +10,7 @@ import zlib
 from pathlib import Path
 from typing import NamedTuple
 
-from station.records.high_water_mark import sync_folder
+from station.atomic_file import sync_folder
 
 FILE_NAME = "audit_head"
 log = logging.getLogger(__name__)

@@ -10,13 +10,14 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.audit import has_row, newer_head
 from station.records.audit_head import Head, read_head
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError
-from station.records.high_water_mark import LARGEST, HighWaterMark, sync_folder
+from station.records.high_water_mark import LARGEST, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.retention import forget_missing, referred
 from station.records.write_requests import utc_ms

@@ -15,10 +15,10 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool
 
+from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
-from station.records.high_water_mark import sync_folder
 
 FILE_NAME = "records.sqlite3"
 MIGRATIONS = Path(__file__).parent / "migrations"

@@ -8,6 +8,7 @@ import os
 import zlib
 from pathlib import Path
 
+from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.errors import SequenceError
 
@@ -71,19 +72,6 @@ class HighWaterMark:
         if fresh:
             sync_folder(self.path.parent)
         self.known, self._older = True, 1 - self._older
-
-
-def sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable.
-
-    Raises:
-        OSError: they may not be durable.
-    """
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _parsed(line: bytes) -> int | None:

@@ -4,7 +4,6 @@ import contextlib
 import hashlib
 import logging
 import math
-import os
 import queue
 import shutil
 import threading
@@ -16,9 +15,9 @@ from typing import Any, NamedTuple
 
 import cv2
 
+from station.atomic_file import PARTIAL, write_atomically
 from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
-from station.records.high_water_mark import sync_folder
 from station.records.model import Image
 from station.records.retention import forget_missing, referred, remove_oldest_images
 from station.records.write_requests import add_images
@@ -29,7 +28,6 @@ log = logging.getLogger(__name__)
 
 FOLDER_NAME = "images"
 MB = 1_000_000
-_PARTIAL = ".partial"
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 _RECORDED_S = 30.0
 """Longest wait for the writer; after it the images are dropped."""
@@ -164,17 +162,7 @@ class ImageStore:
         if path.exists():
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(_PARTIAL)
-        try:
-            with partial.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            partial.rename(path)
-        except OSError:
-            partial.unlink(missing_ok=True)
-            raise
-        sync_folder(path.parent)
+        write_atomically(path, content)
         self.size_bytes += len(content)
 
     def _make_space(self, needed_bytes: int, *, accepted: bool) -> None:
@@ -210,7 +198,7 @@ class ImageStore:
         for file in (self._folder / FOLDER_NAME).glob("*/*"):
             if file.suffix == ".png" and file.stem in wanted:
                 found.add(file.stem)
-            elif file.suffix in {_PARTIAL, ".png"}:
+            elif file.suffix in {PARTIAL, ".png"}:
                 file.unlink(missing_ok=True)
         missing = frozenset(wanted.keys() - found)
         if missing:

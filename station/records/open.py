@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, func, select
 
+from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.messages.message import Message
 from station.records.audit import continue_audit, newer_head
@@ -16,7 +17,7 @@ from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
-from station.records.high_water_mark import HighWaterMark, sync_folder
+from station.records.high_water_mark import HighWaterMark
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
 from station.records.write_requests import add_event, end_open_inspections

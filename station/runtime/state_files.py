@@ -1,10 +1,9 @@
 """State files of the home folder, written so that a crash leaves the old or the new content."""
 
-import contextlib
 import logging
-import os
-import tempfile
 from pathlib import Path
+
+from station.atomic_file import write_atomically
 
 log = logging.getLogger(__name__)
 
@@ -44,17 +43,7 @@ class StateFiles:
             return True
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    file.write(data)
-                    file.flush()
-                    os.fsync(file.fileno())
-                Path(unfinished).replace(path)
-            except OSError:
-                with contextlib.suppress(OSError):
-                    Path(unfinished).unlink()
-                raise
+            write_atomically(path, data, 0o600)
         except OSError as error:
             log.warning("%s cannot be written: %s", path, error.strerror)
             return False

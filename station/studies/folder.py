@@ -1,14 +1,12 @@
 """Study folder: each sample is stored atomically as soon as it is measured."""
 
-import contextlib
 import hashlib
-import os
-import tempfile
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 import station
+from station.atomic_file import write_atomically
 from station.errors import BadInputError, StationError
 from station.studies.sample import SampleResult, Task, segmentation_of
 
@@ -71,7 +69,7 @@ class StudyFolder:
                 raise BadInputError(f"{folder}: is not empty and holds no study; name a new folder with --out")
             self._samples.mkdir(parents=True, exist_ok=True)
             if not label.exists():
-                self._write(label, (identity.model_dump_json(indent=2) + "\n").encode())
+                write_atomically(label, (identity.model_dump_json(indent=2) + "\n").encode())
         except OSError as error:
             raise BadInputError(
                 f"{folder}: cannot be written: {error.strerror}; name another folder with --out"
@@ -125,7 +123,7 @@ class StudyFolder:
         """
         path = self.folder / name
         try:
-            self._write(path, data)
+            write_atomically(path, data)
         except OSError as error:
             raise StationError(
                 f"{path}: cannot be written: {error.strerror}; what was measured by then is kept: free space or mend "
@@ -134,18 +132,3 @@ class StudyFolder:
 
     def _place(self, number: int) -> Path:
         return self._samples / f"{number:05d}.json"
-
-    @staticmethod
-    def _write(path: Path, data: bytes) -> None:
-        descriptor, unfinished = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with open(descriptor, "wb") as file:  # noqa: PTH123 (a descriptor)
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(unfinished).chmod(0o644)
-            Path(unfinished).replace(path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(unfinished).unlink()
-            raise

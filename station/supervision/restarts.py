@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from station.atomic_file import write_atomically
+
 RESTARTS_VARIABLE = "SUPERVISOR_RESTARTS"
 
 log = logging.getLogger(__name__)
@@ -34,10 +36,8 @@ def publish(file: Path, programs: Mapping[str, Restarts]) -> None:
         file: in a folder of the supervisor's.
         programs: all of them by name.
     """
-    unfinished = file.with_suffix(".new")
     try:
-        unfinished.write_text(json.dumps(programs), encoding="utf-8")
-        unfinished.replace(file)
+        write_atomically(file, json.dumps(programs).encode(), durable=False)  # the counts end with the supervisor
     except OSError as error:
         log.warning("%s cannot be written: %s", file, error.strerror)
 
