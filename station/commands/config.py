@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from station.atomic_file import write_atomically
+from station.messages import settings as messages
 from station.settings.conduits import Zone
 from station.settings.configuration import load_configuration
 from station.settings.firewall import rules
 from station.settings.migration import migrated
 from station.settings.problems import Problem, SettingsError
-from station.settings.yaml_loader import LARGEST_FILE_BYTES
+from station.settings.yaml_loader import read_content
 
 _config = click.option(
     "--config",
@@ -68,7 +69,7 @@ def migrate(file: Path, *, write: bool) -> None:
 
     Comments stay. The file is replaced atomically, with its owner and permissions.
     """
-    changed = migrated(_text(file), str(file))
+    changed = migrated(read_content(file), str(file))
     for change in changed.changes:
         click.echo(f"{file}: {change}")
     if not changed.changes:
@@ -91,24 +92,11 @@ def firewall(config: Path | None, zones: dict[Zone, tuple[str, ...]], maintenanc
     click.echo(rules(load_configuration(config), zones, maintenance), nl=False)
 
 
-def _text(file: Path) -> str:
-    """Read a file's text, at most as long as the station reads."""
-    try:
-        with file.open("rb") as source:
-            content = source.read(LARGEST_FILE_BYTES + 1)
-        if len(content) > LARGEST_FILE_BYTES:
-            raise SettingsError([Problem(str(file), "file", f"expected at most {LARGEST_FILE_BYTES} bytes")])
-        return content.decode("utf-8-sig")
-    except OSError as error:
-        raise SettingsError([Problem(str(file), "file", f"cannot be read: {error.strerror}")]) from error
-    except UnicodeDecodeError as error:
-        raise SettingsError([Problem(str(file), "file", "expected UTF-8")]) from error
-
-
 def _replace(file: Path, text: str) -> None:
     try:
         was = file.stat()
         owner = (was.st_uid, was.st_gid) if os.geteuid() == 0 else None
         write_atomically(file, text.encode(), was.st_mode & 0o7777, owner=owner)
     except OSError as error:
-        raise SettingsError([Problem(str(file), "file", f"cannot be written: {error.strerror}")]) from error
+        expected = messages.UNWRITABLE(error=error.strerror or str(error))
+        raise SettingsError([Problem(messages.PATH(path=str(file)), messages.FILE(), expected)]) from error

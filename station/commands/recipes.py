@@ -16,10 +16,10 @@ from station.recipe_store.recipe_state import FileState, RecipeState
 from station.recipe_store.revision import Revision, Status
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
-from station.settings.problems import shortened
+from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import Recipe, check_recipes, recipe_files
 from station.settings.recipe_versions import content_sha256
-from station.settings.scalars import MeaningError, plain_scalar
+from station.settings.yaml_loader import parse_document
 
 Command = Callable[..., Any]
 
@@ -258,10 +258,10 @@ def _change(text: str) -> tuple[str, Any]:
     path, equals, value = text.partition("=")
     if not equals:
         raise BadInputError(f"--set {shortened(text)}: expected PATH=VALUE")
-    try:
-        return path.strip(), plain_scalar(value.strip())
-    except MeaningError as error:
-        raise BadInputError(f"--set {shortened(text)}: {error}") from error
+    read = parse_document(value.strip().encode(), f"--set {shortened(text)}")
+    if read.problems:
+        raise SettingsError(read.problems)
+    return path.strip(), read.value
 
 
 def _line(standing: RecipeState) -> str:

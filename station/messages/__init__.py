@@ -25,6 +25,7 @@ from station.messages import (
     reasons,
     recipes,
     records,
+    settings,
     states,
     whatif,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "reasons",
     "recipes",
     "records",
+    "settings",
     "states",
     "whatif",
 ]

@@ -71,7 +71,7 @@ class RecipeEditor:
             ConflictError: the file was changed since it was exported.
             RecipeStoreError: the file cannot be written.
         """
-        recipe = parse_recipe(text, "the recipe to import")
+        recipe = parse_recipe(text, "import.yaml")
         named = _BASE.search(text)
         base = base or (named[1] if named else "")
         body = _BASE.sub("", text, count=1)

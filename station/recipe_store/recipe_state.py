@@ -6,7 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from station.messages import recipes as messages
-from station.messages.message import Message, message_of, verbatim
+from station.messages.message import Message, message_of
 from station.recipe_store.difference import described_differences
 from station.recipe_store.revision import Revision, Status
 from station.settings.problems import Problem, SettingsError
@@ -106,7 +106,7 @@ def _recipe_state(
 def _no_file_note(name: str, broken: Sequence[Problem], control: Control | None) -> Message:
     if not broken:
         return messages.FILE_GONE(recipe=name, stays=_in_force(control))
-    problems = [verbatim(str(each)) for each in broken]
+    problems = [each.message for each in broken]
     return messages.FILE_BROKEN(problems=problems, stays=_in_force(control), recipe=name)
 
 

@@ -82,7 +82,7 @@ class Revision:
         Raises:
             SettingsError: this program does not accept it any more.
         """
-        return _parsed(self.text, f"{self.name} revision {self.revision}")
+        return _parsed(self.text, f"{self.name}@{self.revision}")
 
 
 @lru_cache(maxsize=256)

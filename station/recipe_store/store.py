@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from station.errors import BadInputError
 from station.messages import recipes as messages
-from station.messages.message import Message, verbatim
+from station.messages.message import Message
 from station.recipe_store.files import Folder, locked, read_folder
 from station.recipe_store.history import Person, approve, read_revisions, retire, store_approved, submit
 from station.recipe_store.recipe_state import RecipeState, ValidFile, recipe_states
@@ -46,7 +46,7 @@ class RecipeStore:
             folder = read_folder(self._folder)
         except SettingsError as error:
             folder = Folder((), {"": list(error.problems)}, error.problems)
-        problems = tuple(verbatim(str(each)) for each in folder.problems)
+        problems = tuple(each.message for each in folder.problems)
         return recipe_states(folder.found, folder.broken, self.history()), problems
 
     def signature(self) -> Hashable:

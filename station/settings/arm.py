@@ -5,7 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
+from station.settings.problems import FieldError
 
 PoseName = Literal["home", "above_nest", "nest", "accept", "reject"]
 """The places that the arm goes to."""
@@ -81,7 +83,7 @@ class Centring(Settings):
     @model_validator(mode="after")
     def _two_axes(self) -> Self:
         if self.image_right[1] == self.image_down[1]:
-            raise ValueError(f"image_right and image_down: expected two axes, got {self.image_right[1]} for both")
+            raise FieldError([((), messages.ONE_AXIS(axis=self.image_right[1]))])
         return self
 
     def in_tool_mm(self, right_mm: float, down_mm: float) -> tuple[float, float, float]:
@@ -285,9 +287,12 @@ class ArmSettings(Settings):
         braking_s = self.joint_speed_rad_s / self.stop_deceleration_rad_s2
         allowed_s = BRAKING_SHARE / self.watchdog_hz
         if braking_s > allowed_s:
-            raise ValueError(
-                f"braking from {self.joint_speed_rad_s:g} rad/s at {self.stop_deceleration_rad_s2:g} rad/s² takes "
-                f"{braking_s:.2f} s, and the watchdog at {self.watchdog_hz:g} Hz leaves {allowed_s:.2f} s: "
-                "lower joint_speed_rad_s, or raise stop_deceleration_rad_s2"
+            expected = messages.BRAKES_TOO_LONG(
+                speed=self.joint_speed_rad_s,
+                deceleration=self.stop_deceleration_rad_s2,
+                braking_s=braking_s,
+                watchdog_hz=self.watchdog_hz,
+                allowed_s=allowed_s,
             )
+            raise FieldError([((), expected)])
         return self

@@ -7,7 +7,9 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
+from station.settings.problems import FieldError
 
 EDS_FOLDER = Path(__file__).parent / "eds"
 """The nodes' electronic data sheets, common to the station and to the builder of a node."""
@@ -151,27 +153,19 @@ class CanSettings(Settings):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         if len({self.station_node, self.gate_node, self.encoder_node}) < 3:
-            raise ValueError("station_node, gate_node and encoder_node have to be three different node ids")
-        if self.heartbeat_lost_s < _FEWEST_BEATS * self.heartbeat_s:
-            raise ValueError(
-                f"heartbeat_lost_s is {self.heartbeat_lost_s:g} s and has to be at least twice heartbeat_s, "
-                f"{2 * self.heartbeat_s:g} s: one late beat must not stop the line"
-            )
-        if self.count_stale_s < _FEWEST_BEATS * self.encoder_period_s:
-            raise ValueError(
-                f"count_stale_s is {self.count_stale_s:g} s and has to be at least twice encoder_period_s, "
-                f"{2 * self.encoder_period_s:g} s: one late count must not stop the line"
-            )
+            raise FieldError([((), messages.NODES_NOT_DISTINCT())])
+        least_s = _FEWEST_BEATS * self.heartbeat_s
+        if self.heartbeat_lost_s < least_s:
+            expected = messages.HEARTBEAT_TOO_STRICT(limit_s=self.heartbeat_lost_s, least_s=least_s)
+            raise FieldError([(("heartbeat_lost_s",), expected)])
+        least_s = _FEWEST_BEATS * self.encoder_period_s
+        if self.count_stale_s < least_s:
+            expected = messages.COUNT_TOO_STRICT(limit_s=self.count_stale_s, least_s=least_s)
+            raise FieldError([(("count_stale_s",), expected)])
         if self.interface == "udp_multicast" and not _is_multicast(self.channel):
-            raise ValueError(
-                f"channel is {self.channel!r} and has to be a multicast address, such as 239.74.163.2, for the "
-                "interface udp_multicast"
-            )
+            raise FieldError([(("channel",), messages.NO_MULTICAST(channel=self.channel))])
         if self.interface == "socketcan" and not _INTERFACE_NAME.fullmatch(self.channel):
-            raise ValueError(
-                f"channel is {self.channel!r} and has to be the name of a network interface, such as can0, for the "
-                "interface socketcan"
-            )
+            raise FieldError([(("channel",), messages.NO_INTERFACE(channel=self.channel))])
         return self
 
 

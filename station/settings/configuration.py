@@ -8,6 +8,8 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.arm import ArmSettings
 from station.settings.calibration import CalibrationSettings
 from station.settings.camera import CameraSettings
@@ -21,7 +23,7 @@ from station.settings.network import Host
 from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
-from station.settings.problems import Contradiction, Problem, SettingsError, dotted
+from station.settings.problems import FieldError, Problem, SettingsError, dotted, field_name
 from station.settings.problems import Path as Where
 from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
@@ -102,14 +104,14 @@ class Configuration(Settings):
         }
         if self.modbus.tls.enabled:
             servers["modbus", "tls"] = (self.modbus.host, self.modbus.tls.port)
-        clashes: list[tuple[Where, str]] = [
-            ((*name, "port"), f"expected a port of its own, got {address[1]}, which {dotted(other)}.port is too")
+        clashes: list[tuple[Where, Message]] = [
+            ((*name, "port"), messages.PORT_TAKEN(port=address[1], other=dotted((*other, "port"))))
             for name, address in servers.items()
             for other in servers
             if other != name and servers[other] == address
         ]
         if clashes:
-            raise Contradiction(clashes)
+            raise FieldError(clashes)
         return self
 
 
@@ -135,11 +137,11 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
     for path, value in given.items():
         merged = _with(merged, path, value)
 
-    def locate(path: Where) -> tuple[str, str]:
+    def locate(path: Where) -> tuple[Message, Message]:
         name = named(path, given)
         if name:
-            return PLACE, name
-        return document.locate(path) if chosen else ("built-in default", dotted(path))
+            return PLACE, messages.FIELD(path=name)
+        return document.locate(path) if chosen else (messages.DEFAULT(), field_name(path))
 
     merged = _anchored(merged, document, given, chosen.parent if chosen else Path())
     document = replace(document, problems=(*problems, *document.problems))
@@ -152,7 +154,8 @@ def _file(file: Path | None, environ: Mapping[str, str]) -> Path | None:
         return file
     if CONFIG_VARIABLE in environ:
         if not environ[CONFIG_VARIABLE]:
-            raise SettingsError([Problem(PLACE, CONFIG_VARIABLE, "expected the path of a file, got nothing")])
+            expected = messages.EXPECTED(wanted=messages.FILE_PATH(), found=messages.NOTHING())
+            raise SettingsError([Problem(PLACE, messages.FIELD(path=CONFIG_VARIABLE), expected)])
         return Path(environ[CONFIG_VARIABLE])
     in_home = Path(environ.get(variable(("home",)), Configuration().home)) / FILE_NAME
     return in_home if os.path.lexists(in_home) else None

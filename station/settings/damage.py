@@ -6,8 +6,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.model import Settings, setting
-from station.settings.problems import Contradiction, Path
+from station.settings.problems import FieldError, Path
 
 LARGEST_AREA_MM2 = 260.0
 """No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
@@ -39,8 +41,8 @@ class AreaThreshold(Settings):
     @model_validator(mode="after")
     def _leaves_room(self) -> Self:
         if self.least_area_mm2 >= self.area_mm2:
-            text = f"expected less than area_mm2, {self.area_mm2:g} mm², got {self.least_area_mm2:g}"
-            raise Contradiction([(("least_area_mm2",), text)])
+            expected = messages.LESS_THAN(field="area_mm2", limit=self.area_mm2, unit=" mm²", value=self.least_area_mm2)
+            raise FieldError([(("least_area_mm2",), expected)])
         return self
 
 
@@ -58,8 +60,8 @@ class LengthRange(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.smallest_mm >= self.largest_mm:
-            text = f"expected less than largest_mm, {self.largest_mm:g} mm, got {self.smallest_mm:g}"
-            raise Contradiction([(("smallest_mm",), text)])
+            expected = messages.LESS_THAN(field="largest_mm", limit=self.largest_mm, unit=" mm", value=self.smallest_mm)
+            raise FieldError([(("smallest_mm",), expected)])
         return self
 
 
@@ -72,9 +74,8 @@ class RatioRange(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.smallest >= self.largest:
-            raise Contradiction(
-                [(("smallest",), f"expected less than largest, {self.largest:g}, got {self.smallest:g}")]
-            )
+            expected = messages.LESS_THAN(field="largest", limit=self.largest, unit="", value=self.smallest)
+            raise FieldError([(("smallest",), expected)])
         return self
 
 
@@ -146,22 +147,23 @@ class SizeOfFruit(Settings):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
+        wrong: list[tuple[Path, Message]] = []
         expected = self.expected_length
-        span = f"expected within expected_length, {expected.smallest_mm:g} to {expected.largest_mm:g} mm, got"
+        span = {"smallest_mm": expected.smallest_mm, "largest_mm": expected.largest_mm}
         if not expected.smallest_mm <= self.reference_mm <= expected.largest_mm:
-            wrong.append((("reference_mm",), f"{span} {self.reference_mm:g}"))
+            wrong.append((("reference_mm",), messages.LENGTH_UNEXPECTED(**span, value=self.reference_mm)))
         if self.judged_by == "class" and not self.classes:
-            wrong.append((("classes",), "expected the grader's classes, as from is 'class'"))
+            wrong.append((("classes",), messages.CLASSES_MISSING()))
         for index, each in enumerate(self.classes):
             if not expected.smallest_mm <= each.middle_mm <= expected.largest_mm:
-                wrong.append((("classes", index, "smallest_mm"), f"{span} a middle of {each.middle_mm:g}"))
+                middle = messages.MIDDLE_UNEXPECTED(**span, value=each.middle_mm)
+                wrong.append((("classes", index, "smallest_mm"), middle))
         for index, (before, after) in enumerate(pairwise(self.classes), start=1):
             if after.number <= before.number:
-                text = f"expected more than the class before, {before.number}, got {after.number}"
-                wrong.append((("classes", index, "number"), text))
+                rising = messages.CLASS_NOT_RISING(before=before.number, value=after.number)
+                wrong.append((("classes", index, "number"), rising))
         if wrong:
-            raise Contradiction(wrong)
+            raise FieldError(wrong)
         return self
 
 
@@ -209,13 +211,13 @@ class AreaUncertainty(Settings):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
+        wrong: list[tuple[Path, Message]] = []
         for index, (before, after) in enumerate(pairwise(self.repeatability), start=1):
             if after.closing_mm <= before.closing_mm:
-                text = f"expected more than the closing before, got {after.closing_mm:g}"
-                wrong.append((("repeatability", index, "closing_mm"), text))
+                expected = messages.CLOSING_NOT_RISING(value=after.closing_mm)
+                wrong.append((("repeatability", index, "closing_mm"), expected))
         if wrong:
-            raise Contradiction(wrong)
+            raise FieldError(wrong)
         return self
 
 
@@ -267,14 +269,13 @@ class DamageThresholds(Settings):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
+        wrong: list[tuple[Path, Message]] = []
         for index, (before, after) in enumerate(pairwise(self.area), start=1):
             if after.closing_mm <= before.closing_mm:
-                text = f"expected more than the threshold before, got {after.closing_mm:g}"
-                wrong.append((("area", index, "closing_mm"), text))
+                expected = messages.THRESHOLD_CLOSING_NOT_RISING(value=after.closing_mm)
+                wrong.append((("area", index, "closing_mm"), expected))
             if after.area_mm2 < before.area_mm2:
-                text = f"expected no less than the threshold before, got {after.area_mm2:g}"
-                wrong.append((("area", index, "area_mm2"), text))
+                wrong.append((("area", index, "area_mm2"), messages.THRESHOLD_FALLING(value=after.area_mm2)))
         if wrong:
-            raise Contradiction(wrong)
+            raise FieldError(wrong)
         return self

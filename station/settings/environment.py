@@ -4,14 +4,17 @@ import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.problems import Path, Problem, SettingsError, dotted, shortened
-from station.settings.schema import Leaf, Node, branches, expectation, formatted, leaves
+from station.settings.schema import Leaf, Node, branches, expectation, found, leaves
 from station.settings.yaml_loader import parse_document
 
 PREFIX = "STATION_"
 CONFIG_VARIABLE = "STATION_CONFIG"
 """Names the configuration file; no field of it."""
-PLACE = "environment"
+PLACE = messages.ENVIRONMENT()
+"""The place of their problems."""
 
 
 def variable(path: Path) -> str:
@@ -73,14 +76,14 @@ def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], 
         if not name.startswith(PREFIX) or name == CONFIG_VARIABLE:
             continue
         if name not in known:
-            problems.append(Problem(PLACE, shortened(name), _unknown(name, known)))
+            problems.append(Problem(PLACE, messages.FIELD(path=shortened(name)), _unknown(name, known)))
             continue
         leaf = known[name]
         try:
             values[leaf.path] = _value(environ[name], leaf.node, root)
         except SettingsError:
-            wanted = str(expectation(leaf.node, root))
-            problems.append(Problem(PLACE, name, f"expected {wanted}, got {formatted(environ[name])}"))
+            expected = messages.EXPECTED(wanted=expectation(leaf.node, root), found=found(environ[name]))
+            problems.append(Problem(PLACE, messages.FIELD(path=name), expected))
     return values, problems
 
 
@@ -92,14 +95,13 @@ def _value(text: str, node: Node, root: Node) -> Any:
         raise SettingsError([]) from error
     if any(branch.get("type") == "string" for branch in branches(node, root)):
         return text
-    document = parse_document(content, PLACE)
+    document = parse_document(content, PREFIX)
     if document.problems:
         raise SettingsError(document.problems)
     return document.value
 
 
-def _unknown(name: str, known: Iterable[str]) -> str:
+def _unknown(name: str, known: Iterable[str]) -> Message:
     """Describe an unknown variable, with similar known ones."""
     near = difflib.get_close_matches(name.removeprefix(PREFIX), [each.removeprefix(PREFIX) for each in known], n=1)
-    hint = f"did you mean {PREFIX}{near[0]}?" if near else "see docs/configuration.md for those there are"
-    return f"unknown variable: {hint}"
+    return messages.UNKNOWN_VARIABLE_NEAR(near=PREFIX + near[0]) if near else messages.UNKNOWN_VARIABLE()

@@ -4,7 +4,9 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
+from station.settings.problems import FieldError
 
 
 class GripperCalibration(Settings):
@@ -45,10 +47,8 @@ class GripperCalibration(Settings):
     def _leaves_room(self) -> Self:
         stroke_mm = (self.closed_count - self.open_count) * self.mm_per_count
         if stroke_mm <= self.finger_offset_mm:
-            raise ValueError(
-                f"the fingers take {self.finger_offset_mm} mm of an opening of {stroke_mm:.1f} mm and leave no room: "
-                "check finger_offset_mm, mm_per_count and the two counts"
-            )
+            expected = messages.NO_STROKE_LEFT(taken_mm=self.finger_offset_mm, stroke_mm=stroke_mm)
+            raise FieldError([((), expected)])
         return self
 
 

@@ -6,10 +6,12 @@ from typing import Literal, Self, get_args
 from pydantic import model_validator
 
 from station.errors import BadInputError
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
 from station.settings.network import Host
 from station.settings.paths import File
 from station.settings.plc import LONGEST_SOCKET_PATH
+from station.settings.problems import FieldError
 
 Language = Literal["en", "de", "es"]
 """All languages of the pages; `./run messages` makes the catalogues of a new one."""
@@ -33,7 +35,7 @@ class HmiTlsSettings(Settings):
     def _has_its_files(self) -> Self:
         missing = [name for name in ("certificate", "key") if getattr(self, name) is None]
         if self.enabled and missing:
-            raise ValueError(f"TLS is enabled without {', '.join(missing)}: name the PEM files or set enabled: false")
+            raise FieldError([((), messages.TLS_WITHOUT_FILES(files=", ".join(missing)))])
         return self
 
 

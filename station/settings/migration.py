@@ -1,14 +1,10 @@
 """Migration of a `station.yaml` from an earlier version, with its comments."""
 
-import io
 from typing import Any, NamedTuple
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
-from station.settings.problems import Problem, SettingsError, dotted
-
-_WIDE = 4096
+from station.messages import settings as messages
+from station.settings.commented_text import CommentedText
+from station.settings.problems import Problem, SettingsError, dotted, field_name
 
 
 class Move(NamedTuple):
@@ -25,37 +21,27 @@ class Migrated(NamedTuple):
     """A migrated configuration."""
 
     text: str
+    """Empty without changes."""
     changes: tuple[str, ...]
-    """The changes, one sentence each; empty for an unchanged text."""
+    """The changes, one sentence each."""
 
 
-def migrated(text: str, source: str) -> Migrated:
+def migrated(content: bytes, source: str) -> Migrated:
     """Move the settings of an earlier version to their new places. Idempotent.
 
     Args:
-        text: the file's; `load_configuration` validates its values.
+        content: the file's; `load_configuration` validates its values.
         source: the file's name for messages.
 
     Raises:
         SettingsError: it is no YAML mapping, or a setting is in its old and in its new place.
     """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.width = _WIDE
-    try:
-        values = yaml.load(text)
-    except YAMLError as error:
-        raise SettingsError([Problem(source, "file", f"expected YAML: {str(error).splitlines()[0]}")]) from error
-    if values is None:
-        return Migrated(text, ())
-    if not isinstance(values, dict):
-        raise SettingsError([Problem(source, "file", "expected settings by their names")])
+    commented = CommentedText(content, source)
+    values = commented.values
+    if not isinstance(values, dict | None):
+        raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), messages.NO_NAMES())])
     changes = tuple(_moved(values, move, source) for move in MOVES if _section(values, move.old) is not None)
-    if not changes:
-        return Migrated(text, ())
-    written = io.StringIO()
-    yaml.dump(values, written)
-    return Migrated(written.getvalue(), changes)
+    return Migrated(commented.written() if changes else "", changes)
 
 
 def _section(values: Any, path: tuple[str, ...]) -> dict[str, Any] | None:
@@ -65,10 +51,11 @@ def _section(values: Any, path: tuple[str, ...]) -> dict[str, Any] | None:
     return values if isinstance(values, dict) and path[-1] in values else None
 
 
-def _moved(values: dict[str, Any], move: Move, source: str) -> str:
+def _moved(values: Any, move: Move, source: str) -> str:
     old, new = dotted(move.old), dotted(move.new)
     if _section(values, move.new) is not None:
-        raise SettingsError([Problem(source, old, f"is {new} now, which is there too: keep one of them, as {new}")])
+        place, field = messages.PATH(path=source), field_name(move.old)
+        raise SettingsError([Problem(place, field, messages.MOVED_TWICE(new=new))])
     section = _section(values, move.old)
     assert section is not None  # noqa: S101 (the caller has looked)
     value = section.pop(move.old[-1])

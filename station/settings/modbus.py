@@ -4,9 +4,11 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
 from station.settings.network import Host, Network
 from station.settings.paths import File
+from station.settings.problems import FieldError
 
 LOOPBACK = ("127.0.0.0/8", "::1/128")
 
@@ -42,7 +44,7 @@ class ModbusTlsSettings(Settings):
     def _has_its_files(self) -> Self:
         missing = [name for name in ("certificate", "key", "client_authority") if getattr(self, name) is None]
         if self.enabled and missing:
-            raise ValueError(f"TLS is enabled without {', '.join(missing)}: name the PEM files or set enabled: false")
+            raise FieldError([((), messages.TLS_WITHOUT_FILES(files=", ".join(missing)))])
         return self
 
 

@@ -6,6 +6,9 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
+from station.messages import settings as messages
+from station.settings.problems import WantedError
+
 _HOST_NAME = re.compile(r"(?=.{1,253}$)(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
 
 
@@ -15,7 +18,7 @@ def _host(text: str) -> str:
         ipaddress.ip_address(text)
     except ValueError:
         if not _HOST_NAME.fullmatch(text) or re.fullmatch(r"[0-9.]+", text):
-            raise ValueError("expected an IP address or a host's name") from None
+            raise WantedError(messages.HOST()) from None
     return text
 
 
@@ -24,7 +27,7 @@ def _network(text: str) -> str:
     try:
         ipaddress.ip_network(text)
     except ValueError:
-        raise ValueError("expected an IP address or a network such as 192.168.1.0/24, without host bits") from None
+        raise WantedError(messages.NETWORK()) from None
     return text
 
 

@@ -4,9 +4,11 @@ from typing import Literal
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
 from station.settings.network import Host
 from station.settings.paths import File
+from station.settings.problems import FieldError
 
 
 class OutboxPostgresqlSettings(Settings):
@@ -104,5 +106,5 @@ class OutboxSettings(Settings):
     @model_validator(mode="after")
     def _has_a_user(self) -> "OutboxSettings":
         if self.mqtt.password_file is not None and self.mqtt.user is None:
-            raise ValueError("mqtt.password_file is given without mqtt.user: name the user that it is of")
+            raise FieldError([((), messages.PASSWORD_WITHOUT_USER())])
         return self

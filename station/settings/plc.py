@@ -6,7 +6,9 @@ from typing import Self
 from pydantic import model_validator
 
 from station.errors import BadInputError
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
+from station.settings.problems import FieldError
 
 LONGEST_SOCKET_PATH = 107
 """Linux, unix(7): a socket's path with its closing NUL fits 108 bytes."""
@@ -87,10 +89,8 @@ class HandshakeSettings(Settings):
     @model_validator(mode="after")
     def _beats_fit(self) -> Self:
         if self.station_lost_after_s < 3 * self.beat_period_s:
-            raise ValueError(
-                f"station_lost_after_s is {self.station_lost_after_s:g} s, and beats come every "
-                f"{self.beat_period_s:g} s: expected at least three beats, so that one lost beat is no lost station"
-            )
+            expected = messages.TOO_FEW_BEATS(limit_s=self.station_lost_after_s, period_s=self.beat_period_s)
+            raise FieldError([((), expected)])
         return self
 
 

@@ -4,21 +4,23 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from station.errors import BadInputError
+from station.messages import settings as messages
+from station.messages.message import Message
 
+MOST_PROBLEMS = 50
 Path = tuple[str | int, ...]
 """Path of a value in nested mappings and lists: keys and positions, outermost first."""
 
 
 def dotted(path: Path) -> str:
-    """Return a path for a message: `steps.result_closings_mm[2]`, or `file` for the whole.
+    """Return a path for a message: `steps.result_closings_mm[2]`."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{shortened(part)}" for part in path)
+    return "".join(parts).removeprefix(".")
 
-    Args:
-        path: keys and positions.
-    """
-    text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{shortened(part)}" if text else shortened(part)
-    return text or "file"
+
+def field_name(path: Path) -> Message:
+    """Return the name of a value for a problem; of the empty path, the file's."""
+    return messages.FIELD(path=dotted(path)) if path else messages.FILE()
 
 
 def shortened(text: str, longest: int = 60) -> str:
@@ -35,25 +37,41 @@ def shortened(text: str, longest: int = 60) -> str:
 class Problem(NamedTuple):
     """One problem; its text is `place: field: what was expected`."""
 
-    place: str
-    field: str
-    expected: str
+    place: Message
+    field: Message
+    expected: Message
+
+    @property
+    def message(self) -> Message:
+        """The whole problem."""
+        return messages.PROBLEM(place=self.place, field=self.field, expected=self.expected)
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.field}: {self.expected}"
+        return str(self.message)
 
 
 class SettingsError(BadInputError):
-    """All problems of the settings, one per line."""
+    """All problems of the settings, one per line; of very many the first."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        if len(self.problems) > MOST_PROBLEMS:
+            more = Problem(self.problems[MOST_PROBLEMS].place, messages.FILE(), messages.MORE())
+            self.problems = (*self.problems[:MOST_PROBLEMS], more)
+        super().__init__(messages.PROBLEMS(problems=[problem.message for problem in self.problems]))
 
 
-class Contradiction(ValueError):  # noqa: N818 (pydantic's validators raise it; it reaches users as problems)
-    """Fields that are valid one by one and wrong together; each with its path in the model."""
+class WantedError(ValueError):
+    """A value that a field's validator refuses, with what it accepts."""
 
-    def __init__(self, parts: Iterable[tuple[Path, str]]) -> None:
+    def __init__(self, wanted: Message) -> None:
+        self.wanted = wanted
+        super().__init__(str(wanted))
+
+
+class FieldError(ValueError):
+    """Values that a model's validator refuses: the path of each inside the model, and what was expected."""
+
+    def __init__(self, parts: Iterable[tuple[Path, Message]]) -> None:
         self.parts = tuple(parts)
-        super().__init__("; ".join(f"{dotted(path)}: {text}" for path, text in self.parts))
+        super().__init__("; ".join(f"{dotted(path)}: {expected}" for path, expected in self.parts))

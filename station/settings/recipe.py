@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from station.errors import BadInputError
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.problems import Problem, SettingsError, shortened
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256, recipe_of
@@ -98,11 +100,14 @@ def recipe_files(folder: Path | None = None) -> list[Path]:
         files = sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES and path.name[0] != ".")
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        problem = Problem(shortened(str(folder), 1000), "folder", f"expected a folder of recipes: {reason.lower()}")
-        raise SettingsError([problem]) from error
+        raise _folder_error(folder, messages.NO_FOLDER(error=reason.lower())) from error
     if not files:
-        raise SettingsError([Problem(shortened(str(folder), 1000), "folder", "expected recipes (*.yaml), got none")])
+        raise _folder_error(folder, messages.NO_RECIPES())
     return files
+
+
+def _folder_error(folder: Path, expected: Message) -> SettingsError:
+    return SettingsError([Problem(messages.PATH(path=shortened(str(folder), 1000)), messages.FOLDER(), expected)])
 
 
 def shipped_folder() -> Path:
@@ -150,6 +155,6 @@ def check_recipes(files: Iterable[Path]) -> Checked:
             other = first.setdefault(value, path)
             if other != path:
                 clashing |= {other, path}
-                text = f"expected one recipe with {value}, but {shortened(str(other), 1000)} has it too"
-                problems.append(Problem(*read_document(path).locate((field,)), text))
+                expected = messages.RECIPE_TWICE(value=str(value), file=shortened(str(other), 1000))
+                problems.append(Problem(*read_document(path).locate((field,)), expected))
     return Checked({path: recipe for path, recipe in recipes.items() if path not in clashing}, tuple(problems))

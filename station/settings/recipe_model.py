@@ -4,22 +4,24 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.damage import LARGEST_AREA_MM2, DamageThresholds
 from station.settings.model import Settings, setting
-from station.settings.problems import Contradiction, Path
+from station.settings.problems import FieldError, Path, WantedError
 from station.settings.segmentation import Segmentation
 
 
 def _integer(value: object) -> object:
     """Refuse true and 1.0, which pydantic accepts for the choice 1, even if it is strict."""
     if type(value) is not int:
-        raise ValueError("expected 1")
+        raise ValueError  # the schema says what was expected
     return value
 
 
 def _printable(title: str) -> str:
     if not title.isprintable():
-        raise ValueError("expected printable characters: no control characters, none that turn the direction of text")
+        raise WantedError(messages.PRINTABLE())
     return title
 
 
@@ -36,9 +38,8 @@ class WidthRange(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.smallest_mm >= self.largest_mm:
-            raise Contradiction(
-                [(("smallest_mm",), f"expected less than largest_mm, {self.largest_mm:g} mm, got {self.smallest_mm:g}")]
-            )
+            expected = messages.LESS_THAN(field="largest_mm", limit=self.largest_mm, unit=" mm", value=self.smallest_mm)
+            raise FieldError([(("smallest_mm",), expected)])
         return self
 
 
@@ -106,26 +107,26 @@ class WidthSteps(Settings):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
+        wrong: list[tuple[Path, Message]] = []
         if self.start == "width" and self.start_width_mm is None:
-            wrong.append((("start_width_mm",), "expected a width, as start is 'width'"))
+            wrong.append((("start_width_mm",), messages.WIDTH_MISSING()))
         if self.start == "onset" and self.start_width_mm is not None:
-            wrong.append((("start_width_mm",), f"expected null, as start is 'onset', got {self.start_width_mm:g}"))
+            wrong.append((("start_width_mm",), messages.WIDTH_UNUSED(value=self.start_width_mm)))
         if self.start == "width" and self.measured == "while_closing":
-            wrong.append((("measured",), "expected 'at_rest', as start is 'width': the way to the limits is not known"))
+            wrong.append((("measured",), messages.AT_REST_ONLY()))
         if self.start_width_mm is not None and self.travel_mm > self.start_width_mm:
-            wrong.append((("number",), f"expected steps within the start width, got {self.travel_mm:g} mm of closing"))
+            wrong.append((("number",), messages.STEPS_BEYOND_WIDTH(travel_mm=self.travel_mm)))
         if self.travel_mm > self.closing_limit_mm:
-            limit = f"closing_limit_mm, {self.closing_limit_mm:g} mm"
-            wrong.append((("number",), f"expected steps within {limit}, got {self.travel_mm:g} mm of closing"))
+            expected = messages.STEPS_BEYOND_LIMIT(limit_mm=self.closing_limit_mm, travel_mm=self.travel_mm)
+            wrong.append((("number",), expected))
         for index, closing_mm in enumerate(self.result_closings_mm):
             place = ("result_closings_mm", index)
             if closing_mm > self.travel_mm:
-                wrong.append((place, f"expected within the steps, {self.travel_mm:g} mm, got {closing_mm:g}"))
+                wrong.append((place, messages.BEYOND_STEPS(travel_mm=self.travel_mm, value=closing_mm)))
             elif index and closing_mm <= self.result_closings_mm[index - 1]:
-                wrong.append((place, f"expected more than the closing before, got {closing_mm:g}"))
+                wrong.append((place, messages.CLOSING_NOT_RISING(value=closing_mm)))
         if wrong:
-            raise Contradiction(wrong)
+            raise FieldError(wrong)
         return self
 
 
@@ -260,19 +261,19 @@ class Recipe(Settings):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        wrong: list[tuple[Path, str]] = []
-        closings = ", ".join(f"{closing_mm:g}" for closing_mm in self.steps.result_closings_mm)
+        wrong: list[tuple[Path, Message]] = []
+        closings = [messages.CLOSING(closing_mm=each) for each in self.steps.result_closings_mm]
         for index, threshold in enumerate(self.damage.area):
             if threshold.closing_mm not in self.steps.result_closings_mm:
-                text = f"expected one of the results' closings ({closings}), got {threshold.closing_mm:g}"
-                wrong.append((("damage", "area", index, "closing_mm"), text))
+                expected = messages.NO_RESULT_CLOSING(closings=closings, value=threshold.closing_mm)
+                wrong.append((("damage", "area", index, "closing_mm"), expected))
         largest_mm2 = max(threshold.area_mm2 for threshold in self.damage.area)
         if self.early_stop.area_mm2 < largest_mm2:
-            text = f"expected no less than the largest damage threshold, {largest_mm2:g} mm², got"
-            wrong.append((("early_stop", "area_mm2"), f"{text} {self.early_stop.area_mm2:g}"))
+            expected = messages.STOP_BELOW_AREA(limit_mm2=largest_mm2, value=self.early_stop.area_mm2)
+            wrong.append((("early_stop", "area_mm2"), expected))
         if self.early_stop.growth_mm2_per_mm < self.damage.growth_mm2_per_mm:
-            text = f"expected no less than the damage threshold, {self.damage.growth_mm2_per_mm:g} mm²/mm, got"
-            wrong.append((("early_stop", "growth_mm2_per_mm"), f"{text} {self.early_stop.growth_mm2_per_mm:g}"))
+            limit, given = self.damage.growth_mm2_per_mm, self.early_stop.growth_mm2_per_mm
+            wrong.append((("early_stop", "growth_mm2_per_mm"), messages.STOP_BELOW_GROWTH(limit=limit, value=given)))
         if wrong:
-            raise Contradiction(wrong)
+            raise FieldError(wrong)
         return self

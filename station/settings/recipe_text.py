@@ -1,20 +1,17 @@
 """Edits of a recipe's YAML text by a program, with its comments retained."""
 
-import io
 import re
 from collections.abc import Mapping
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from station.errors import BadInputError
-from station.settings.problems import Problem, SettingsError, shortened
+from station.messages import settings as messages
+from station.settings.commented_text import CommentedText
+from station.settings.problems import shortened
 from station.settings.recipe_model import Recipe
-from station.settings.recipe_versions import SCHEMA_VERSION, parse_recipe, upgrade
+from station.settings.recipe_versions import parse_recipe, upgrade
 
 _PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d{1,3})\]|(\d{1,3})")
-_WIDE = 4096
 
 
 def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str, Recipe]:
@@ -28,11 +25,11 @@ def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str
     Raises:
         BadInputError: there is no such value, or the recipe would be invalid; all problems.
     """
-    yaml, values = _round_trip(text, source)
-    upgrade(values)
+    commented = _commented(text, source)
+    upgrade(commented.values)
     for path, value in changes.items():
-        _set(values, path, value)
-    changed = _dumped(yaml, values)
+        _set(commented.values, path, value)
+    changed = commented.written()
     return changed, parse_recipe(changed, source)
 
 
@@ -49,32 +46,18 @@ def upgraded_text(text: str, source: str) -> tuple[str, int] | None:
     Raises:
         BadInputError: it is no valid recipe of its version.
     """
-    yaml, values = _round_trip(text, source)
-    found = upgrade(values)
+    commented = _commented(text, source)
+    found = upgrade(commented.values)
     if found is None:
         return None
-    changed = _dumped(yaml, values)
-    parse_recipe(changed, f"{source} in form {SCHEMA_VERSION}")
+    changed = commented.written()
+    parse_recipe(changed, source)
     return changed, found
 
 
-def _round_trip(text: str, source: str) -> tuple[YAML, Any]:
+def _commented(text: str, source: str) -> CommentedText:
     parse_recipe(text, source)
-    yaml = YAML(typ="rt")
-    yaml.preserve_quotes = True
-    yaml.width = _WIDE
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    try:
-        return yaml, yaml.load(text)
-    except YAMLError as error:
-        message = f"expected text that can be changed with its comments kept: {shortened(str(error), 200)}"
-        raise SettingsError([Problem(source, "file", message)]) from error
-
-
-def _dumped(yaml: YAML, values: Any) -> str:
-    text = io.StringIO()
-    yaml.dump(values, text)
-    return text.getvalue()
+    return CommentedText(text.encode(), source, list_indent=2)
 
 
 def _set(values: Any, path: str, value: Any) -> None:
@@ -84,6 +67,4 @@ def _set(values: Any, path: str, value: Any) -> None:
             values = values[part]
         values[parts[-1]] = value  # one that no recipe has is refused with the whole
     except (KeyError, IndexError, TypeError):
-        raise BadInputError(
-            f"{shortened(path)}: expected the path of a value in the recipe's file, as damage.area[0].area_mm2"
-        ) from None
+        raise BadInputError(messages.NO_SUCH_VALUE(path=shortened(path))) from None

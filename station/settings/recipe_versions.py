@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import replace
 from typing import Any
 
+from station.messages import settings as messages
 from station.settings.problems import Problem
 from station.settings.recipe_model import Recipe
 from station.settings.validation import validated
@@ -46,11 +47,7 @@ def recipe_of(document: Document) -> Recipe:
     form = values.get("schema_version") if isinstance(values, dict) else None
     if isinstance(form, int) and form > SCHEMA_VERSION:
         place, field = document.locate(("schema_version",))
-        message = (
-            f"expected at most {SCHEMA_VERSION}, got {form} of a newer fruit-station: install that, or write the older "
-            "form"
-        )
-        problem = Problem(place, field, message)
+        problem = Problem(place, field, messages.NEWER_SCHEMA(known=SCHEMA_VERSION, found=form))
         document = replace(document, problems=(problem,), doubtful=frozenset({()}))
     if isinstance(values, dict) and not document.problems:
         upgrade(values)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from station.messages import expectations as messages
+from station.messages import settings
 from station.messages.message import Definition, Message
 from station.settings.problems import Path, shortened
 
@@ -238,22 +239,22 @@ def figure(value: float) -> str:
     return str(int(value)) if value == int(value) else f"{value:.6g}"
 
 
-def formatted(value: Any) -> str:
-    """Format a value for a message.
+def found(value: Any) -> Message:
+    """Describe a value that is not accepted.
 
     Args:
         value: anything that a document holds.
     """
     match value:
         case None:
-            return "nothing"
+            return settings.NOTHING()
         case bool():
-            return "true" if value else "false"
+            return settings.VALUE(value=str(value).lower())
         case str():
-            return f"'{shortened(value, 40)}'"
+            return settings.VALUE(value=f"'{shortened(value, 40)}'")
         case dict():
-            return "a mapping"
+            return settings.A_MAPPING()
         case list():
-            return f"a list of {len(value)}"
+            return settings.A_LIST(number=len(value))
         case _:
-            return str(value)
+            return settings.VALUE(value=str(value))

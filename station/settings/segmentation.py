@@ -4,8 +4,9 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
+from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.problems import Contradiction
+from station.settings.problems import FieldError
 
 
 class PaperParameters(Settings):
@@ -92,12 +93,12 @@ class PaperParameters(Settings):
     def _windows_have_a_centre(self) -> Self:
         """Refuse even windows: OpenCV silently takes the next odd one, and an even kernel shifts the mask."""
         even = [
-            ((name,), f"expected an odd side, got {side_px}")
+            ((name,), messages.EVEN_SIDE(side_px=side_px))
             for name in ("template_window_px", "search_window_px", "kernel_px")
             if (side_px := getattr(self, name)) % 2 == 0
         ]
         if even:
-            raise Contradiction(even)
+            raise FieldError(even)
         return self
 
 

@@ -1,4 +1,4 @@
-"""Validation of plain values as a settings model, with all problems as text."""
+"""Validation of plain values as a settings model, with all problems."""
 
 import difflib
 import json
@@ -9,15 +9,17 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from station.messages import settings as messages
+from station.messages.message import Message
 from station.settings.model import Settings
-from station.settings.problems import Contradiction, Problem, SettingsError, shortened
+from station.settings.problems import FieldError, Problem, SettingsError, WantedError, shortened
 from station.settings.problems import Path as Where
-from station.settings.schema import Node, expectation, find, formatted, names, schema_of
-from station.settings.yaml_loader import MOST_PROBLEMS, Document, read_document
+from station.settings.schema import Node, expectation, find, found, names, schema_of
+from station.settings.yaml_loader import Document, read_document
 
 Model = TypeVar("Model", bound=Settings)
 
-Locate = Callable[[Where], tuple[str, str]]
+Locate = Callable[[Where], tuple[Message, Message]]
 """Says where a value was written and what it is called there: `file:line` and `modbus.port`."""
 
 
@@ -48,90 +50,67 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
         SettingsError: all problems.
     """
     problems = list(document.problems)
-    if () in document.doubtful:
-        raise SettingsError(problems)
     try:
-        # As JSON, because strict pydantic then takes a list for a tuple and a text for an enumeration.
-        checked = model.model_validate_json(json.dumps(value))
+        if () not in document.doubtful:
+            # As JSON, because strict pydantic then takes a list for a tuple and a text for an enumeration.
+            checked = model.model_validate_json(json.dumps(value))
+            if not problems:
+                return checked
     except ValidationError as error:
         for details in error.errors():
-            if len(problems) > MOST_PROBLEMS:
-                break
             problems += _problems(details, value, schema_of(model), locate, document.doubtful)
-        raise SettingsError(_readable(sorted(dict.fromkeys(problems), key=_line))) from error
-    if problems:
-        raise SettingsError(problems)
-    return checked
-
-
-def _readable(problems: list[Problem]) -> list[Problem]:
-    """Limit the number of problems to a readable one."""
-    if len(problems) <= MOST_PROBLEMS:
-        return problems
-    more = Problem(problems[MOST_PROBLEMS].place, "file", "and more: mend these first")
-    return [*problems[:MOST_PROBLEMS], more]
+    raise SettingsError(sorted(dict.fromkeys(problems), key=_line))
 
 
 def _line(problem: Problem) -> int:
     """Return a problem's line, for sorting; 0 for none."""
-    line = problem.place.rpartition(":")[2]
-    return int(line) if line.isdecimal() else 0
+    line = problem.place.parameters.get("line")
+    return line if isinstance(line, int) else 0
 
 
 def _problems(
     details: ErrorDetails, value: Any, root: Node, locate: Locate, doubtful: frozenset[Where]
 ) -> list[Problem]:
     """Convert one error of pydantic to problems; none if the loader has reported it already."""
+    kind, given, context = details["type"], details["input"], details.get("ctx", {})
     path = _cleaned(details["loc"], value)
-    if details["type"] == "missing" and isinstance(path[-1], int):  # one complaint for a list that is too short
+    if kind == "missing" and isinstance(path[-1], int):  # one complaint for a list that is too short
         path = path[:-1]
     if any(path[: len(each)] == each for each in doubtful):
         return []
-    if details["type"] == "too_short" and len(details["input"]) >= details.get("ctx", {}).get("min_length", 0):
+    if kind == "too_short" and len(given) >= context.get("min_length", 0):
         return []  # pydantic counts the good items only; what is wrong with the others it says itself
-    cause = details.get("ctx", {}).get("error")
-    if isinstance(cause, Contradiction):
-        return [Problem(*locate(path + inner), text) for inner, text in cause.parts]
-    return [Problem(*locate(path), _difference(details, path, root, cause))]
+    cause = context.get("error")
+    if isinstance(cause, FieldError):
+        return [Problem(*locate(path + inner), expected) for inner, expected in cause.parts]
+    if kind == "extra_forbidden":
+        return [Problem(*locate(path), _unknown(str(path[-1]), names(root, path[:-1])))]
+    if isinstance(cause, WantedError):
+        wanted = cause.wanted
+    else:
+        node = find(root, path)
+        wanted = expectation(node, root) if node else messages.ANOTHER_VALUE(type=kind)
+    is_missing = kind == "missing" and not isinstance(given, list)
+    got = messages.NOTHING() if is_missing else found(given)
+    return [Problem(*locate(path), messages.EXPECTED(wanted=wanted, found=got))]
 
 
-def _cleaned(location: tuple[str | int, ...], value: Any) -> Where:
+def _cleaned(location: Where, value: Any) -> Where:
     """Return a path without the names of alternatives that pydantic inserts; the value may lack its last part."""
     path: list[str | int] = []
     for index, part in enumerate(location):
-        inside = _inside(value, part)
-        if inside is not None:
+        entries: dict[str | int, Any] = value if isinstance(value, dict) else {}
+        if isinstance(value, list):
+            entries = dict(enumerate(value))
+        if part in entries or (index == len(location) - 1 and isinstance(value, dict | list)):
             path.append(part)
-            value = inside[0]
-        elif index == len(location) - 1 and isinstance(value, dict | list):
-            path.append(part)
+            value = entries.get(part)
     return tuple(path)
 
 
-def _inside(value: Any, part: str | int) -> tuple[Any] | None:
-    """Return one entry or item, or None if there is none."""
-    if isinstance(value, dict) and part in value:
-        return (value[part],)
-    if isinstance(value, list) and isinstance(part, int) and part < len(value):
-        return (value[part],)
-    return None
-
-
-def _difference(details: ErrorDetails, path: Where, root: Node, cause: object) -> str:
-    """Describe the expected and the actual value."""
-    if details["type"] == "extra_forbidden":
-        return _unknown(str(path[-1]), names(root, path[:-1]))
-    node = find(root, path)
-    wanted = str(expectation(node, root)) if node else details["msg"]
-    if details["type"] == "missing" and not isinstance(details["input"], list):
-        return f"expected {wanted}, got nothing"
-    if cause is not None:
-        return f"{cause}, got {formatted(details['input'])}"
-    return f"expected {wanted}, got {formatted(details['input'])}"
-
-
-def _unknown(name: str, known: list[str]) -> str:
+def _unknown(name: str, known: list[str]) -> Message:
     """Describe an unknown key, with a similar known one or all of them."""
     near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"expected {', '.join(known)}"
-    return f"unknown key {shortened(name)}: {hint}"
+    if near:
+        return messages.UNKNOWN_KEY_NEAR(name=shortened(name), near=near[0])
+    return messages.UNKNOWN_KEY(name=shortened(name), known=", ".join(known))

@@ -28,8 +28,8 @@ from station.cli import cli
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
 from station.logs import configure_logging
-from station.messages import commands, recipes, records
-from station.messages.message import Message, definitions
+from station.messages import commands, recipes, records, settings
+from station.messages.message import VERBATIM, Message, definitions
 from station.messages.reasons import reason_message
 from station.settings.configuration import Configuration
 from station.supervision.serving import Server, listen
@@ -174,6 +174,9 @@ def test_a_refused_recipe_a_full_disk_and_a_jam_are_the_same_messages_everywhere
             recipe.write_text(json.dumps({**json.loads(recipe.read_text()), "plc_number": "three"}))
             refused = await proven(AlarmId.RECIPE_BROKEN, pages, log)
             assert recipes.FILE_BROKEN.id in refused.ids()
+            assert list(refused.ids()).count(settings.PROBLEM.id) == 1
+            assert VERBATIM.id not in refused.ids()
+            assert "erwartet: eine ganze Zahl von 1 bis 65535, gefunden: 'three'" in german(refused)
             done = await cell.line.order(CommandName.CHANGE_RECIPE, 9)
             assert commands.RECIPE_UNKNOWN.id in done.why.ids()
             assert re.search(r"\b9\b", german(done.why))

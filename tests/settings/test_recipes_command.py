@@ -51,7 +51,7 @@ def test_all_problems_of_all_files_and_the_good_ones_beside_them(station, small,
     assert done.stderr.splitlines() == [
         f"{bad}:10: steps.step_mm: expected a number from 0.4 to 5 mm, got 'x'",
         f"{bad}:16: gripper.force_n: expected a number from 20 to 235 N, got 0",
-        "none.yaml:1: file: expected a readable file: no such file or directory: is the name right?",
+        "none.yaml:1: file: expected a readable file: there is none with this name",
     ]
 
 

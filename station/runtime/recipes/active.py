@@ -106,7 +106,11 @@ class ActiveRecipes:
             self._take(stored.values())
             return
         self._audit_files(states)
-        self.problems = tuple(dict.fromkeys([*broken, *(each.note for each in states if each.note is not None)]))
+        notes = [each.note for each in states if each.note is not None]
+        enclosed = {
+            part for note in notes for parts in note.parameters.values() if isinstance(parts, tuple) for part in parts
+        }
+        self.problems = tuple(dict.fromkeys([*(each for each in broken if each not in enclosed), *notes]))
         gone = {each.name for each in states if each.file_state is FileState.MISSING}
         self._take(control for name, control in controls.items() if name not in gone)
         self._store_controls(controls)

@@ -60,7 +60,7 @@ class PanelPictures:
         if record.trigger.recipe is None:
             raise RecordsError(messages.NO_RECIPE(number=request.sequence), messages.OPEN_ANOTHER())
         try:
-            recipe = parse_recipe(record.trigger.recipe.text, f"the recipe of inspection {request.sequence}")
+            recipe = parse_recipe(record.trigger.recipe.text, f"inspection@{request.sequence}")
         except SettingsError as error:
             raise RecordsError(messages.UNKNOWN_RECIPE(), message_of(error)) from error
         reference = _picture(_stored(record, "reference", None))

@@ -86,7 +86,7 @@ def _full(
     if snapshot is None or judged is None or record.standing is None:
         return None
     try:
-        recipe = parse_recipe(snapshot.text, f"the recipe of inspection {sequence}")
+        recipe = parse_recipe(snapshot.text, f"inspection@{sequence}")
         limit_s = deadline_s(recipe)
     except StationError:  # of a form that this program does not take, or longer than this cell may take
         return None

@@ -1,0 +1,45 @@
+"""YAML text with its comments, for edits by a program: the loader's rules decide, ruamel.yaml writes."""
+
+import io
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from station.messages import settings as messages
+from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.yaml_loader import parse_document
+
+_WIDE = 4096
+
+
+class CommentedText:
+    """Values of a YAML text that are changed in place, and the text with them and its comments.
+
+    Args:
+        content: YAML that the loader accepts.
+        source: its name for messages.
+        list_indent: columns of a list's items behind their key.
+
+    Raises:
+        SettingsError: the loader's problems, or it cannot be written with its comments.
+    """
+
+    def __init__(self, content: bytes, source: str, *, list_indent: int = 0) -> None:
+        if problems := parse_document(content, source).problems:
+            raise SettingsError(problems)
+        self._yaml = YAML(typ="rt")
+        self._yaml.preserve_quotes = True
+        self._yaml.width = _WIDE
+        self._yaml.indent(mapping=2, sequence=2 + list_indent, offset=list_indent)
+        try:
+            self.values: Any = self._yaml.load(content.decode("utf-8-sig"))
+        except YAMLError as error:
+            expected = messages.NOT_EDITABLE(error=shortened(str(error), 200))
+            raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)]) from error
+
+    def written(self) -> str:
+        """Return the text with the values as they are now."""
+        text = io.StringIO()
+        self._yaml.dump(self.values, text)
+        return text.getvalue()
