@@ -215,7 +215,7 @@ class Line:
         now_ms = time.time_ns() // 1_000_000
         oldest = now_ms - round(1000 * (away_s if away else 1.0)) if waiting else None
         told = DestinationStatus(
-            connected=not away, told=0, refused=0, waiting=waiting, oldest_utc_ms=oldest, error="away" if away else ""
+            connected=not away, told=0, refused=0, waiting=waiting, oldest_utc_ms=oldest, error=None
         )
         return OutboxStatus(utc_ms=now_ms, destinations={"postgresql": told})
 

@@ -1,6 +1,8 @@
 """Outbox errors."""
 
 from station.errors import StationError
+from station.messages.message import Message
+from station.messages.outbox import FAULT
 
 
 class OutboxError(StationError):
@@ -11,5 +13,5 @@ class OutboxError(StationError):
         remedy: what a person has to do.
     """
 
-    def __init__(self, cause: str, remedy: str) -> None:
-        super().__init__(f"outbox: {cause}; {remedy}")
+    def __init__(self, cause: Message, remedy: Message) -> None:
+        super().__init__(FAULT(cause=cause, remedy=remedy))

@@ -13,6 +13,7 @@ from pathlib import Path
 import aiomqtt
 
 from station.atomic_file import write_atomically
+from station.messages import outbox as messages
 from station.outbox.errors import OutboxError
 from station.outbox.feed import Batch, json_text
 from station.outbox.secrets import password
@@ -65,9 +66,9 @@ class Mqtt:
                 yield Session(client, root, self._folder / "mqtt.json")
                 await client.publish(online, b"false", _AT_LEAST_ONCE, retain=True)
         except (aiomqtt.MqttError, OSError) as error:
-            raise OutboxError(
-                f"MQTT broker {settings.host}:{settings.port}: {error}", "see the broker and the outbox's settings"
-            ) from error
+            address = f"{settings.host}:{settings.port}"
+            cause = messages.UNREACHABLE(destination="MQTT", address=address, error=str(error))
+            raise OutboxError(cause, messages.SEE_SERVER()) from error
 
 
 class Session:

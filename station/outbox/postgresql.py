@@ -9,6 +9,7 @@ from typing import Any, LiteralString
 import psycopg
 from psycopg import AsyncConnection, sql
 
+from station.messages import outbox as messages
 from station.outbox.errors import OutboxError
 from station.outbox.feed import Batch, Event, json_text
 from station.outbox.secrets import password
@@ -89,15 +90,16 @@ class Postgresql:
                 await self._prepare(connection)
                 yield Session(self, connection, self._station)
         except psycopg.errors.UndefinedTable as error:
-            raise OutboxError(f"{place} has no tables of ours", "load deploy/postgresql/schema.sql there") from error
+            raise OutboxError(
+                messages.NO_TABLES(address=place), messages.LOAD(file="deploy/postgresql/schema.sql")
+            ) from error
         except psycopg.errors.InsufficientPrivilege as error:
-            raise OutboxError(
-                f"{place}: user {settings.user} may not write: {_first_line(error)}", "grant it the role fruit_station"
-            ) from error
+            cause = messages.NO_RIGHT(address=place, user=settings.user, error=_first_line(error))
+            raise OutboxError(cause, messages.GRANT_ROLE()) from error
         except (psycopg.Error, OSError) as error:
-            raise OutboxError(
-                f"{place} as {settings.user}: {_first_line(error)}", "see the server and the outbox's settings"
-            ) from error
+            address = f"{settings.user}@{place}"
+            cause = messages.UNREACHABLE(destination="PostgreSQL", address=address, error=_first_line(error))
+            raise OutboxError(cause, messages.SEE_SERVER()) from error
 
     async def _prepare(self, connection: AsyncConnection[Any]) -> None:
         found = await (await connection.execute("SELECT max(version) FROM schema_version")).fetchone()
@@ -105,13 +107,11 @@ class Postgresql:
             version = found and found[0]
             upgrade = f"deploy/postgresql/schema-{version}-to-{SCHEMA_VERSION}.sql"
             older = isinstance(version, int) and version < SCHEMA_VERSION
-            remedy = f"load {upgrade} there" if older else "bring this station to the version of the others"
-            raise OutboxError(f"the database's form is {version}, not {SCHEMA_VERSION}", remedy)
+            remedy = messages.LOAD(file=upgrade) if older else messages.UPDATE_STATION()
+            raise OutboxError(messages.OTHER_SCHEMA(found=str(version), expected=SCHEMA_VERSION), remedy)
         lock = "SELECT pg_try_advisory_lock(hashtextextended('fruit-station ' || %s, 0))"
         if await (await connection.execute(lock, (self._station,))).fetchone() != (True,):
-            raise OutboxError(
-                f"another process tells as {self._station}", "give each station a name of its own: outbox.station"
-            )
+            raise OutboxError(messages.NAME_TAKEN(station=self._station), messages.OWN_NAME())
         await connection.execute(
             "CREATE TEMP TABLE incoming (entry bigint, kind text, data jsonb) ON COMMIT DELETE ROWS"
         )

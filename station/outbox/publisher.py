@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Protocol
 
 from station.errors import StationError
+from station.messages import outbox as messages
+from station.messages.message import Message, message_of
 from station.outbox.feed import LARGEST_BATCH, Batch, read_batch
 from station.outbox.mqtt import Mqtt
 from station.outbox.postgresql import Postgresql
@@ -68,7 +70,8 @@ class Publisher:
         self._position: int | None = None
         self._waiting: int | None = None
         self._oldest_utc_ms: int | None = None
-        self._connected, self._error = False, "not yet connected"
+        self._connected = False
+        self._error: Message | None = messages.NOT_YET_CONNECTED()
         self._away_since_utc_ms: int | None = time.time_ns() // 1_000_000
 
     async def run(self) -> None:
@@ -83,7 +86,7 @@ class Publisher:
             except Exception as error:
                 if not isinstance(error, StationError):
                     log.exception("%s: a fault of the program", self.destination.name)
-                self._now(connected=False, error=f"{error}")
+                self._now(connected=False, error=message_of(error))
             await self._count_waiting()
             pause_s = min(self._longest_pause_s, FIRST_PAUSE_S * 2**tries)
             tries = min(tries + 1, 20)
@@ -133,7 +136,7 @@ class Publisher:
         self._position, self._waiting = position, batch.last - position
         self._oldest_utc_ms = batch.oldest_utc_ms
 
-    def _now(self, *, connected: bool, error: str = "") -> None:
+    def _now(self, *, connected: bool, error: Message | None = None) -> None:
         """Log a changed state, once."""
         if connected and not self._connected:
             log.info("%s: connected", self.destination.name)

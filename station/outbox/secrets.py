@@ -4,6 +4,7 @@ import os
 import stat
 from pathlib import Path
 
+from station.messages import outbox as messages
 from station.outbox.errors import OutboxError
 
 
@@ -21,10 +22,11 @@ def password(file: Path | None, variable: str) -> str | None:
         return os.environ.get(variable)
     try:
         if stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
-            raise OutboxError(f"{file}: others than its owner can read the password", f"chmod 600 {file}")
+            raise OutboxError(messages.PASSWORD_OPEN(file=str(file)), messages.CLOSE_PASSWORD(file=str(file)))
         lines = file.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise OutboxError(f"{file}: the password cannot be read: {error}", "name a text file that it is in") from error
+        cause = messages.PASSWORD_UNREADABLE(file=str(file), error=str(error))
+        raise OutboxError(cause, messages.NAME_PASSWORD_FILE()) from error
     if not lines or not lines[0]:
-        raise OutboxError(f"{file}: its first line is empty", "write the password there")
+        raise OutboxError(messages.PASSWORD_EMPTY(file=str(file)), messages.WRITE_PASSWORD())
     return lines[0]

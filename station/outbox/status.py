@@ -1,12 +1,12 @@
 """Outbox status, in a small file that the station's metrics are made from."""
 
-import json
 import time
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from station.atomic_file import write_atomically
+from station.messages.message import Message
 
 FOLDER_NAME = "outbox"
 _FILE_NAME = "status.json"
@@ -24,8 +24,8 @@ class DestinationStatus(BaseModel):
     """Entries not published to it yet; None before the first connection."""
     oldest_utc_ms: int | None
     """Time of the first of them."""
-    error: str
-    """Its fault now; empty for none."""
+    error: Message | None
+    """Its fault now."""
     away_since_utc_ms: int | None = None
     """Start of the fault."""
 
@@ -57,6 +57,6 @@ def write_status(folder: Path, destinations: dict[str, DestinationStatus]) -> No
 def read_status(folder: Path) -> OutboxStatus | None:
     """Read the last status; None if there is none that can be read."""
     try:
-        return OutboxStatus.model_validate(json.loads((folder / _FILE_NAME).read_bytes()))
-    except (OSError, ValueError, ValidationError):
+        return OutboxStatus.model_validate_json((folder / _FILE_NAME).read_bytes())
+    except (OSError, ValidationError):
         return None

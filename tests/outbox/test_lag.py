@@ -17,6 +17,7 @@ from station.records.audit import AuditEntry
 from station.runtime.station import Station
 from station.settings.configuration import load_configuration
 
+AWAY = messages.NOT_YET_CONNECTED()
 LIMIT_S = 90.0
 
 
@@ -100,7 +101,7 @@ def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in
     of = OutboxMonitor(configuration.outbox, home)
 
     def trouble(**values):
-        usual = {"connected": False, "told": 0, "refused": 0, "waiting": 0, "oldest_utc_ms": None, "error": "away"}
+        usual = {"connected": False, "told": 0, "refused": 0, "waiting": 0, "oldest_utc_ms": None, "error": AWAY}
         write_status(outbox_folder(home), {"postgresql": DestinationStatus(**{**usual, **values})})
         return of.alarm_detail()
 
@@ -111,13 +112,13 @@ def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in
     unknown = trouble(waiting=None, away_since_utc_ms=now_ms - 90_000)
     assert unknown is not None
     assert messages.WAITING_UNKNOWN.id in ids(unknown)
-    assert unknown.parameters["error"] == "away"
+    assert unknown.parameters["error"] == AWAY
     assert trouble(waiting=3, oldest_utc_ms=now_ms + 3_600_000) is None, "the clock was set back"
 
 
 def test_a_process_that_says_nothing_any_more_is_an_alarm_too(site, monkeypatch):
     configuration = site()
-    status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error="")
+    status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error=None)
     write_status(outbox_folder(configuration.home), {"postgresql": status})
     of = OutboxMonitor(configuration.outbox, configuration.home)
     assert of.alarm_detail() is None

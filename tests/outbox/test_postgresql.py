@@ -148,7 +148,7 @@ def test_a_connection_that_is_cut_while_there_is_nothing_to_tell_is_noticed(serv
 def test_two_processes_cannot_tell_as_one_station(server):
     async def steps():
         async with Postgresql(settings(server), "one").connected():
-            with pytest.raises(OutboxError, match=r"another process tells as one; give each station a name of its own"):
+            with pytest.raises(OutboxError, match="another process publishes as one; give each station a name"):
                 async with Postgresql(settings(server), "one").connected():
                     pass
 
@@ -158,7 +158,7 @@ def test_two_processes_cannot_tell_as_one_station(server):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"database": "postgres"}, "has no tables of ours; load deploy/postgresql/schema.sql there"),
+        ({"database": "postgres"}, "has no tables of the station; load deploy/postgresql/schema.sql there"),
         ({"host": "/nowhere"}, "see the server and the outbox's settings"),
         ({"user": "stranger"}, 'role "stranger" does not exist'),
     ],
@@ -205,14 +205,14 @@ def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_
                 async with Postgresql(settings(server, database="old"), "old").connected():
                     pass
 
-            with pytest.raises(OutboxError, match=f"the database's form is 1, not 2; load {remedy} there"):
+            with pytest.raises(OutboxError, match=f"the database's schema version is 1, not 2; load {remedy} there"):
                 asyncio.run(connect())
             old.execute((Path(__file__).resolve().parents[2] / remedy).read_bytes())
             asyncio.run(connect())
             upgraded = [old.execute(query).fetchall() for query in FORM]
             assert upgraded == new
             old.execute("UPDATE schema_version SET version = 3")
-            with pytest.raises(OutboxError, match="the database's form is 3, not 2; bring this station to the version"):
+            with pytest.raises(OutboxError, match="schema version is 3, not 2; bring this station to the version"):
                 asyncio.run(connect())
     finally:
         with server.connect() as owner:
