@@ -10,10 +10,10 @@ from station.atomic_file import write_atomically
 from station.messages import settings as messages
 from station.settings.conduits import Zone
 from station.settings.configuration import load_configuration
+from station.settings.file_content import read_content
 from station.settings.firewall import rules
 from station.settings.migration import migrated
 from station.settings.problems import Problem, SettingsError
-from station.settings.yaml_loader import read_content
 
 _config = click.option(
     "--config",

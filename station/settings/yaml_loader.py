@@ -5,7 +5,6 @@ PyYAML reads; it constructs no object. A plain word is accepted where YAML 1.1, 
 """
 
 import re
-import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,11 @@ from yaml.reader import ReaderError
 
 from station.messages import settings as messages
 from station.messages.message import Message
+from station.settings.file_content import read_content
 from station.settings.problems import Path as Where
-from station.settings.problems import Problem, SettingsError, field_name, shortened
+from station.settings.problems import Problem, field_name, shortened
 from station.settings.schema import found
 
-LARGEST_FILE_BYTES = 64 * 1024
 DEEPEST = 12
 MOST_VALUES = 10_000
 MOST_DIGITS = 18
@@ -65,33 +64,6 @@ def read_document(path: Path) -> Document:
         SettingsError: the file cannot be read. Problems of its content are in the document's `problems`.
     """
     return parse_document(read_content(path), shortened(str(path), 1000))
-
-
-def read_content(path: Path) -> bytes:
-    """Read the bytes of a file.
-
-    Args:
-        path: a regular file of at most `LARGEST_FILE_BYTES`, UTF-8, with or without a byte order mark.
-
-    Raises:
-        SettingsError: it cannot be read.
-    """
-    source = shortened(str(path), 1000)
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for its other end
-            raise SettingsError([_problem(source, 1, messages.NOT_A_FILE())])
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
-    except FileNotFoundError as error:
-        raise SettingsError([_problem(source, 1, messages.NOT_FOUND())]) from error
-    except PermissionError as error:
-        raise SettingsError([_problem(source, 1, messages.NOT_PERMITTED())]) from error
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise SettingsError([_problem(source, 1, messages.UNREADABLE(error=reason.lower()))]) from error
-    if len(content) > LARGEST_FILE_BYTES:
-        raise SettingsError([_problem(source, 1, messages.TOO_LARGE(limit_kib=LARGEST_FILE_BYTES // 1024))])
-    return content
 
 
 def parse_document(content: bytes, source: str) -> Document:
