@@ -34,7 +34,7 @@ class CommentedText:
         self._yaml.indent(mapping=2, sequence=2 + list_indent, offset=list_indent)
         try:
             self.values: Any = self._yaml.load(content.decode("utf-8-sig"))
-        except YAMLError as error:
+        except (YAMLError, ValueError) as error:  # it takes `.` and `_` for numbers
             expected = messages.NOT_EDITABLE(error=shortened(str(error), 200))
             raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)]) from error
 
