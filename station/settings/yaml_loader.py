@@ -31,6 +31,7 @@ _ALIKE = {
 }
 """Words of each kind of PyYAML's that mean the same in both versions."""
 _NUMBER_OF_1_2 = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|0o[0-7]+")
+_BREAK_OF_1_1 = re.compile("[\x85\u2028\u2029]")
 _HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 
 
@@ -116,6 +117,8 @@ class _Reader(yaml.SafeLoader):
     """PyYAML's nodes as plain values, with their lines and problems."""
 
     def __init__(self, text: str) -> None:
+        if other := _BREAK_OF_1_1.search(text):
+            raise _RefusedError(text.count("\n", 0, other.start()) + 1, messages.NOT_PRINTABLE())
         super().__init__(text)
         self.lines: dict[Where, int] = {}
         self.found: list[tuple[Where, int, Message]] = []
