@@ -31,8 +31,9 @@ from measurement.soft_table import soft_table
 from measurement.untouched import untouched_table
 
 from station.settings.segmentation import RobustParameters
-from station.vision.contact import Contact, Flag, Image, Mask
+from station.vision.contact import Contact, Image, Mask
 from station.vision.robust import RobustMethod
+from station.vocabulary import Flag
 
 ROOT = Path(__file__).resolve().parents[1]
 SIGMA_PIXEL, SIGMA_COLUMN, SIGMA_ROW, SIGMA_OFFSET = (3.1, 1.8, 2.5), (1.8, 1.3, 2.6), 1.0, 1.5

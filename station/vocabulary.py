@@ -1,4 +1,4 @@
-"""Names shared by the domain, the wire and the records: reasons, refusals, PackML states."""
+"""Names shared by the domain, the wire and the records: reasons, flags, refusals, PackML states."""
 
 from enum import StrEnum
 from typing import Literal
@@ -35,6 +35,25 @@ class Reason(StrEnum):
     """The area or its growth is nearer to a limit than the measurement is certain."""
     SIZE_UNKNOWN = "size_unknown"
     """The recipe needs the fruit's size, and it is missing, impossible, or length and class contradict each other."""
+
+
+class Flag(StrEnum):
+    """Flag of a measured area: what a reader of it has to know."""
+
+    NO_CONTACT = "no_contact"
+    """Nothing touches the gel: the area is 0."""
+    UNDECIDED = "undecided"
+    """Something bends the gel, but no edge was found: the area is given as 0 and is unknown."""
+    CUT_BY_BORDER = "cut_by_border"
+    """The contact reaches the image's border: the area is a lower bound."""
+    LOWER_BOUND = "lower_bound"
+    """The edge was lost where the press so far had it: the contact is at least as large as this area."""
+    SATURATED = "saturated"
+    """Much of the contact is at the end of the grey scale: its edge may lie elsewhere."""
+    LOW_CONFIDENCE = "low_confidence"
+    """The confidence is below what the recipe asks for."""
+    REFERENCE_MISMATCH = "reference_mismatch"
+    """The frame differs from its reference by more than contact and drift explain: take a new reference."""
 
 
 class Refusal(StrEnum):

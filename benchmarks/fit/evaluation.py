@@ -13,9 +13,10 @@ from fit.parts import Group
 from station.settings.segmentation import RobustParameters
 from station.twin.gel import MM_PER_PX
 from station.vision.constants import CONSTANTS, Constants
-from station.vision.contact import Contact, Flag
+from station.vision.contact import Contact
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
+from station.vocabulary import Flag
 
 LARGE_ERROR = 0.25
 LEAST_MM2 = 2.0

@@ -7,10 +7,10 @@ from measurement.peers import PEER, contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.contact import Pose
 from station.twin.digit.press import PressOptions
-from station.vision.contact import Flag
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
+from station.vocabulary import Flag
 
 CLOSINGS_MM = (0.8, 1.2, 2.5, 5.0, 7.0)
 BORDER_SEED = 44000

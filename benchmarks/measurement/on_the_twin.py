@@ -16,11 +16,12 @@ from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
-from station.vision.contact import Flag, Image
+from station.vision.contact import Image
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
 from station.vision.working import working_image
+from station.vocabulary import Flag
 
 CLOSINGS_MM = (0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.8, 2.5, 3.5, 5.0, 7.0)
 PEER_CLOSINGS_MM = (0.0, 0.4, 1.2, 2.5, 5.0)

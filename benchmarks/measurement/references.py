@@ -8,9 +8,10 @@ import numpy as np
 
 from measurement import soft_bodies
 from station.settings.segmentation import RobustParameters
-from station.vision.contact import Contact, Flag, Image
+from station.vision.contact import Contact, Image
 from station.vision.robust import RobustMethod
 from station.vision.step import measure_step
+from station.vocabulary import Flag
 
 TWIN_SEEDS = range(91_000, 91_100)
 """Nothing was chosen on them."""

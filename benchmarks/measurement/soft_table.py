@@ -14,11 +14,12 @@ from measurement.data_sets import filled
 from measurement.peers import PEER, contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.gel import MM_PER_PX
-from station.vision.contact import Contact, Flag
+from station.vision.contact import Contact
 from station.vision.methods import median_image
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
+from station.vocabulary import Flag
 
 SEEDS = range(90_000, 90_034)
 """Six bodies each; nothing was chosen on them."""

@@ -8,10 +8,11 @@ from measurement.on_the_twin import FRAMES_PER_S, FRAMES_PER_STEP, conditions
 from measurement.peers import PEER, contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.sensor import DigitSensor
-from station.vision.contact import Contact, Flag
+from station.vision.contact import Contact
 from station.vision.methods import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
+from station.vocabulary import Flag
 
 UNITS = range(32000, 32060)
 """Nothing was chosen on them."""

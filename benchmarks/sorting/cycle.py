@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.second_press import needs_second_press, together
 from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
 from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_STANDARD_UNCERTAINTY
-from station.vocabulary import OutcomeName, Reason
+from station.vocabulary import Flag, OutcomeName, Reason
 
 from .presses import Closing, Pressed, Step
 from .specimens import CALIBRATION_SD, Specimen, Task, draw

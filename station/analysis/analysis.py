@@ -22,10 +22,11 @@ from station.errors import BadInputError
 from station.inspection.curve import Reading, area_curve
 from station.inspection.monotone import wrong_frames
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Contact, Flag, Image
+from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
 from station.vision.scale import Scale
+from station.vocabulary import Flag
 
 _THUMBNAIL_PX = 220
 _STAGE_PX = 150

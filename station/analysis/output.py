@@ -19,8 +19,9 @@ from station.analysis.measurement import Measured, Refused
 from station.errors import BadInputError
 from station.inspection.curve import AreaCurve
 from station.inspection.monotone import WrongFrame
-from station.vision.contact import Contact, Flag
+from station.vision.contact import Contact
 from station.vision.quality import DenoisingQuality
+from station.vocabulary import Flag
 
 RESULT_COLUMNS = ("image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags")
 CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2")

@@ -13,9 +13,10 @@ from station.calibration.rig import Pressed, Rig
 from station.messages import calibration as messages
 from station.messages.message import Message
 from station.settings.recipe import Recipe
-from station.vision.contact import Contact, Flag, Image, Method
+from station.vision.contact import Contact, Image, Method
 from station.vision.methods import make_method, median_image
 from station.vision.step import mean_image, measure_step
+from station.vocabulary import Flag
 
 FINEST_STEP_MM = 0.4
 """A count of the gripper."""

@@ -12,9 +12,10 @@ from math import hypot
 from statistics import median
 
 from station.inspection.monotone import wrong_frames
-from station.inspection.press import RELATIVE_NOISE, Flag, Measured, Press
+from station.inspection.press import RELATIVE_NOISE, Measured, Press
 from station.inspection.sized_limits import SizedLimits
 from station.inspection.uncertainty import Budget, budget_at
+from station.vocabulary import Flag
 
 LIGHT_TOUCH = 0.5
 """Below this share of the first damage threshold's closing a contact is too light to say anything for or against: a

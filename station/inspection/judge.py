@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from station.inspection.evidence import Evidence, Growth
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import SizedLimits, sized_limits
 from station.inspection.uncertainty import Budget
 from station.messages import judge as messages
@@ -18,7 +18,7 @@ from station.messages.message import Definition, Message, joined
 from station.messages.reasons import reason_message
 from station.settings.damage import AreaThreshold
 from station.settings.recipe_model import Recipe
-from station.vocabulary import OutcomeName, Reason
+from station.vocabulary import Flag, OutcomeName, Reason
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,27 +1,14 @@
 """One press as it was measured: what the judge is given, in plain values."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 from math import isfinite
 
 from station.inspection.fruit_size import NO_SIZE, FruitSize
-from station.vocabulary import Reason
+from station.vocabulary import Flag, Reason
 
 RELATIVE_NOISE = 0.05
 """By how much of itself an area may fall while the gripper closes before its step is called wrong; docs/measurement.md
 has the method's median errors, 0.04 to 0.06 on smooth fruit. The guard band of a limit is in uncertainty.py."""
-
-
-class Flag(StrEnum):
-    """What a reader of an area has to know about it; the same words as the measurement's own flags."""
-
-    NO_CONTACT = "no_contact"
-    UNDECIDED = "undecided"
-    CUT_BY_BORDER = "cut_by_border"
-    LOWER_BOUND = "lower_bound"
-    SATURATED = "saturated"
-    LOW_CONFIDENCE = "low_confidence"
-    REFERENCE_MISMATCH = "reference_mismatch"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from station.inspection.judge import Judgement
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.messages.message import Message, joined
+from station.vocabulary import Flag
 
 _PRESSES, _PRESS = "presses", "first_press"
 _FLAGS = {flag.value for flag in Flag}

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from station.inspection.judge import early_stop
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
 from station.twin.contact import FruitOnGel, Pose
@@ -194,5 +194,5 @@ class Grip:
             area_mm2=area_mm2,
             area_px=contact.area_px,
             confidence=contact.confidence,
-            flags=frozenset(Flag(flag.value) for flag in contact.flags),
+            flags=contact.flags,
         )

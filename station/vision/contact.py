@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Protocol
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+
+from station.vocabulary import Flag
 
 Image = npt.NDArray[np.uint8]
 """A colour image, shape (height, width, 3), dtype uint8, channels B, G, R as OpenCV reads them."""
@@ -20,25 +21,6 @@ FloatImage = npt.NDArray[np.float32]
 
 StageSink = Callable[[str, npt.NDArray[np.uint8]], None]
 """Takes a stage's name and its picture: (height, width, 3) BGR or (height, width) grey, dtype uint8."""
-
-
-class Flag(StrEnum):
-    """What a reader of an area has to know about it."""
-
-    NO_CONTACT = "no_contact"
-    """Nothing touches the gel: the area is 0."""
-    UNDECIDED = "undecided"
-    """Something bends the gel, but no edge was found: the area is given as 0 and is unknown."""
-    CUT_BY_BORDER = "cut_by_border"
-    """The contact reaches the image's border: the area is a lower bound."""
-    LOWER_BOUND = "lower_bound"
-    """The edge was lost where the press so far had it: the contact is at least as large as this area."""
-    SATURATED = "saturated"
-    """Much of the contact is at the end of the grey scale: its edge may lie elsewhere."""
-    LOW_CONFIDENCE = "low_confidence"
-    """The confidence is below what the recipe asks for."""
-    REFERENCE_MISMATCH = "reference_mismatch"
-    """The frame differs from its reference by more than contact and drift explain: take a new reference."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from station.vision.background import Background, BackgroundModel, Coefficients,
 from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
 from station.vision.changed_area import agreement, agreement_of_growth, changed
 from station.vision.constants import CONSTANTS, Constants
-from station.vision.contact import Contact, Flag, FloatImage, Image, Mask, StageSink, contact_from_mask
+from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.contour import change_length
 from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
@@ -33,6 +33,7 @@ from station.vision.region import (
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
 from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
+from station.vocabulary import Flag
 
 PRINTED_LONG_SIDE_PX = 640
 PRINTED_IMAGE_PX = 640 * 480

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from station.vision.confidence import agreement
-from station.vision.contact import Contact, Flag, Image, Method
+from station.vision.contact import Contact, Image, Method
+from station.vocabulary import Flag
 
 
 def measure_step(

@@ -8,12 +8,13 @@ import numpy as np
 
 from station.calibration.gate import gated
 from station.errors import StationError
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.messages import whatif as messages
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
+from station.vocabulary import Flag
 from station.whatif.stored import StoredPress
 
 _SAME_AREA, _SAME_PX = 0.02, 50
@@ -71,7 +72,7 @@ def _point(
         confidence *= min(1.0, stored.confidence / then.confidence)
     scale_mm2 = stored.area_mm2 / stored.area_px if stored.area_px else _scale(press)
     area_mm2 = now.area_px * scale_mm2
-    flags = {Flag(flag.value) for flag in now.flags}
+    flags = set(now.flags)
     if confidence is not None and confidence < draft.robust.least_confidence:
         flags.add(Flag.LOW_CONFIDENCE)
     return Measured(stored.closing_mm, area_mm2, now.area_px, confidence, frozenset(flags))

@@ -10,14 +10,14 @@ from typing import Any
 from sqlalchemy import Connection
 
 from station.inspection.fruit_size import FruitSize
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.second_press import together
 from station.messages.judge import STEPS_ENDED
 from station.messages.message import Message
 from station.records.first_press import first_press
 from station.records.images import image_path
 from station.records.stored_message import from_stored
-from station.vocabulary import OutcomeName, Reason
+from station.vocabulary import Flag, OutcomeName, Reason
 
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
 """Default of the gripper's count, the step of the onset search; for records without their own."""

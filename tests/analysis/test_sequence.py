@@ -18,9 +18,10 @@ from station.analysis.sources import Source, list_sources
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 from station.twin.digit.press import render_press
-from station.vision.contact import Contact, Flag, StageSink, contact_from_mask
+from station.vision.contact import Contact, StageSink, contact_from_mask
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
+from station.vocabulary import Flag
 
 CLOSINGS_MM = (-2.0, -1.0, 0.5, 1.5, 2.5, 3.5, 4.5)
 BLUEBERRY = find_recipe("blueberry")

@@ -10,7 +10,8 @@ from station.analysis.analysis import Request, analyze
 from station.analysis.decoding import Decoded
 from station.analysis.sources import list_sources
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Contact, Flag, contact_from_mask
+from station.vision.contact import Contact, contact_from_mask
+from station.vocabulary import Flag
 
 
 class Stub:

@@ -17,7 +17,7 @@ from markdown_it.token import Token
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
@@ -273,7 +273,7 @@ def _pressed(shown: PressSequence, recipe, size: FruitSize) -> Press:
             area_mm2,
             contact.area_px,
             contact.confidence,
-            frozenset(Flag(flag.value) for flag in contact.flags),
+            contact.flags,
             None if changed_px is None else changed_px * MM_PER_PX**2,
             changed_px,
         )

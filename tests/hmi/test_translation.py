@@ -25,8 +25,7 @@ from station.messages import arm, camera, commands, gripper, judge, lots, outbox
 from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
-from station.vision.contact import Flag
-from station.vocabulary import OutcomeName, PackmlState, Reason
+from station.vocabulary import Flag, OutcomeName, PackmlState, Reason
 
 STATION = HMI.parent / "station"
 NO_PAGES = {

@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from station.inspection.judge import early_stop, judge
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.messages import judge as messages
 from station.messages.message import SENTENCES
 from station.settings.recipe import load_recipe
 from station.settings.recipe_model import Recipe
 from station.vision.contact import Flag as MeasurementFlag
-from station.vocabulary import Reason
+from station.vocabulary import Flag, Reason
 
 ROOT = Path(__file__).resolve().parents[2]
 

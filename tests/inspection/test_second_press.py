@@ -7,10 +7,10 @@ import pytest
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.second_press import needs_second_press, together
 from station.settings.recipe import load_recipe
-from station.vocabulary import Reason
+from station.vocabulary import Flag, Reason
 
 RECIPE = load_recipe(Path(__file__).resolve().parents[2] / "recipes" / "blueberry.yaml")
 COUNT_MM = 0.375

@@ -13,9 +13,8 @@ from station.records.database import records_folder
 from station.runtime.imaging import worker as vision_worker
 from station.runtime.rpc.pictures import PanelPictures
 from station.runtime.rpc.worker import PanelWorker
-from station.vision.contact import Flag
 from station.vision.methods import make_method
-from station.vocabulary import Reason
+from station.vocabulary import Flag, Reason
 
 
 @pytest.fixture

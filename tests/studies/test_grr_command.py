@@ -28,7 +28,8 @@ from station.studies.gauge_twin import (
     setup_of,
 )
 from station.twin.gel import MM_PER_PX
-from station.vision.contact import Contact, Flag
+from station.vision.contact import Contact
+from station.vocabulary import Flag
 
 
 def asked(*arguments: object) -> Result:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from station.settings.segmentation import PaperParameters
-from station.vision.contact import Flag, contact_from_mask
+from station.vision.contact import contact_from_mask
 from station.vision.paper import (
     PaperMethod,
     amplified_difference,
@@ -16,6 +16,7 @@ from station.vision.paper import (
     clean,
     denoise,
 )
+from station.vocabulary import Flag
 
 PARAMETERS = PaperParameters()
 SMALL_IMAGES = arrays(np.uint8, (12, 9, 3))

@@ -11,9 +11,9 @@ from station.twin.digit.loaded import band_share
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.soft.body import Foundation, SoftBody, SoftKind
 from station.twin.soft.contact import SoftOnGel
-from station.vision.contact import Flag
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
+from station.vocabulary import Flag
 
 PARAMETERS = RobustParameters()
 SEEDS = range(4)

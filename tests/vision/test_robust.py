@@ -21,9 +21,9 @@ from station.twin.soft.body import Foundation, SoftBody, SoftKind
 from station.twin.soft.contact import SoftOnGel
 from station.twin.squeeze import Squeeze
 from station.vision.constants import CONSTANTS
-from station.vision.contact import Flag
 from station.vision.robust import STAGES, RobustMethod
 from station.vision.step import mean_image
+from station.vocabulary import Flag
 
 FEW = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 

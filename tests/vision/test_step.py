@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from station.settings.segmentation import PaperParameters, RobustParameters
-from station.vision.contact import Flag
 from station.vision.paper import PaperMethod
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
+from station.vocabulary import Flag
 
 
 def test_one_frame_is_measured_as_it_is(sphere_press):

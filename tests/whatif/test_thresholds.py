@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.settings.recipe import find_recipe, load_recipe
-from station.vocabulary import Reason
+from station.vocabulary import Flag, Reason
 from station.whatif.limits import (
     Costs,
     MarkedFruit,

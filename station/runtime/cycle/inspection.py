@@ -9,7 +9,7 @@ from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.evidence import AT_MM
 from station.inspection.judge import Judgement
-from station.inspection.press import Flag, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.second_press import together
 from station.messages.message import Message
 from station.records.first_press import first_press_findings, first_press_measures
@@ -214,7 +214,7 @@ class Inspection:
             area_mm2=area_mm2,
             area_px=contact.area_px,
             confidence=contact.confidence,
-            flags=frozenset(Flag(flag.value) for flag in contact.flags),
+            flags=contact.flags,
             changed_area_mm2=self._mm2(contact.changed_area_px),
             changed_area_px=contact.changed_area_px,
         )

@@ -15,9 +15,10 @@ from station.messages.message import Message
 from station.runtime.state_files import StateFiles
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
-from station.vision.contact import Flag, Method
+from station.vision.contact import Method
 from station.vision.image_quality import DEAD_LED, light, sharpness
 from station.vision.methods import make_method
+from station.vocabulary import Flag
 
 _SATURATED_LEVEL = 250
 GOLDEN = "golden_reference.png"
