@@ -16,12 +16,12 @@ from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
+from station.press.procedure import Cell
 from station.records.database import records_folder
 from station.records.errors import LockedError
 from station.records.open import lock_folder
 from station.runtime.devices.bare_grip import renewed_lease
 from station.runtime.devices.calibration_rig import StationRig
-from station.runtime.devices.grip import Cell
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
 

@@ -22,7 +22,7 @@ from station.runtime.cycle.actions import Inspector
 from station.runtime.cycle.service import CYCLE, Service
 from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.imaging.reference import GoldenReference
+from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
 from station.runtime.observability.audit_logger import FLUSH_S, AuditLogger
 from station.runtime.observability.health import HealthServer, Liveness

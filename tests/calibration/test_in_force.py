@@ -32,7 +32,7 @@ from station.messages.message import verbatim
 from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
 from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.imaging.reference import GoldenReference
+from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint

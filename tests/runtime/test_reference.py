@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from station.inspection.alarm_table import AlarmId
-from station.runtime.imaging.reference import BadReferenceError, GoldenReference, check_reference
+from station.press.reference import BadReferenceError, check_reference
+from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.state_files import StateFiles
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings

@@ -11,8 +11,8 @@ from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.messages import gripper as gripper_messages
-from station.runtime.devices import grip as grip_module
-from station.runtime.devices.grip import MOST_UNSEEN_MM, Cell, Grip, NothingTouchedError, UnseenContactError
+from station.press import procedure as grip_module
+from station.press.procedure import MOST_UNSEEN_MM, Cell, Grip, NothingTouchedError, UnseenContactError
 from station.settings.recipe import find_recipe
 
 BLUEBERRY = find_recipe("blueberry")

@@ -8,9 +8,9 @@ import pytest
 
 from station.devices.camera.interface import Frame
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
-from station.runtime.devices.grip import GripStep
+from station.press.procedure import GripStep
 from station.runtime.imaging import worker as module
-from station.runtime.imaging.reference import GoldenReference
+from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
 from station.runtime.state_files import StateFiles
 from station.settings.recipe import find_recipe

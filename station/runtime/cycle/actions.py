@@ -18,10 +18,7 @@ from station.inspection.judge import early_stop, judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
-from station.records.model import Image
-from station.runtime.alarms.manager import AlarmManager
-from station.runtime.cycle.inspection import Inspection
-from station.runtime.devices.grip import (
+from station.press.procedure import (
     FRAME_DEADLINE_S,
     Grip,
     GripStep,
@@ -29,8 +26,11 @@ from station.runtime.devices.grip import (
     UnseenContactError,
     at_once,
 )
+from station.press.reference import ALARMS, BadReferenceError
+from station.records.model import Image
+from station.runtime.alarms.manager import AlarmManager
+from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
-from station.runtime.imaging.reference import ALARMS, BadReferenceError
 from station.runtime.imaging.worker import MeasuredStep, VisionWorker
 from station.runtime.observability.metrics import Metrics
 from station.settings.configuration import Configuration

@@ -12,10 +12,10 @@ from station.inspection.judge import Judgement
 from station.inspection.press import Measured, Press
 from station.inspection.second_press import together
 from station.messages.message import Message
+from station.press.procedure import GripStep
 from station.records.first_press import first_press_findings, first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
-from station.runtime.devices.grip import GripStep
 from station.runtime.imaging.worker import MeasuredStep
 from station.runtime.recipes.active import ActiveRecipe
 from station.vocabulary import OutcomeName, Reason

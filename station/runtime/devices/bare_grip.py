@@ -8,7 +8,7 @@ from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.messages import grip as messages
-from station.runtime.devices.grip import Cell, Grip, GripError, GripStep
+from station.press.procedure import Cell, Grip, GripError, GripStep
 from station.settings.recipe import Recipe
 from station.vision.contact import Method
 

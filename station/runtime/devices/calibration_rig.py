@@ -6,7 +6,7 @@ from station.calibration.rig import Place, Pressed
 from station.devices.camera.interface import Image
 from station.devices.gripper.interface import ObjectState
 from station.messages import grip as messages
-from station.runtime.devices.grip import FRAME_DEADLINE_S, Cell, Grip, GripError
+from station.press.procedure import FRAME_DEADLINE_S, Cell, Grip, GripError
 from station.settings.recipe import Recipe
 
 _OPEN_WITHIN_MM = 2.0

@@ -22,8 +22,8 @@ from station.errors import StationError
 from station.messages import camera as camera_messages
 from station.messages import device as device_messages
 from station.messages import gripper as gripper_messages
+from station.press.procedure import FRAME_DEADLINE_S, Cell, FramesError
 from station.runtime.devices.calibration import ActiveCalibration
-from station.runtime.devices.grip import FRAME_DEADLINE_S, Cell, FramesError
 from station.runtime.devices.monitor import DeviceMonitor
 from station.settings.configuration import Configuration
 

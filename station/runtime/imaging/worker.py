@@ -11,8 +11,9 @@ from typing import TypeVar
 import cv2
 
 from station.devices.camera.interface import Frame, Image
-from station.runtime.devices.grip import GripStep
-from station.runtime.imaging.reference import GoldenReference, ReferenceProperties, check_reference
+from station.press.procedure import GripStep
+from station.press.reference import ReferenceProperties, check_reference
+from station.runtime.imaging.golden_reference import GoldenReference
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Contact, Method

@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 from station.channel.line import Reason, Refusal
 from station.devices.camera.interface import FrameFault
 from station.inspection.alarm_table import ALARMS
+from station.press.reference import ALARMS as REFERENCE_ALARMS
 from station.records import errors
-from station.runtime.imaging.reference import ALARMS as REFERENCE_ALARMS
 
 OTHER = "other"
 """Label value for a value that is not one of its own, or one too many."""

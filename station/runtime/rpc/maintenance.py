@@ -35,7 +35,7 @@ from station.messages.commands import JOGGING
 from station.messages.message import Message
 from station.records.audit import AuditEntry
 from station.runtime.devices.manager import GRIPPER
-from station.runtime.imaging.reference import GOLDEN
+from station.runtime.imaging.golden_reference import GOLDEN
 from station.runtime.observability.observability import Observability
 from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing

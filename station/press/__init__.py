@@ -1,0 +1,1 @@
+"""Press: reference, approach, contact, compression steps and release, the same for every rig."""

@@ -1,0 +1,73 @@
+"""Golden reference: the stored picture of the untouched gel that every new reference is compared with."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from station.devices.camera.interface import Image
+from station.messages import grip as messages
+from station.messages.message import Message
+from station.press.reference import PreparedReference
+from station.runtime.state_files import StateFiles
+from station.settings.segmentation import Segmentation
+from station.vision.image_quality import light, sharpness
+from station.vision.methods import make_method
+
+GOLDEN = "golden_reference.png"
+
+
+class GoldenReference:
+    """Golden reference: the gel when a person last checked that it was clean, stored in the home folder.
+
+    For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
+    the gel or its cleaning, a person removes the file and the next reference replaces it.
+
+    Args:
+        state_files: state files of the home folder.
+        calibrated: returns the calibration's file; None if there is none.
+    """
+
+    def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
+        self._state_files, self._calibrated = state_files, calibrated
+        self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
+
+    def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
+        """Return the golden reference, prepared for comparisons; None if there is none that can be read.
+
+        Args:
+            segmentation: of the recipe; finds a contact between the golden and another reference.
+        """
+        data, renewal = self._read()
+        if data is None:
+            return None
+        if self._prepared is None or self._prepared[:2] != (data, segmentation):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+            if picture is None:
+                return None
+            image = np.asarray(picture, np.uint8)
+            self._prepared = (
+                data,
+                segmentation,
+                PreparedReference(
+                    image.shape, sharpness(image), light(image), make_method([image], segmentation), renewal
+                ),
+            )
+        return self._prepared[2]
+
+    def store_first(self, image: Image) -> None:
+        """Store a picture as the golden reference if there is none yet.
+
+        Args:
+            image: shape (height, width, 3), dtype uint8, BGR.
+        """
+        if self._read()[0] is None:
+            self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
+
+    def _read(self) -> tuple[bytes | None, Message]:
+        """Return its file's content, and the instruction to make another one."""
+        calibrated = self._calibrated()
+        if calibrated is not None and (data := self._state_files.read(str(calibrated))) is not None:
+            return data, messages.RENEW_BY_CALIBRATION()
+        return self._state_files.read(GOLDEN), messages.RENEW_BY_REMOVAL(file=GOLDEN)
